@@ -13,8 +13,8 @@
 //! ```
 //!
 //! mixed with rho by the share `film / texture` while the film does not cover the ground's texture
-//! of 1.2 mm (Hahner et al., CVPR 2022, after Shin et al.). The rest of the light is reflected as by
-//! a mirror.
+//! of 1.2 mm (Hahner et al., CVPR 2022, after Shin et al.). The rest of the light is reflected as
+//! by a mirror.
 
 use formats::Scan;
 use formats::rng::StreamKey;

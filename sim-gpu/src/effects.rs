@@ -215,7 +215,8 @@ impl Effects {
     /// The same effects, with the values of `sensor` wherever they refer to the sensor's own.
     ///
     /// # Errors
-    /// If they refer to a quantum, a detection limit or a beam shape that the sensor does not state.
+    /// If they refer to a quantum, a detection limit or a beam shape that the sensor does not
+    /// state.
     pub fn for_sensor(&self, sensor: &SensorProfile) -> Result<Self, InvalidValue> {
         let mut resolved = self.clone();
         if let Some(quantum) = &mut resolved.quantum

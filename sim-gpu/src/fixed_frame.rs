@@ -1,5 +1,5 @@
-//! The frame of a sensor and an object in integers, from which casters make rays. `cpu::aim` derives
-//! the bounds of its rounding.
+//! The frame of a sensor and an object in integers, from which casters make rays. `cpu::aim`
+//! derives the bounds of its rounding.
 
 use glam::{DMat3, DVec3};
 

@@ -2,8 +2,8 @@
 //!
 //! An OBJ file names a material for each face (`usemtl`), whose colour is in an MTL file (`Kd`,
 //! `map_Kd`), or gives its vertices colours. Colours describe visible light, and surfaces differ at
-//! 905 nm: black plastic may be bright there. A name may therefore get a reflectivity of its own, or
-//! one of the table in `assets/materials.toml`.
+//! 905 nm: black plastic may be bright there. A name may therefore get a reflectivity of its own,
+//! or one of the table in `assets/materials.toml`.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -192,8 +192,8 @@ impl Materials {
     /// without one get `otherwise`.
     ///
     /// # Errors
-    /// If a file is not OBJ or cannot be read, a name is not used by the mesh, an MTL file is missing
-    /// or malformed, or a colour or an image cannot be used.
+    /// If a file is not OBJ or cannot be read, a name is not used by the mesh, an MTL file is
+    /// missing or malformed, or a colour or an image cannot be used.
     pub fn load(
         path: &Path,
         choice: &MaterialChoice,

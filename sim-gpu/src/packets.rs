@@ -10,8 +10,8 @@ use crate::config::{InvalidValue, within};
 use crate::effects::{Effects, NoiseModel, ReturnMode};
 use crate::sensor::{Layout, Rotating, SensorProfile};
 
-/// The attributes that [`formats::vlp32c`] reads, with these `effects` and these `wanted` attributes:
-/// the calibrated reflectivity or else the intensity, if there is either.
+/// The attributes that [`formats::vlp32c`] reads, with these `effects` and these `wanted`
+/// attributes: the calibrated reflectivity or else the intensity, if there is either.
 #[must_use]
 pub fn attributes(effects: &Effects, wanted: &AttributeSet) -> AttributeSet {
     let brightness = if wanted.contains(&Attribute::Reflectivity) {

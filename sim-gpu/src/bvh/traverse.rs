@@ -87,7 +87,8 @@ impl<Distance: PartialOrd + Copy + Default> Stack<Distance> {
     }
 }
 
-/// Visits the leaves at or below `from` that matter to `search`, in order of their boxes' distances.
+/// Visits the leaves at or below `from` that matter to `search`, in order of their boxes'
+/// distances.
 #[inline(always)]
 pub fn traverse<S: Search>(
     tree: &WideBvh,

@@ -2,12 +2,12 @@
 //! 2(1), 2013. Twin of `shaders/intersect.wgsl`, for the four triangles of a leaf at once. Each
 //! lane equals the result of `reference` for one triangle to the bit.
 //!
-//! Subnormal numbers: WGSL allows adapters to flush them to 0, and the CPU does not flush. What this
-//! crate promises does not depend on it. In the unit frame, flushing moves a coordinate by less than
-//! 1.2e-38, which is negligible beside [`DISPLACEMENT`]. Edge functions are products of two lengths:
-//! those of a triangle whose sides are below 1e-19 of the object's longest may vanish on some
-//! adapters, whose beams then hit the surface behind it. Such a triangle is smaller than the rounding
-//! of any vertex that is not next to 0.
+//! Subnormal numbers: WGSL allows adapters to flush them to 0, and the CPU does not flush. What
+//! this crate promises does not depend on it. In the unit frame, flushing moves a coordinate by
+//! less than 1.2e-38, which is negligible beside [`DISPLACEMENT`]. Edge functions are products of
+//! two lengths: those of a triangle whose sides are below 1e-19 of the object's longest may vanish
+//! on some adapters, whose beams then hit the surface behind it. Such a triangle is smaller than
+//! the rounding of any vertex that is not next to 0.
 
 #[cfg(test)]
 mod reference;

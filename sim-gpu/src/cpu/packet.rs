@@ -1,8 +1,8 @@
 //! Traces eight coherent rays at once, one in each lane of AVX2 or AVX-512: Wald, Slusallek,
 //! Benthin, Wagner, "Interactive rendering with coherent ray tracing", Eurographics 2001.
 //!
-//! Below a node that few of the rays enter, each ray goes on by itself. Each lane equals the result of
-//! `traverse` for a single ray to the bit.
+//! Below a node that few of the rays enter, each ray goes on by itself. Each lane equals the result
+//! of `traverse` for a single ray to the bit.
 
 use super::frustum::Frustum;
 use super::intersect::{DISPLACEMENT, STEEPEST};

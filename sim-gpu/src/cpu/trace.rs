@@ -63,7 +63,8 @@ impl Task<'_> {
         let mut interleaved = Interleaved::for_tree(tree);
         let mut from = 0;
         while from < rays.len() {
-            // Incoherent rays before the next packet go interleaved, up to the end if there is none.
+            // Incoherent rays before the next packet go interleaved, up to the end if there is
+            // none.
             let packet = next_packet(rays, from);
             let at = packet.as_ref().map_or(rays.len(), |(at, ..)| *at);
             interleaved.trace(tree, &rays[from..at], &mut codes[from..at], by);

@@ -8,7 +8,8 @@ use crate::sensor::{DetectionLimit, LARGEST_M};
 /// The detection of returns by received power.
 ///
 /// A receiver reports a pulse where its signal crosses a threshold. Here the signal is the received
-/// power, and the threshold is the power of the weakest surface that the sensor is stated to detect.
+/// power, and the threshold is the power of the weakest surface that the sensor is stated to
+/// detect.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Detection {
     /// The weakest surface that the sensor detects; `None` is the sensor's own limit.

@@ -1,5 +1,5 @@
-//! The buffers of one dispatch in flight. Slots are reused, so that a long run allocates only as much
-//! as its largest batches need.
+//! The buffers of one dispatch in flight. Slots are reused, so that a long run allocates only as
+//! much as its largest batches need.
 
 use super::batch::Batch;
 use super::clock::Clock;

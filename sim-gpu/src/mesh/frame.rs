@@ -28,8 +28,8 @@ formats::named! {
         /// the point clouds of ModelNet.
         #[default]
         UnitSphere = "unit-sphere",
-        /// The centre of the bounding box moves to the origin, and its longest side becomes 2, as in
-        /// ModelNet40-C.
+        /// The centre of the bounding box moves to the origin, and its longest side becomes 2, as
+        /// in ModelNet40-C.
         Bbox = "bbox",
         /// The centre of the bounding box moves to the origin; the unit of the file is a metre.
         None = "none",

@@ -26,9 +26,9 @@ pub struct LoadedMesh {
 ///
 /// # Errors
 ///
-/// [`MeshError`] names the path, the line if known, and the cause: the file cannot be read, is not a
-/// regular file, is empty, truncated or not of its format, has an index out of range or a coordinate
-/// that is not finite, or has no triangle.
+/// [`MeshError`] names the path, the line if known, and the cause: the file cannot be read, is not
+/// a regular file, is empty, truncated or not of its format, has an index out of range or a
+/// coordinate that is not finite, or has no triangle.
 pub fn load(path: &Path) -> Result<LoadedMesh, MeshError> {
     Ok(load_hashed(path, Hashing::None)?.0)
 }

@@ -1,8 +1,8 @@
 //! Wavefront OBJ, through the crate tobj.
 //!
-//! tobj is given positions and faces only. Groups, materials, normals and texture coordinates do not
-//! matter to a beam, but would split the mesh into several models, or make it fail. Lines keep their
-//! numbers, so that errors can name them.
+//! tobj is given positions and faces only. Groups, materials, normals and texture coordinates do
+//! not matter to a beam, but would split the mesh into several models, or make it fail. Lines keep
+//! their numbers, so that errors can name them.
 
 use std::io::{BufRead, Cursor};
 
@@ -14,8 +14,8 @@ use super::triangle_mesh::{Parsed, TriangleMesh};
 
 /// Reads an OBJ file from its bytes.
 ///
-/// All objects become one mesh. It has the vertices that faces refer to, in the order of their first
-/// use. Polygons become fans around their first corner; faces of fewer than three corners are
+/// All objects become one mesh. It has the vertices that faces refer to, in the order of their
+/// first use. Polygons become fans around their first corner; faces of fewer than three corners are
 /// dropped and counted.
 pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, ParseError> {
     let geometry = Geometry::parse(bytes)?;

@@ -18,8 +18,8 @@ const FACE: usize = 1;
 /// Reads a PLY file from its bytes.
 ///
 /// It reads x, y and z of the element `vertex` and the list of vertex indices of `face`, and skips
-/// everything else. Polygons become fans around their first corner; faces of fewer than three corners
-/// are dropped and counted.
+/// everything else. Polygons become fans around their first corner; faces of fewer than three
+/// corners are dropped and counted.
 ///
 /// A coordinate of type `float` is rounded to f32 in text too, so that both
 /// encodings of a mesh give the same positions.

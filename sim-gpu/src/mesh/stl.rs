@@ -9,8 +9,8 @@ use glam::DVec3;
 use super::error::{Malformed, ParseError};
 use super::triangle_mesh::Parsed;
 
-/// Binary STL, little-endian: 80 bytes of text, the number of triangles (u32), and for each triangle
-/// the normal and the corners as twelve f32, and a u16.
+/// Binary STL, little-endian: 80 bytes of text, the number of triangles (u32), and for each
+/// triangle the normal and the corners as twelve f32, and a u16.
 const HEADER: usize = 80;
 const PREFIX: usize = HEADER + 4;
 const TRIANGLE: usize = 50;

@@ -65,7 +65,8 @@ pub enum TreeError {
     },
 }
 
-/// Lists the meshes in the folder `root`, or the single file `root`, sorted by class, split and name.
+/// Lists the meshes in the folder `root`, or the single file `root`, sorted by class, split and
+/// name.
 ///
 /// A mesh `CLASS/{train,test}/NAME.ext` keeps its split. The class of any other mesh is its folder,
 /// and 4 of 5 are in the training set. The split is a function of `seed`, class and name alone, so
@@ -73,11 +74,11 @@ pub enum TreeError {
 /// class, or a split of one.
 ///
 /// Characters that some platform forbids in file names become `_`. If several meshes have the same
-/// class, split and name (`a.obj` beside `a.off`, or in folders at different depths), `_` and a hash
-/// of the relative path is appended to each of their names.
+/// class, split and name (`a.obj` beside `a.off`, or in folders at different depths), `_` and a
+/// hash of the relative path is appended to each of their names.
 ///
-/// Links are followed, except to a folder that contains them. Files with other extensions, files and
-/// folders whose name begins with a dot, and `__MACOSX` are ignored.
+/// Links are followed, except to a folder that contains them. Files with other extensions, files
+/// and folders whose name begins with a dot, and `__MACOSX` are ignored.
 ///
 /// # Errors
 ///

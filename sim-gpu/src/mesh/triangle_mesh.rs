@@ -21,8 +21,8 @@ pub struct Parsed {
 }
 
 impl Parsed {
-    /// Appends a face as a fan around its first corner, or counts it as dropped if it has fewer than
-    /// three corners.
+    /// Appends a face as a fan around its first corner, or counts it as dropped if it has fewer
+    /// than three corners.
     pub(super) fn add_face(&mut self, corners: &[u32]) {
         self.dropped_faces += usize::from(corners.len() < 3);
         let sides = corners.windows(2).skip(1);

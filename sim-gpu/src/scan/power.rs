@@ -6,9 +6,9 @@
 //! P = rho cos(theta) / R^2
 //! ```
 //!
-//! for a surface that scatters by Lambert's law and fills the beam, with reflectivity rho, incidence
-//! theta and range R. Shaders do not compute it: the range is known in f64 only after casting, and
-//! every adapter must detect the same returns.
+//! for a surface that scatters by Lambert's law and fills the beam, with reflectivity rho,
+//! incidence theta and range R. Shaders do not compute it: the range is known in f64 only after
+//! casting, and every adapter must detect the same returns.
 
 use crate::cpu::random::{normal_deviate, random_bits};
 use crate::effects::Detection;
@@ -19,8 +19,8 @@ use formats::rng::StreamKey;
 /// Selects the random bits of a beam for the receiver's noise and the error of its timing.
 const RECEIVER_PURPOSE: u32 = 3;
 
-/// Calibrated reflectivities: percent for diffuse surfaces, the rest of a byte for retro-reflectors.
-/// VLP-32C User Manual 63-9325, 6.1.
+/// Calibrated reflectivities: percent for diffuse surfaces, the rest of a byte for
+/// retro-reflectors. VLP-32C User Manual 63-9325, 6.1.
 const WHITE: f64 = 100.0;
 const LEAST_RETRO: f64 = 101.0;
 const IDEAL_RETRO: f64 = 255.0;
@@ -28,8 +28,8 @@ const IDEAL_RETRO: f64 = 255.0;
 /// The brightness, 0 to 1, of a surface whose normal has this `cosine` to the beam. A white surface
 /// that faces the sensor has 1.
 ///
-/// A retro-reflector has 1 at any incidence. That is a lower bound: it returns far more, but makers do
-/// not state how much.
+/// A retro-reflector has 1 at any incidence. That is a lower bound: it returns far more, but makers
+/// do not state how much.
 pub(super) fn brightness(material: Material, cosine: impl FnOnce() -> f64) -> f64 {
     if material.retroreflection > 0.0 {
         return 1.0;
@@ -67,9 +67,9 @@ pub(super) fn is_detected(
     power + noise * limit.power() >= limit.power()
 }
 
-/// The error of the range of a detected return of this power due to the receiver's noise, metres. The
-/// time of a pulse is measured to 1/sqrt(2 SNR) of its length, so that the standard deviation falls
-/// as the square root of the power. Powers below the limit count as the limit.
+/// The error of the range of a detected return of this power due to the receiver's noise, metres.
+/// The time of a pulse is measured to 1/sqrt(2 SNR) of its length, so that the standard deviation
+/// falls as the square root of the power. Powers below the limit count as the limit.
 pub(super) fn range_error(
     sigma_at_limit_m: f64,
     limit: &DetectionLimit,

@@ -10,10 +10,10 @@ const BITS: u32 = 12;
 /// The most squares side by side around the horizon.
 const MAX_SQUARES: f64 = 256.0;
 
-/// All indices of `directions`, sorted along a chain of Hilbert curves. The strip between the lowest
-/// and the highest elevation is cut into squares around the horizon, each with its own curve. Each
-/// curve ends where the next begins, so that every run of the chain is a compact patch, whatever
-/// the spacing of the rings. Ties keep firing order.
+/// All indices of `directions`, sorted along a chain of Hilbert curves. The strip between the
+/// lowest and the highest elevation is cut into squares around the horizon, each with its own
+/// curve. Each curve ends where the next begins, so that every run of the chain is a compact patch,
+/// whatever the spacing of the rings. Ties keep firing order.
 pub(super) fn coherent_order(directions: &[DVec3]) -> Vec<u32> {
     let angles_rad: Vec<[f64; 2]> = directions.iter().map(azimuth_elevation_rad).collect();
     let lowest = |axis: usize| angles_rad.iter().map(|a| a[axis]).fold(f64::INFINITY, f64::min);

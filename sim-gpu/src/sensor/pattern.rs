@@ -184,8 +184,8 @@ fn for_each_ray<T: Copy>(of_beam: &[T], samples: u32) -> Vec<T> {
     of_beam.iter().flat_map(|&value| std::iter::repeat_n(value, samples as usize)).collect()
 }
 
-/// The starts of some rays, from [`BeamPattern::starts_m`]; `None` if all rays start at the sensor's
-/// origin.
+/// The starts of some rays, from [`BeamPattern::starts_m`]; `None` if all rays start at the
+/// sensor's origin.
 #[inline(always)]
 pub(crate) fn starts<const N: usize>(starts_m: &[DVec3], beams: [u32; N]) -> Option<[DVec3; N]> {
     (!starts_m.is_empty()).then(|| each(|lane: usize| starts_m[beams[lane] as usize]))

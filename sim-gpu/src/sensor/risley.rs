@@ -72,8 +72,8 @@ impl Prism {
     }
 }
 
-/// Snell's law: the unit vector `ray` behind a face whose `normal` points against it. `ratio` is the
-/// index before the face over that behind it. `None` for total internal reflection.
+/// Snell's law: the unit vector `ray` behind a face whose `normal` points against it. `ratio` is
+/// the index before the face over that behind it. `None` for total internal reflection.
 fn refract(ray: DVec3, normal: DVec3, ratio: f64) -> Option<DVec3> {
     let cos_in = -ray.dot(normal);
     let cos2_out = 1.0 - ratio * ratio * (1.0 - cos_in * cos_in);

@@ -24,10 +24,12 @@ pub struct Table {
     /// The start of the first scan, seconds after the first row.
     #[serde(default)]
     pub start_s: f64,
-    /// The number of laser lines that take turns row by row; a point's ring is the index of its line.
+    /// The number of laser lines that take turns row by row; a point's ring is the index of its
+    /// line.
     #[serde(default = "one_line")]
     pub lines: u16,
-    /// The azimuth, counterclockwise from forward, and the elevation of each row, instead of a file.
+    /// The azimuth, counterclockwise from forward, and the elevation of each row, instead of a
+    /// file.
     #[serde(default)]
     pub directions_deg: Vec<[f64; 2]>,
 }

@@ -45,7 +45,8 @@ pub(super) fn proven(mesh: &TriangleMesh, kept: &[u32], bound: f64) -> Option<Tr
     (corners.len() <= most).then(|| welded.mesh_of(mesh, &corners))
 }
 
-/// `corners` without the triangles that stray from the `original`, and with the triangles to restore.
+/// `corners` without the triangles that stray from the `original`, and with the triangles to
+/// restore.
 fn repair(
     mesh: &TriangleMesh,
     welded: &Welded,
@@ -96,8 +97,8 @@ fn target(mesh: TriangleMesh) -> Target {
     Target::new(Surface::of_mesh(mesh), Builder::Morton)
 }
 
-/// A mesh in which corners at the same position are the same vertex: files often repeat vertices for
-/// each face, and edges would not collapse across such seams.
+/// A mesh in which corners at the same position are the same vertex: files often repeat vertices
+/// for each face, and edges would not collapse across such seams.
 struct Welded {
     /// In the unit frame, `[n_welded]`.
     positions: Vec<[f32; 3]>,

@@ -36,8 +36,8 @@ fn to_segment(point: DVec3, from: DVec3, to: DVec3) -> f64 {
     (point - (from + along * t)).length()
 }
 
-/// The distance from `point` to the surface of `target`, both in its unit frame; infinite for an empty
-/// surface.
+/// The distance from `point` to the surface of `target`, both in its unit frame; infinite for an
+/// empty surface.
 #[must_use]
 pub fn distance_to_surface(target: &Target, point: DVec3) -> f64 {
     let mut search = NearestTo { point, surface: &target.surface, nearest: f64::INFINITY };

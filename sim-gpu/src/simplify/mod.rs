@@ -1,7 +1,7 @@
 //! Level of detail: fewer triangles, with a change below the resolution of sensors.
 //!
-//! A bound in metres, [`Simplify`], limits the distance between the simplified surface and the mesh's
-//! own. Its properties are proven for each mesh, independently of the decimation:
+//! A bound in metres, [`Simplify`], limits the distance between the simplified surface and the
+//! mesh's own. Its properties are proven for each mesh, independently of the decimation:
 //!
 //! - Every point of the simplified surface lies within the bound of the original surface, and every
 //!   point of the original within the bound of the simplified one (their Hausdorff distance). So
@@ -9,8 +9,8 @@
 //! - Hence a beam as wide as the bound on each side meets the original at a range that differs from
 //!   the simplified one by at most the bound.
 //! - For a beam without width, where one surface is a plane and the other a displaced copy, ranges
-//!   differ by up to bound / cos(incidence). Near edges and silhouettes it may meet another surface,
-//!   as may the wide beams of a real sensor.
+//!   differ by up to bound / cos(incidence). Near edges and silhouettes it may meet another
+//!   surface, as may the wide beams of a real sensor.
 //!
 //! The crate `meshopt` chooses the triangles. Its C++ rounds as its compiler does: the same program
 //! gives the same triangles, but those of another platform may differ.
@@ -73,8 +73,8 @@ impl Simplify {
     }
 }
 
-/// Simplifies the `kept` triangles of `mesh` within `bound`, in the mesh's units; `None` if that saves
-/// too little.
+/// Simplifies the `kept` triangles of `mesh` within `bound`, in the mesh's units; `None` if that
+/// saves too little.
 ///
 /// The vertices are some of the mesh's own. As in a file, some triangles may be degenerate or
 /// duplicates.

@@ -21,8 +21,9 @@ pub struct Viewpoint<'a> {
     pub positions: Vec<DVec3>,
 }
 
-/// The radius of a beam's footprint at the point of an object nearest to any of `viewpoints`, in the
-/// units of `mesh`: `units_per_m` of them are a metre. A surface displaced by less stays in its beam.
+/// The radius of a beam's footprint at the point of an object nearest to any of `viewpoints`, in
+/// the units of `mesh`: `units_per_m` of them are a metre. A surface displaced by less stays in its
+/// beam.
 ///
 /// The nearest distance is that to the mesh's bounding box, but at least the nearest range that the
 /// sensor reports. The radius is 0 if a sensor without such a limit stands in the box, and infinite

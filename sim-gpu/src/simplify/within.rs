@@ -21,8 +21,8 @@ const SHORTEST_PIECE: f64 = 1.0 / 16.0;
 /// The limit of pieces in a proof, per triangle of both surfaces; a proof that needs more fails.
 const PIECES_PER_TRIANGLE: usize = 256;
 
-/// Whether every point of `surface` is proven to lie within `bound` of the surface of `target`, all in
-/// the same units.
+/// Whether every point of `surface` is proven to lie within `bound` of the surface of `target`, all
+/// in the same units.
 #[must_use]
 pub fn lies_within(surface: &Surface, target: &Target, bound: f64) -> bool {
     beyond(surface, target, bound).is_empty()
@@ -103,7 +103,8 @@ impl Proof<'_> {
         .is_some()
     }
 
-    /// A triangle that is `fit` among those in boxes that hold all of `piece` if grown by the bound.
+    /// A triangle that is `fit` among those in boxes that hold all of `piece` if grown by the
+    /// bound.
     fn search(&self, [a, b, c]: [DVec3; 3], fit: impl Fn(u32) -> bool) -> Option<u32> {
         let (low, high) = (a.min(b).min(c) + self.bound, a.max(b).max(c) - self.bound);
         let Target { surface, bvh } = self.target;

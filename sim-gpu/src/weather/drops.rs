@@ -43,7 +43,8 @@ const ICE: f64 = 1.3031;
 /// The most drops of a kind in a beam.
 const MOST: u32 = 32;
 
-/// Steps of the integral along a beam, which is smooth: the relative error of Simpson's rule is 1e-6.
+/// Steps of the integral along a beam, which is smooth: the relative error of Simpson's rule is
+/// 1e-6.
 const STEPS: usize = 256;
 
 /// The extinction of rain at this rate, per metre.

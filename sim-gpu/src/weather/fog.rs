@@ -99,8 +99,8 @@ impl Fog {
 /// The cells of the table of shares, each about 6 cm wide.
 const CELLS: usize = 64;
 
-/// The part of the maximum of I(R) from the fog before each border of cells, between the blind range
-/// and the maximum.
+/// The part of the maximum of I(R) from the fog before each border of cells, between the blind
+/// range and the maximum.
 fn shares(peak_m: f64, extinction: f64) -> [f64; CELLS + 1] {
     let cell_m = (peak_m - BLIND_M) / CELLS as f64;
     let mut sums = [0.0; CELLS + 1];

@@ -34,8 +34,8 @@ fn sigma(p: f64, n: u32) -> f64 {
 #[test]
 fn rain_takes_the_place_of_a_surface_as_often_as_its_closed_form_and_lisa_say() {
     // The probability that a drop is stronger than a surface of reflectivity 0.1 and than the
-    // limit: 1 - exp(-mu), mu the integral of their density by an adaptive rule; beside it the figure that
-    // LISA itself gives, with its standard deviation.
+    // limit: 1 - exp(-mu), mu the integral of their density by an adaptive rule; beside it the
+    // figure that LISA itself gives, with its standard deviation.
     const BEAMS: u32 = 40_000;
     for (mm_h, end_m, closed, lisas, lisas_sigma) in [
         (10.0, 60.0, 0.0554, 0.0555, 0.0030),

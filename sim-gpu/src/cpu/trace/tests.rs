@@ -50,8 +50,8 @@ fn shuffled(rays: &[TraceRay]) -> Vec<TraceRay> {
     (0..rays.len()).map(|i| rays[i * STEP % rays.len()]).collect()
 }
 
-/// The rays of `coherent`, some replaced by rays along axes and diagonals, without direction, and with
-/// numbers that are not finite.
+/// The rays of `coherent`, some replaced by rays along axes and diagonals, without direction, and
+/// with numbers that are not finite.
 fn odd(coherent: &[TraceRay]) -> Vec<TraceRay> {
     let numbers = [0.0, -0.0, 1.0, -1.0, 1e-30, f32::INFINITY, f32::NAN];
     let mut rays = coherent.to_vec();

@@ -58,7 +58,8 @@ fn the_profiles_of_the_documentation_are_sound() {
     assert!(error.contains("table.file: expected a profile in a file, to find mid360.csv"));
 }
 
-/// Each row replaces the first text by the second in a sound profile; the error must hold the third.
+/// Each row replaces the first text by the second in a sound profile; the error must hold the
+/// third.
 #[test]
 fn bad_profiles_are_named() {
     let crossing = &TINY.replace("rpm = 60", "rpm = 60\nbeam_crossing_m = 0.04");
