@@ -2,15 +2,17 @@
 
 use crate::summary::{Counts, Summary, check};
 use crate::test::python;
-use anyhow::{Context, bail};
-use serde_json::Value;
+use anyhow::bail;
 use std::process::Command;
-use xtask::workspace::{cargo, output, root};
+use xtask::workspace::{cargo, output, packages, root};
 
-/// Runs every check, whether or not one before it failed, and ends with a table.
+/// The manifest of the product's workspace.
+const MANIFEST: &str = "Cargo.toml";
+
+/// Runs every check even if one fails, and prints a table of the results.
 pub fn run() -> anyhow::Result<u8> {
     let mut summary = Summary::default();
-    summary.step("packages", |_| packages());
+    summary.step("packages", |_| package());
     summary.step("binaries", binaries);
     summary.step("dependencies", |_| {
         let words = ["check", "--hide-inclusion-graph", "bans", "licenses", "sources"];
@@ -22,18 +24,18 @@ pub fn run() -> anyhow::Result<u8> {
     Ok(summary.end())
 }
 
-/// Checks that every crate for crates.io builds from what its package holds.
-fn packages() -> anyhow::Result<Counts> {
+/// Checks that every crate for crates.io builds from the files of its package.
+fn package() -> anyhow::Result<Counts> {
     let mut package = cargo(&["package", "--allow-dirty"]);
-    for crate_ in crates()?.iter().filter(|crate_| crate_["publish"].is_null()) {
+    for crate_ in packages(MANIFEST)?.iter().filter(|crate_| crate_["publish"].is_null()) {
         package.args(["--package", crate_["name"].as_str().unwrap_or_default()]);
     }
     check("packages", &mut package)
 }
 
-/// Checks what a release would hold for each system.
+/// Checks which files a release would have for each system.
 fn binaries(summary: &mut Summary) -> anyhow::Result<Counts> {
-    let is_known = crates()?.iter().any(|crate_| crate_["repository"].is_string());
+    let is_known = packages(MANIFEST)?.iter().any(|crate_| crate_["repository"].is_string());
     if !is_known {
         let reason = "no manifest names the `repository` to release from";
         return Ok(summary.skip("binaries", 1, reason));
@@ -41,15 +43,15 @@ fn binaries(summary: &mut Summary) -> anyhow::Result<Counts> {
     check("binaries", tool("dist", "cargo-dist")?.arg("plan"))
 }
 
-/// Checks that no dependency has a known flaw, where the database of them can be fetched.
+/// Checks that no dependency has a known vulnerability, if their database can be downloaded.
 fn advisories(summary: &mut Summary) -> anyhow::Result<Counts> {
     if !tool("cargo-deny", "cargo-deny")?.args(["fetch", "db"]).status()?.success() {
-        return Ok(summary.skip("advisories", 1, "their database cannot be fetched"));
+        return Ok(summary.skip("advisories", 1, "their database cannot be downloaded"));
     }
     check("advisories", tool("cargo-deny", "cargo-deny")?.args(["check", "advisories"]))
 }
 
-/// Checks that the public interface changes as the versions say.
+/// Checks that changes of the public API agree with the version numbers.
 fn semantic_versions(summary: &mut Summary) -> anyhow::Result<Counts> {
     let mut git = Command::new("git");
     let tags = output(git.args(["tag", "--list", "v*"]).current_dir(root()))?;
@@ -60,14 +62,7 @@ fn semantic_versions(summary: &mut Summary) -> anyhow::Result<Counts> {
     check("semantic versions", semver.args(["semver-checks", "--workspace"]))
 }
 
-/// The workspace's crates as `cargo metadata` describes them.
-fn crates() -> anyhow::Result<Vec<Value>> {
-    let metadata = output(&mut cargo(&["metadata", "--no-deps", "--format-version", "1"]))?;
-    let mut metadata: Value = serde_json::from_str(&metadata).context("cargo metadata")?;
-    Ok(metadata["packages"].as_array_mut().map(std::mem::take).unwrap_or_default())
-}
-
-/// The program, at the workspace's root, or an error that says which package installs it.
+/// `program` in the workspace's root. If it is missing, the error names the `package` that has it.
 fn tool(program: &str, package: &str) -> anyhow::Result<Command> {
     if Command::new(program).arg("--version").output().is_err() {
         bail!("{program} is missing: `cargo install --locked {package}` installs it");
@@ -89,8 +84,8 @@ mod tests {
     }
 
     #[test]
-    fn the_crates_for_users_are_published_and_the_chores_are_not() {
-        let crates = crates().unwrap();
+    fn crates_for_users_are_published_and_crates_for_developers_are_not() {
+        let crates = packages(MANIFEST).unwrap();
         let find = |name: &str| crates.iter().find(|crate_| crate_["name"] == name).unwrap();
         let is_published = |name: &str| find(name)["publish"].is_null();
         for name in ["edgepuck", "edgepuck-formats", "sim-gpu", "infer-cpu"] {

@@ -1,4 +1,4 @@
-//! What became of the checks of a run: counts by step, and the table that ends it.
+//! The results of a run: counts for each step, and the table that ends the run.
 
 use anyhow::{Context, ensure};
 use std::fmt;
@@ -23,8 +23,8 @@ impl Counts {
     /// One check that failed.
     pub const FAILED: Self = Self { passed: 0, failed: 1, skipped: 0 };
 
-    /// The counts in the line that closes a test program's output; `None` for
-    /// any other line. Rust's own harness and libtest-mimic write the same line:
+    /// The counts in the last line of a test program's output; `None` for any other line. Rust's
+    /// own harness and libtest-mimic write the same line:
     /// `test result: ok. 9 passed; 0 failed; 1 ignored; 0 measured; ...`.
     pub fn of_closing_line(line: &str) -> Option<Self> {
         let (_, counts) = line.trim().strip_prefix("test result: ")?.split_once(". ")?;
@@ -50,7 +50,7 @@ impl Counts {
         }
     }
 
-    /// The same checks, `n` of which were counted as passed and were skipped.
+    /// Counts `n` checks as skipped that were counted as passed.
     #[must_use]
     pub fn of_which_skipped(self, n: u64) -> Self {
         Self { passed: self.passed.saturating_sub(n), skipped: self.skipped + n, ..self }
@@ -68,13 +68,12 @@ impl fmt::Display for Counts {
 #[derive(Default)]
 pub struct Summary {
     steps: Vec<(String, Duration, Counts)>,
-    /// What was skipped or failed, and why: a sentence each.
+    /// A sentence for each check that was skipped or failed, with the reason.
     remarks: Vec<String>,
 }
 
 impl Summary {
-    /// Runs one step. A step that ends in an error has failed; the steps after
-    /// it run all the same.
+    /// Runs one step. An error of `check` is a failure of the step, and does not stop the run.
     pub fn step(&mut self, name: &str, check: impl FnOnce(&mut Self) -> anyhow::Result<Counts>) {
         let start = Instant::now();
         let counts = check(self).unwrap_or_else(|error| {
@@ -97,6 +96,12 @@ impl Summary {
         Counts { skipped: n as u64, ..Counts::default() }
     }
 
+    /// Adds the steps that have run beside those of `self`.
+    pub fn append(&mut self, others: Self) {
+        self.steps.extend(others.steps);
+        self.remarks.extend(others.remarks);
+    }
+
     /// Keeps a sentence for the end of the run.
     pub fn remark(&mut self, remark: String) {
         self.remarks.push(remark);
@@ -114,7 +119,7 @@ impl Summary {
     }
 }
 
-/// Runs a command that is one check, after naming it; its output goes to the terminal.
+/// Prints a command and runs it as one check. Its output goes to the terminal.
 ///
 /// # Errors
 /// If it cannot be started or fails.
@@ -127,7 +132,7 @@ pub fn check(name: &str, command: &mut Command) -> anyhow::Result<Counts> {
 }
 
 impl fmt::Display for Summary {
-    /// The remarks, the table of steps, and the total alone on the last line.
+    /// The remarks, the table of steps, and the total as the last line.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for remark in &self.remarks {
             writeln!(f, "{remark}")?;

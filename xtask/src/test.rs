@@ -2,6 +2,7 @@
 
 mod docs;
 mod fuzz;
+mod lints;
 mod meanwhile;
 mod peers;
 pub mod python;
@@ -11,6 +12,8 @@ mod test_programs;
 
 use crate::summary::{Counts, Summary, check};
 use anyhow::{bail, ensure};
+use lints::by_clippy;
+use meanwhile::nice;
 use std::process::Command;
 use xtask::workspace::{cargo, cargo_in_lab, output, root};
 
@@ -20,11 +23,15 @@ const PACKAGES: &str = "xtask/packages.sh";
 /// Flags of `test`.
 #[derive(clap::Args)]
 pub struct Args {
+    /// Check only the format, the lints and the unit tests, in a few minutes
+    #[arg(long, conflicts_with = "sanitize")]
+    quick: bool,
+
     /// Install nothing; skip the checks whose requirements are missing, and list them
     #[arg(long)]
     no_install: bool,
 
-    /// Seconds to fuzz each hand-written parser
+    /// How long to fuzz each parser
     #[arg(long, default_value_t = 15, value_name = "SECONDS")]
     fuzz_seconds: u32,
 
@@ -38,12 +45,14 @@ pub struct Args {
     sanitize: bool,
 }
 
-/// Installs what is missing, runs every step whether or not one before it
-/// failed, and ends with a table of them.
+/// Installs what is missing, runs every step even if one fails, and prints a table of the results.
 pub fn run(args: &Args) -> anyhow::Result<u8> {
     let mut summary = Summary::default();
     if args.sanitize {
         sanitize::run(&mut summary);
+    } else if args.quick {
+        check_source(&mut summary);
+        summary.step("unit tests", unit_tests);
     } else {
         run_all(args, &mut summary);
     }
@@ -56,31 +65,63 @@ fn run_all(args: &Args, summary: &mut Summary) {
         summary.command("packages", Command::new("sh").arg(PACKAGES).current_dir(root()));
     }
     let packages = peers::Packages::fetch_meanwhile(args.peers, install);
+    let wheel = python::build_meanwhile(install);
     let fuzz_targets = fuzz::build_meanwhile(args.fuzz_seconds);
-    let _pi_binary = targets::build_meanwhile();
+    let pi_binary = targets::build_meanwhile();
     let mdbook = docs::build_meanwhile(install);
-    summary.command("format", &mut cargo(&["fmt", "--all", "--check"]));
-    let mut lints = cargo_on_all(&["clippy", "--all-targets"]);
-    summary.command("lints", lints.args(["--", "--deny", "warnings"]));
-    // What a first build leaves out, and what a machine without a GPU can.
-    for package in ["edgepuck", "sim-gpu"] {
-        let mut lints = cargo(&["clippy", "--package", package, "--no-default-features"]);
-        let name = format!("lints of the smallest {package}");
-        summary.command(&name, lints.args(["--", "--deny", "warnings"]));
-    }
+    check_source(summary);
     summary.step("tests", |summary| tests(summary, install));
     summary.step("laboratory", |summary| laboratory(summary, install));
-    let mut documentation = cargo_on_all(&["doc", "--no-deps"]);
-    summary.command("documentation", documentation.env("RUSTDOCFLAGS", "--deny warnings"));
-    summary.step("dependencies", |_| infer_cpu_is_light());
-    targets::run(summary, install);
-    docs::build_site(summary, mdbook);
-    python::run(summary, install, args.peers == peers::Which::All);
-    peers::run(summary, packages);
+    let programs = peers::programs();
+    // A peer takes the binary for the Raspberry Pi.
+    let _ = pi_binary.and_then(meanwhile::Meanwhile::end);
+    // Peers wait for clocks and sockets, so what only needs the processor runs beside them.
+    let others = std::thread::scope(|scope| {
+        let others = scope.spawn(|| {
+            let mut summary = Summary::default();
+            smallest_lints(&mut summary);
+            let mut documentation = cargo_on_all(&["doc", "--no-deps"]);
+            documentation.env("RUSTDOCFLAGS", "--deny warnings");
+            summary.command("documentation", &mut nice(&documentation));
+            summary.step("dependencies", |_| infer_cpu_is_light());
+            targets::run(&mut summary, install);
+            docs::build_site(&mut summary, mdbook);
+            let with_pytorch = args.peers == peers::Which::All;
+            let wheel = python::run(&mut summary, wheel, with_pytorch);
+            docs::run_blocks(&mut summary, &wheel, &programs);
+            summary
+        });
+        peers::run(summary, packages, &programs);
+        others.join()
+    });
+    match others {
+        Ok(others) => summary.append(others),
+        Err(_) => summary.step("documentation and targets", |_| bail!("they panicked")),
+    }
     fuzz::run(summary, args.fuzz_seconds, fuzz_targets);
 }
 
-/// A check that cannot run here, which fails where it is `required`.
+/// Checks the format and the lints, which compiles all tests.
+fn check_source(summary: &mut Summary) {
+    summary.command("format", &mut cargo(&["fmt", "--all", "--check"]));
+    summary.step("lints", |_| {
+        let tests = lints::check("lints", compile_all(&["test"]).arg("--no-run"))?;
+        // The library of the Python package has no tests.
+        let mut libraries = compile_all(&["build", "--lib", "--profile", "test"]);
+        Ok(tests.and(lints::check("lints", &mut libraries)?))
+    });
+}
+
+/// Lints the smallest builds: of a first command, and of a machine without a GPU.
+fn smallest_lints(summary: &mut Summary) {
+    for package in ["edgepuck", "sim-gpu"] {
+        let mut lints = cargo(&["clippy", "--package", package, "--no-default-features"]);
+        let name = format!("lints of the smallest {package}");
+        summary.command(&name, &mut nice(lints.args(["--", "--deny", "warnings"])));
+    }
+}
+
+/// Skips a check that cannot run here. It fails if it is `required`.
 fn go_without(
     summary: &mut Summary,
     name: &str,
@@ -91,8 +132,8 @@ fn go_without(
     Ok(summary.skip(name, 1, lack))
 }
 
-/// A command of Cargo on every crate, with the features that all such commands
-/// share, so that nothing is built twice.
+/// A command of Cargo on every crate, with the features that all such commands share, so that
+/// nothing is built twice.
 fn cargo_on_all(words: &[&str]) -> Command {
     let mut command = cargo(words);
     command.args(["--workspace", "--features", "edgepuck/hdf5,edgepuck/textures,train/hdf5"]);
@@ -102,9 +143,14 @@ fn cargo_on_all(words: &[&str]) -> Command {
     command
 }
 
-/// A command of Cargo on the laboratory's workspace.
-fn cargo_on_lab(words: &[&str]) -> Command {
-    let mut command = cargo_in_lab(words);
+/// A command of Cargo that compiles every crate, with Clippy.
+fn compile_all(words: &[&str]) -> Command {
+    by_clippy(cargo_on_all(words))
+}
+
+/// A command of Cargo that compiles the laboratory, with Clippy.
+fn compile_lab(words: &[&str]) -> Command {
+    let mut command = by_clippy(cargo_in_lab(words));
     command.args(["--features", "hdf5"]);
     command
 }
@@ -113,28 +159,41 @@ fn cargo_on_lab(words: &[&str]) -> Command {
 fn laboratory(summary: &mut Summary, required: bool) -> anyhow::Result<Counts> {
     let manifest = root().join("xtask/lab/Cargo.toml");
     check("format", cargo(&["fmt", "--check", "--manifest-path"]).arg(manifest))?;
-    let mut lints = cargo_on_lab(&["clippy", "--all-targets"]);
-    check("lints", lints.args(["--", "--deny", "warnings"]))?;
-    let mut tests = cargo_on_lab(&["test", "--no-fail-fast"]);
-    if required {
-        tests.env(test_support::REQUIRE_ADAPTER, "1");
-    }
-    test_programs::run(summary, &mut tests)
+    let lints = lints::check("lints", compile_lab(&["test"]).arg("--no-run"))?;
+    let mut tests = compile_lab(&["test", "--no-fail-fast"]);
+    require_adapter(&mut tests, required);
+    Ok(lints.and(test_programs::run(summary, &mut tests)?))
 }
 
 /// The tests of all crates.
 fn tests(summary: &mut Summary, required: bool) -> anyhow::Result<Counts> {
-    let mut tests = cargo_on_all(&["test", "--no-fail-fast"]);
-    // A machine without any Vulkan adapter tests the CPU alone, and says so.
-    if required {
-        tests.env(test_support::REQUIRE_ADAPTER, "1");
-    }
+    let mut tests = compile_all(&["test", "--no-fail-fast"]);
+    require_adapter(&mut tests, required);
     let counts = test_programs::run(summary, &mut tests)?;
     if has_cpp_compiler() {
         return Ok(counts);
     }
     let lack = "there is no C++ compiler";
     Ok(counts.and(go_without(summary, "tests of simplified meshes", lack, required)?))
+}
+
+/// The tests in the same files as the code.
+fn unit_tests(summary: &mut Summary) -> anyhow::Result<Counts> {
+    let mut tests = compile_all(&["test", "--no-fail-fast", "--lib"]);
+    // The library of the Python package has no tests, and needs an interpreter to be linked.
+    tests.args(["--exclude", "edgepuck-python"]);
+    for program in ["infer-cpu", "edgepuck-ros2", "xtask"] {
+        tests.args(["--bin", program]);
+    }
+    test_programs::run(summary, &mut tests)
+}
+
+/// Lets tests fail without a Vulkan adapter if it is `required`. Otherwise they test the CPU only,
+/// and report it.
+fn require_adapter(tests: &mut Command, required: bool) {
+    if required {
+        tests.env(test_support::REQUIRE_ADAPTER, "1");
+    }
 }
 
 /// Whether meshoptimizer, which `--simplify` uses, can be built.

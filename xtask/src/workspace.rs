@@ -1,4 +1,4 @@
-//! The workspace that this program is part of, and commands run in it.
+//! The workspace that this program is part of, and commands that run in it.
 
 use anyhow::{Context, bail};
 use serde_json::Value;
@@ -28,8 +28,8 @@ pub fn cargo_in_lab(args: &[&str]) -> Command {
     command
 }
 
-/// Names the laboratory's workspace to Cargo, and the product's folder of build results, in
-/// which both find the same builds of other packages.
+/// Names the laboratory's workspace to Cargo, and the product's folder of build results, so that
+/// both share what they build of other packages.
 fn of_lab(cargo: &mut Command) {
     cargo.arg("--manifest-path").arg(root().join("xtask/lab/Cargo.toml"));
     if std::env::var_os("CARGO_TARGET_DIR").is_none() {
@@ -42,8 +42,8 @@ fn cargo_command() -> Command {
     Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
 }
 
-/// Cargo, which builds the program of `package` if need be and then runs it in the
-/// caller's folder; features, `--` and the program's words are still to be added.
+/// Cargo, which builds the program of `package` and runs it in the caller's folder. The caller adds
+/// features, `--` and the program's arguments.
 pub fn cargo_run(package: &str) -> Command {
     let mut command = cargo_command();
     command.args(["run", "--release", "--package", package, "--bin", package]);
@@ -54,10 +54,10 @@ pub fn cargo_run(package: &str) -> Command {
     command
 }
 
-/// The folder of Rust's standard library for `target`; it need not be there.
+/// The folder of Rust's standard library for `target`, which may be missing.
 ///
 /// # Errors
-/// If there is no rustc to ask.
+/// rustc cannot run.
 pub fn standard_library(target: &str) -> anyhow::Result<PathBuf> {
     let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
     let mut ask = Command::new(rustc);
@@ -65,34 +65,34 @@ pub fn standard_library(target: &str) -> anyhow::Result<PathBuf> {
     Ok(PathBuf::from(folder.trim()))
 }
 
-/// Fetches the standard library for `target` through rustup unless it is there.
+/// Downloads the standard library for `target` through rustup if it is missing.
 ///
 /// # Errors
-/// There is no rustup, or it cannot fetch the library.
+/// rustup is missing, or cannot download the library.
 pub fn need_standard_library(target: &str) -> anyhow::Result<()> {
     if standard_library(target)?.is_dir() {
         return Ok(());
     }
-    eprintln!("fetching Rust's standard library for {target}: rustup target add {target}");
+    eprintln!("downloading Rust's standard library for {target}: rustup target add {target}");
     let status = Command::new("rustup").args(["target", "add", target]).status();
     let status = status.with_context(|| {
-        format!("there is no rustup here to fetch it; install {target}'s standard library yourself")
+        format!("rustup is missing; install the standard library for {target} yourself")
     })?;
     if !status.success() {
-        bail!("rustup could not fetch {target}; is this machine offline?");
+        bail!("rustup cannot download {target}; is this machine offline?");
     }
     Ok(())
 }
 
-/// What a command prints.
+/// The standard output of a command.
 ///
 /// # Errors
-/// If it cannot be started or fails; then with what it said.
+/// The command cannot be started, or fails. The error has its error output.
 pub fn output(command: &mut Command) -> anyhow::Result<String> {
     let output = command.output().with_context(|| format!("cannot run {}", words(command)))?;
     if !output.status.success() {
-        let said = String::from_utf8_lossy(&output.stderr);
-        bail!("{} failed ({}): {}", words(command), output.status, said.trim());
+        let errors = String::from_utf8_lossy(&output.stderr);
+        bail!("{} failed ({}): {}", words(command), output.status, errors.trim());
     }
     Ok(String::from_utf8_lossy(&output.stdout).into_owned())
 }
@@ -103,11 +103,20 @@ pub fn words(command: &Command) -> String {
     words.map(OsStr::to_string_lossy).collect::<Vec<_>>().join(" ")
 }
 
-/// The program `name` among those that Cargo's `messages`, one JSON object a line,
-/// say were built.
+/// The packages of the workspace with this manifest, as `cargo metadata` describes them.
 ///
 /// # Errors
-/// There is none.
+/// Cargo fails.
+pub fn packages(manifest: &str) -> anyhow::Result<Vec<Value>> {
+    let words = ["metadata", "--no-deps", "--format-version", "1", "--manifest-path", manifest];
+    let mut metadata: Value = serde_json::from_str(&output(&mut cargo(&words))?)?;
+    Ok(metadata["packages"].as_array_mut().map(std::mem::take).unwrap_or_default())
+}
+
+/// The path of program `name`, from Cargo's `messages`, one JSON object a line.
+///
+/// # Errors
+/// Cargo has not built the program.
 pub fn executable(messages: &str, name: &str) -> anyhow::Result<PathBuf> {
     let messages = messages.lines().filter_map(|m| serde_json::from_str::<Value>(m).ok());
     let mut programs = messages.filter(|message| {

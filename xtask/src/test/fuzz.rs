@@ -1,6 +1,6 @@
-//! Feeds each hand-written parser with mutated input for a while.
+//! Feeds mutated input to each hand-written parser.
 
-use super::meanwhile::Meanwhile;
+use super::meanwhile::{Meanwhile, nice};
 use crate::summary::{Counts, Summary};
 use anyhow::ensure;
 use std::fs;
@@ -9,30 +9,29 @@ use std::process::Command;
 use std::thread::available_parallelism;
 use xtask::workspace::{cargo, root};
 
-/// The targets, a program each.
+/// The targets. Each is a program.
 const TARGETS: [&str; 6] = ["off", "mesh", "clouds", "model", "packets", "live"];
 
-/// Named, so that build scripts go without the flags.
+/// The target is named, so that build scripts are compiled without the flags below.
 const TRIPLE: &str = "x86_64-unknown-linux-gnu";
 
-/// libFuzzer's coverage, by flags that a stable compiler takes.
+/// The flags of the stable compiler that instrument code for libFuzzer.
 const COVERAGE: &str = "-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
      -Cllvm-args=-sanitizer-coverage-inline-8bit-counters \
      -Cllvm-args=-sanitizer-coverage-pc-table \
      -Cllvm-args=-sanitizer-coverage-trace-compares -Ccodegen-units=1";
 
-/// Starts to build the targets, in the time that other steps leave a core idle.
+/// Starts to build the targets in the background.
 pub fn build_meanwhile(seconds: u32) -> Option<anyhow::Result<Meanwhile>> {
     let is_known = cfg!(all(target_os = "linux", target_arch = "x86_64"));
     (seconds > 0 && is_known).then(|| {
-        let mut build = Command::new("nice");
-        build.arg(cargo(&[]).get_program()).args(["build", "--release", "--target", TRIPLE]);
-        build.arg("--bins").current_dir(folder()).env("RUSTFLAGS", COVERAGE);
-        Meanwhile::start("fuzz-build", &mut build)
+        let mut build = cargo(&["build", "--release", "--target", TRIPLE, "--bins"]);
+        build.current_dir(folder()).env("RUSTFLAGS", COVERAGE);
+        Meanwhile::start("fuzz-build", &mut nice(&build))
     })
 }
 
-/// Fuzzes every target for `seconds`, as many at a time as there are cores.
+/// Fuzzes every target for `seconds`, one per core at a time.
 pub fn run(summary: &mut Summary, seconds: u32, build: Option<anyhow::Result<Meanwhile>>) {
     summary.step("fuzzing", |summary| {
         let Some(build) = build else {
@@ -69,7 +68,7 @@ fn start(target: &str, seconds: u32) -> anyhow::Result<Meanwhile> {
     let folder = folder();
     let mut command = Command::new(folder.join(format!("target/{TRIPLE}/release/{target}")));
     command.arg(format!("-max_total_time={seconds}")).current_dir(&folder);
-    // What is found goes to the first folder; the second is where it starts.
+    // libFuzzer starts with both folders, and writes new inputs to the first.
     if folder.join("seeds").join(target).is_dir() {
         fs::create_dir_all(folder.join("corpus").join(target))?;
         command.args([format!("corpus/{target}"), format!("seeds/{target}")]);

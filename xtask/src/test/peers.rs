@@ -1,12 +1,12 @@
 //! The scripts in `tests/peers`, which compare our programs with other software.
 //!
-//! Python runs each in an environment of pinned packages from PyPI. `EDGEPUCK_PROGRAM`,
+//! Python runs each script in an environment of pinned packages from PyPI. `EDGEPUCK_PROGRAM`,
 //! `EDGEPUCK_LAB`, `EDGEPUCK_INFER` and `EDGEPUCK_ROS2` are our programs, `EDGEPUCK_OUT` is an empty
-//! folder, and [`SUPPORT`] is on `PYTHONPATH`. It ends with 0 if all is well and with [`SKIPPED`]
-//! if it cannot run here. A script `x.py` uses the packages of `requirements.txt`, unless there is
-//! an `x-requirements.txt`: of packages that others do not go with, or that are very large.
+//! folder, and [`SUPPORT`] is on `PYTHONPATH`. A script exits with 0 on success and with
+//! [`SKIPPED`] if it cannot run here. A script `x.py` uses the packages of `requirements.txt`, or
+//! those of `x-requirements.txt` if it exists: they conflict with the others, or are very large.
 
-use super::{cargo_on_all, cargo_on_lab, meanwhile::Meanwhile};
+use super::{compile_all, compile_lab, meanwhile::Meanwhile};
 use crate::summary::{Counts, Summary};
 use anyhow::{Context, anyhow};
 use std::fs;
@@ -20,17 +20,17 @@ use xtask::workspace::{LAB, executable, output, root};
 /// The folder of the scripts.
 const SCRIPTS: &str = "tests/peers";
 
-/// The folder of the module that they share.
+/// The folder of the module that all scripts share.
 const SUPPORT: &str = "tests/peers/support";
 
-/// What a script ends with that cannot run, having said why.
+/// The exit code of a script that cannot run, after it has printed the reason.
 const SKIPPED: i32 = 77;
 
 /// The packages of most scripts.
 const SHARED: Environment<'_> = Environment {
     name: "tests-venv",
     requirements: "tests/peers/requirements.txt",
-    size: "some 1.5 GB",
+    size: "about 1.5 GB",
 };
 
 /// Which scripts are run.
@@ -44,30 +44,30 @@ pub enum Which {
     All,
 }
 
-/// The interpreter that has a script's packages, or why there is none.
+/// The interpreter that has a script's packages, or the reason why it cannot be had.
 pub type Python = Result<PathBuf, String>;
 
-/// The environments of packages by which scripts are run.
+/// The environments that scripts run in.
 pub struct Packages {
     which: Which,
-    /// Whether packages may be fetched.
+    /// Whether packages may be downloaded.
     install: bool,
-    /// Fetches the packages that most scripts share.
+    /// Downloads the packages that most scripts share.
     shared: JoinHandle<Python>,
 }
 
 impl Packages {
-    /// Begins to fetch what most scripts share, which takes minutes, while other steps compile.
+    /// Starts to download the packages that most scripts share, while other steps compile.
     pub fn fetch_meanwhile(which: Which, install: bool) -> Self {
         let fetch = move || match which {
-            Which::None => Err("--peers none asks for none".to_owned()),
+            Which::None => Err("--peers none was given".to_owned()),
             Which::Light | Which::All => interpreter(&SHARED, install),
         };
         Self { which, install, shared: std::thread::spawn(fetch) }
     }
 }
 
-/// The interpreter of script `name`; `None` if it needs only what most scripts share.
+/// The interpreter of script `name`; `None` if it uses the shared packages.
 fn python_of(name: &str, which: Which, install: bool) -> Option<Python> {
     let requirements = format!("{SCRIPTS}/{name}-requirements.txt");
     if !root().join(&requirements).exists() {
@@ -77,12 +77,12 @@ fn python_of(name: &str, which: Which, install: bool) -> Option<Python> {
     if is_large && which != Which::All {
         return Some(Err("its packages are large; --peers all runs it".to_owned()));
     }
-    let size = if is_large { "some 5 GB" } else { "some 400 MB" };
+    let size = if is_large { "about 5 GB" } else { "about 400 MB" };
     let folder = format!("tests-{name}-venv");
     Some(interpreter(&Environment { name: &folder, requirements: &requirements, size }, install))
 }
 
-/// The interpreter of `environment`, which is made if it may be.
+/// The interpreter of `environment`, which is made first if `install` allows it.
 pub fn interpreter(environment: &Environment<'_>, install: bool) -> Python {
     match install {
         true => environment.interpreter(),
@@ -90,16 +90,16 @@ pub fn interpreter(environment: &Environment<'_>, install: bool) -> Python {
     }
 }
 
-/// Runs the scripts, two at a time: each waits for files, sockets and other programs.
-/// A script whose packages are missing is skipped, and named.
-pub fn run(summary: &mut Summary, packages: Packages) {
+/// Runs the scripts, two at a time, because each waits for files, sockets and other programs. A
+/// script whose packages are missing is skipped and reported.
+pub fn run(summary: &mut Summary, packages: Packages, programs: &anyhow::Result<Programs>) {
     summary.step("peers", |summary| {
         let scripts = scripts()?;
         let Packages { which, install, shared } = packages;
         if which == Which::None {
-            return Ok(summary.skip("peers", scripts.len(), "--peers none asks for none"));
+            return Ok(summary.skip("peers", scripts.len(), "--peers none was given"));
         }
-        let programs = programs()?;
+        let programs = programs.as_ref().map_err(|cause| anyhow!("{cause:#}"))?;
         let shared = shared.join().unwrap_or_else(|_| Err("fetching them panicked".to_owned()));
         let (scripts, summary) = (Mutex::new(scripts.into_iter()), Mutex::new(summary));
         let next = || scripts.lock().ok()?.next();
@@ -107,7 +107,7 @@ pub fn run(summary: &mut Summary, packages: Packages) {
             std::iter::from_fn(next).try_fold(Counts::default(), |counts, script| {
                 let name = script.file_stem().unwrap_or_default().to_string_lossy().into_owned();
                 let python = python_of(&name, which, install).unwrap_or_else(|| shared.clone());
-                Ok(counts.and(check(&summary, &name, &script, python, &programs)?))
+                Ok(counts.and(check(&summary, &name, &script, python, programs)?))
             })
         };
         std::thread::scope(|scope| {
@@ -136,16 +136,17 @@ fn check(
         fs::remove_dir_all(&out).with_context(|| out.display().to_string())?;
     }
     fs::create_dir_all(&out).with_context(|| out.display().to_string())?;
-    // -B keeps compiled files from lying beside the scripts.
     let mut command = Command::new(python);
-    command.arg("-B").arg(script).current_dir(&out);
+    command.arg(script).current_dir(&out);
+    // Compiled files must not lie beside the scripts.
+    command.env("PYTHONPYCACHEPREFIX", cache_dir().join("pycache"));
     command.env("PYTHONPATH", root().join(SUPPORT)).env("EDGEPUCK_OUT", &out);
     command.envs(programs.iter().map(|(variable, program)| (variable, program)));
     let (status, said) = Meanwhile::start(&format!("peer-{name}"), &mut command)?.end()?;
     eprintln!("== {peer}: {SCRIPTS}/{name}.py\n{said}");
     Ok(match status.code() {
         Some(0) => Counts::PASSED,
-        Some(SKIPPED) => summary().skip(&peer, 1, "it said why"),
+        Some(SKIPPED) => summary().skip(&peer, 1, "it printed the reason"),
         _ => {
             summary().remark(format!("{peer}: FAILED, {status}"));
             Counts::FAILED
@@ -163,19 +164,19 @@ fn scripts() -> anyhow::Result<Vec<PathBuf>> {
     Ok(scripts)
 }
 
-/// The variables that tell scripts of our programs, and the programs.
+/// Our programs, each with the environment variable that has its path.
 pub type Programs = [(&'static str, PathBuf); 4];
 
 /// Our programs as the tests have built them: nothing is built for the peers alone.
 pub fn programs() -> anyhow::Result<Programs> {
-    let built = |cargo: fn(&[&str]) -> Command| {
-        let mut cargo = cargo(&["test", "--no-run", "--message-format", "json-render-diagnostics"]);
+    let built = |mut cargo: Command| {
+        cargo.args(["--no-run", "--message-format", "json-render-diagnostics"]);
         output(cargo.stderr(Stdio::inherit()))
     };
-    let messages = built(cargo_on_all)?;
+    let messages = built(compile_all(&["test"]))?;
     Ok([
         ("EDGEPUCK_PROGRAM", executable(&messages, "edgepuck")?),
-        ("EDGEPUCK_LAB", executable(&built(cargo_on_lab)?, LAB)?),
+        ("EDGEPUCK_LAB", executable(&built(compile_lab(&["test"]))?, LAB)?),
         ("EDGEPUCK_INFER", executable(&messages, "infer-cpu")?),
         ("EDGEPUCK_ROS2", executable(&messages, "edgepuck-ros2")?),
     ])

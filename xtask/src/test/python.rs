@@ -1,29 +1,30 @@
-//! The Python package: a wheel is built and judged, and its tests run in an environment that has
+//! The Python package: its wheel is built and checked, and its tests run in an environment that has
 //! nothing else of ours.
 
-use super::docs;
+use super::meanwhile::{Meanwhile, nice};
 use super::peers::interpreter;
 use crate::summary::{Counts, Summary};
-use anyhow::{Context, anyhow, ensure};
+use anyhow::{Context, anyhow, bail, ensure};
 use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::thread::JoinHandle;
 use xtask::pi_target;
-use xtask::venv::{Environment, cache_dir, succeeds};
+use xtask::venv::{self, Environment, cache_dir, succeeds};
 use xtask::workspace::{need_standard_library, output, root};
 
-/// What builds wheels and judges them.
+/// The packages that build and check wheels.
 const BUILD: Environment<'_> = Environment {
     name: "python-build-venv",
     requirements: "python/requirements-build.txt",
-    size: "some 100 MB",
+    size: "about 100 MB",
 };
 
-/// What lists the packages that all tests need.
+/// The list of the packages that all tests need.
 const TESTS_NEED: &str = "python/tests/requirements.txt";
 
-/// The systems that a wheel of Linux runs on: all since glibc 2.28.
+/// The systems that a wheel for Linux runs on: all since glibc 2.28.
 const PLATFORM: &str = "manylinux_2_28";
 
 const AARCH64: &str = "aarch64-unknown-linux-gnu";
@@ -32,66 +33,56 @@ const AARCH64: &str = "aarch64-unknown-linux-gnu";
 const NATIVE: &str =
     if cfg!(target_arch = "aarch64") { AARCH64 } else { "x86_64-unknown-linux-gnu" };
 
-/// How a wheel is built and tested.
-struct Plan<'a> {
-    target: &'a str,
-    /// Cargo's profile that it is built by.
-    profile: &'a str,
-    /// A new environment to test it in.
-    folder: PathBuf,
-    /// Lists of packages that tests need.
-    requirements: &'a [&'a str],
-    /// Which tests are run, an expression of pytest's `-k`; if empty, all.
-    tests: &'a str,
-}
-
 /// A wheel of the package.
 pub struct Wheel {
-    /// The interpreter that has the tools of [`BUILD`].
+    /// The interpreter that has the packages of [`BUILD`].
     pub tools: PathBuf,
-    /// Where it is.
+    /// The wheel's path.
     pub file: PathBuf,
 }
 
-/// Builds the wheel and tests it, with PyTorch of PyPI if asked for, and runs the documentation with
-/// it. Other systems build theirs as they are released.
-pub fn run(summary: &mut Summary, install: bool, with_pytorch: bool) {
-    let mut wheel = Err("there is no wheel to run it with".to_owned());
-    summary.step("python", |summary| {
+/// A build in the background. The outer error is the reason why none can run here.
+pub type Build = JoinHandle<Result<anyhow::Result<Wheel>, String>>;
+
+/// Starts to build the wheel in the background. Other systems build theirs for a release.
+pub fn build_meanwhile(install: bool) -> Build {
+    std::thread::spawn(move || {
         if !cfg!(target_os = "linux") {
-            return Ok(summary.skip("python", 1, "wheels are tested on Linux"));
+            return Err("wheels are tested on Linux".to_owned());
         }
-        let tools = match interpreter(&BUILD, install) {
-            Ok(tools) => tools,
-            Err(cause) => return Ok(summary.skip("python", 1, &cause)),
+        Ok(build(interpreter(&BUILD, install)?, NATIVE, "release"))
+    })
+}
+
+/// Tests the wheel, with PyTorch of PyPI if `with_pytorch` is set. Returns it, or the reason why
+/// there is none.
+pub fn run(summary: &mut Summary, building: Build, with_pytorch: bool) -> Result<Wheel, String> {
+    let mut wheel = Err("its wheel was not built".to_owned());
+    summary.step("python", |summary| {
+        let built = match building.join() {
+            Ok(Ok(built)) => built?,
+            Ok(Err(cause)) => return Ok(summary.skip("python", 1, &cause)),
+            Err(_) => bail!("the thread that builds the wheel panicked"),
         };
-        let plan = native(&tools, with_pytorch)?;
-        let built = build(tools, &plan)?;
-        let counts = test(&built, &plan)?;
+        let folder = cache_dir().join("python-test-venv");
+        venv::make(&built.tools, &folder, &["--without-pip"]).map_err(|cause| anyhow!(cause))?;
+        let mut requirements = vec![TESTS_NEED];
+        if with_pytorch {
+            requirements.push("tests/peers/pytorch-requirements.txt");
+        }
+        let counts = test(&built, &folder, &requirements, "");
         wheel = Ok(built);
-        Ok(counts)
+        counts
     });
-    summary.step("documentation's examples", |summary| match &wheel {
-        Ok(wheel) => docs::run_blocks(wheel),
-        Err(cause) => Ok(summary.skip("documentation's examples", 1, cause)),
-    });
+    wheel
 }
 
-fn native(tools: &Path, with_pytorch: bool) -> anyhow::Result<Plan<'static>> {
-    let folder = environment(tools, "python-test-venv", &[])?;
-    let requirements: &[&str] = match with_pytorch {
-        true => &[TESTS_NEED, "tests/peers/pytorch-requirements.txt"],
-        false => &[TESTS_NEED],
-    };
-    Ok(Plan { target: NATIVE, profile: "release", folder, requirements, tests: "" })
-}
-
-/// Builds the wheel of aarch64 as releases hold it, and tests it under an emulator if there is one.
+/// Builds the wheel for aarch64 as for a release, and tests it in an emulator if there is one.
 pub fn run_emulated(summary: &mut Summary) {
-    let name = "wheel of aarch64";
+    let name = "wheel for aarch64";
     summary.step(name, |summary| {
         if NATIVE == AARCH64 {
-            let reason = "this processor is of its kind, so `cargo xtask test` tests it";
+            let reason = "this processor is an aarch64, so `cargo xtask test` tests it";
             return Ok(summary.skip(name, 1, reason));
         }
         let Some(emulator) = pi_target::emulator() else {
@@ -104,13 +95,11 @@ pub fn run_emulated(summary: &mut Summary) {
              that fork: QEMU aborts once a child of a process with threads starts one"
         ));
         let tests = "not (test_memory.py or fork- or [fork])";
-        let requirements = &[TESTS_NEED];
-        let plan = Plan { target: AARCH64, profile: "dist", folder, requirements, tests };
-        test(&build(tools, &plan)?, &plan)
+        test(&build(tools, AARCH64, "dist")?, &folder, &[TESTS_NEED], tests)
     });
 }
 
-/// Makes `folder` an environment of an emulated Python, and gives the interpreter that builds.
+/// Makes `folder` an environment of an emulated Python. Returns the interpreter that builds wheels.
 fn prepare_emulated(emulator: &Command, folder: &Path) -> anyhow::Result<PathBuf> {
     need_standard_library(AARCH64)?;
     let mut make = Command::new("sh");
@@ -120,29 +109,35 @@ fn prepare_emulated(emulator: &Command, folder: &Path) -> anyhow::Result<PathBuf
         .map_err(|cause| anyhow!(cause))
 }
 
-/// The wheel, for Pythons from 3.10 on.
-fn build(tools: PathBuf, plan: &Plan<'_>) -> anyhow::Result<Wheel> {
+/// Builds the wheel for `target`, for Python 3.10 and later, with a `profile` of Cargo.
+fn build(tools: PathBuf, target: &str, profile: &str) -> anyhow::Result<Wheel> {
     let wheels = cache_dir().join("wheels");
     if wheels.exists() {
         fs::remove_dir_all(&wheels).with_context(|| wheels.display().to_string())?;
     }
     let mut maturin = Command::new(&tools);
-    maturin.args(["-m", "maturin", "build", "--profile", plan.profile, "--zig", "--locked"]);
-    maturin.args(["--compatibility", PLATFORM, "--target", plan.target, "--out"]).arg(&wheels);
+    maturin.args(["-m", "maturin", "build", "--profile", profile, "--zig", "--locked"]);
+    maturin.args(["--compatibility", PLATFORM, "--target", target, "--out"]).arg(&wheels);
     maturin.arg("--manifest-path").arg(root().join("python/Cargo.toml"));
     // maturin asks the first Python on the path for zig.
     maturin.env("PATH", path_behind(tools.parent())?);
-    let status = maturin.status().context("cannot start maturin")?;
-    ensure!(status.success(), "maturin: {status}");
+    let (status, log) = Meanwhile::start("wheel-build", &mut nice(&maturin))?.end()?;
+    ensure!(status.success(), "maturin: {status}\n{log}");
     let built = fs::read_dir(&wheels).with_context(|| wheels.display().to_string())?;
     let file = built.filter_map(|entry| Some(entry.ok()?.path())).next();
     let file = file.ok_or_else(|| anyhow!("{}: expected a wheel, found none", wheels.display()))?;
     Ok(Wheel { tools, file })
 }
 
-/// Checks that the wheel runs on the Pythons and the systems that its name promises, and tests it in
-/// an environment of its own, away from the package's source.
-fn test(wheel: &Wheel, plan: &Plan<'_>) -> anyhow::Result<Counts> {
+/// Checks that the wheel runs on the versions of Python and the systems that its name states, and
+/// tests it in the environment `folder`, away from the package's source. `tests` selects tests as
+/// pytest's option `-k` does; if it is empty, all run.
+fn test(
+    wheel: &Wheel,
+    folder: &Path,
+    requirements: &[&str],
+    tests: &str,
+) -> anyhow::Result<Counts> {
     let mut abi3audit = Command::new(&wheel.tools);
     abi3audit.args(["-m", "abi3audit", "--strict"]).arg(&wheel.file);
     succeeds(&mut abi3audit).map_err(|cause| anyhow!(cause))?;
@@ -152,66 +147,54 @@ fn test(wheel: &Wheel, plan: &Plan<'_>) -> anyhow::Result<Counts> {
         shown.split_whitespace().collect::<Vec<_>>().join(" ").contains(PLATFORM),
         "auditwheel: expected a wheel for {PLATFORM}, found: {shown}"
     );
-    let python = plan.folder.join("bin/python");
-    wheel.install(&python, plan.requirements)?;
-    let mut tests = pytest(&python, &plan.folder);
-    tests.arg("--doctest-modules");
+    let python = folder.join("bin/python");
+    wheel.install(&python, requirements)?;
+    let mut pytest = pytest(&python, folder);
     // `edgepuck.torch` alone needs PyTorch.
-    tests.arg("--doctest-ignore-import-errors");
-    tests.args(["-k", plan.tests]).arg(root().join("python/tests")).args(["--pyargs", "edgepuck"]);
-    Ok(Counts { passed: 2, ..Counts::default() }.and(counts(&mut tests)?))
+    pytest.args(["--doctest-modules", "--doctest-ignore-import-errors", "-k", tests]);
+    pytest.arg(root().join("python/tests")).args(["--pyargs", "edgepuck"]);
+    Ok(Counts { passed: 2, ..Counts::default() }.and(counts(&mut pytest)?))
 }
 
 impl Wheel {
-    /// Installs it, and the packages of these lists, for the interpreter `python`, which needs no pip.
+    /// Installs it, and the packages of these lists, for the interpreter `python`.
     pub fn install(&self, python: &Path, requirements: &[&str]) -> anyhow::Result<()> {
-        let mut install = Command::new(&self.tools);
-        install.args(["-m", "pip", "--python"]).arg(python);
-        install.args(["install", "--quiet", "--disable-pip-version-check"]).arg(&self.file);
-        for list in requirements {
-            install.arg("-r").arg(root().join(list));
-        }
-        succeeds(&mut install).map_err(|cause| anyhow!(cause))
+        let lists = requirements.iter().flat_map(|list| ["-r".into(), root().join(list).into()]);
+        let words = std::iter::once(self.file.clone().into()).chain(lists);
+        venv::install(python, words).map_err(|cause| anyhow!(cause))
     }
 }
 
-/// A new environment of this name and without pip, for Python `base`.
-pub fn environment(base: &Path, name: &str, options: &[&str]) -> anyhow::Result<PathBuf> {
-    let folder = cache_dir().join(name);
-    let mut make = Command::new(base);
-    make.args(["-m", "venv", "--clear", "--without-pip"]).args(options).arg(&folder);
-    succeeds(&mut make).map_err(|cause| anyhow!("{}: {cause}", folder.display()))?;
-    Ok(folder)
-}
-
-/// The path on which programs are looked for, with these `folders` before all others.
+/// The variable `PATH` with `folders` before all others.
 pub fn path_behind<'a>(folders: impl IntoIterator<Item = &'a Path>) -> anyhow::Result<OsString> {
     let others = std::env::var_os("PATH").unwrap_or_default();
     let folders = folders.into_iter().map(Path::to_path_buf);
     Ok(std::env::join_paths(folders.chain(std::env::split_paths(&others)))?)
 }
 
-/// pytest in `folder`, in which no package must lie that could be taken for the installed one.
+/// pytest in `folder`, which must not contain a package with the name of an installed one.
 pub fn pytest(python: &Path, folder: &Path) -> Command {
     let mut pytest = Command::new(python);
-    pytest.args(["-B", "-m", "pytest", "-p", "no:cacheprovider"]);
+    pytest.args(["-m", "pytest", "-p", "no:cacheprovider"]);
     pytest.current_dir(folder).env("PYTHONSAFEPATH", "1");
+    pytest.env("PYTHONPYCACHEPREFIX", cache_dir().join("pycache"));
     pytest
 }
 
 /// Runs `pytest` and counts its tests.
 pub fn counts(pytest: &mut Command) -> anyhow::Result<Counts> {
     let done = pytest.output().context("cannot start pytest")?;
-    let said = String::from_utf8_lossy(&done.stdout);
-    eprintln!("{said}");
-    let counts = closing_line(&said).ok_or_else(|| anyhow!("pytest ended with {}", done.status))?;
+    let printed = String::from_utf8_lossy(&done.stdout);
+    eprintln!("{printed}");
+    let counts =
+        closing_line(&printed).ok_or_else(|| anyhow!("pytest ended with {}", done.status))?;
     ensure!(done.status.success() || counts.failed > 0, "pytest ended with {}", done.status);
     Ok(counts)
 }
 
 /// The counts in the last line: `==== 1 failed, 73 passed, 2 skipped in 15.23s ====`.
-fn closing_line(said: &str) -> Option<Counts> {
-    let line = said.lines().rfind(|line| line.contains(" in "))?;
+fn closing_line(printed: &str) -> Option<Counts> {
+    let line = printed.lines().rfind(|line| line.contains(" in "))?;
     let (counts, _) = line.trim_matches(['=', ' ']).split_once(" in ")?;
     let count = |names: &[&str]| {
         let parts = counts.split(", ").filter_map(|part| part.split_once(' '));
@@ -228,12 +211,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_closing_line_tells_what_passed_failed_and_was_skipped() {
+    fn the_closing_line_has_the_counts() {
         let counts = |line| closing_line(&format!("one line in 2 parts\n{line}\n"));
-        let told = Counts { passed: 73, failed: 2, skipped: 5 };
+        let expected = Counts { passed: 73, failed: 2, skipped: 5 };
         let line = "=== 1 failed, 73 passed, 1 skipped, 4 deselected, 3 warnings, 1 error in \
                     15.23s (0:00:15) ===";
-        assert_eq!(counts(line), Some(told));
+        assert_eq!(counts(line), Some(expected));
         assert_eq!(counts("74 passed in 15.36s").map(|counts| counts.passed), Some(74));
         assert_eq!(counts("no tests ran in 0.01s"), None);
     }

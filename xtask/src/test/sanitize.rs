@@ -1,5 +1,5 @@
-//! The tests of kernels and parsers under AddressSanitizer, which finds what a
-//! wrong offset in `unsafe` code reads or writes.
+//! Runs the tests of kernels and parsers under AddressSanitizer, which finds reads and writes of
+//! `unsafe` code outside its memory.
 
 use super::{go_without, test_programs};
 use crate::summary::Summary;
@@ -9,7 +9,7 @@ use xtask::workspace::{cargo, standard_library};
 /// Its runtime comes with Rust for this target.
 const TRIPLE: &str = "x86_64-unknown-linux-gnu";
 
-/// What is tested: a step's name and what `cargo test` is asked for.
+/// The name of each step, and the arguments of `cargo test`.
 const STEPS: [(&str, &[&str]); 3] = [
     ("kernels, sanitized", &["--package", "infer-cpu", "--lib"]),
     ("cloud parsers, sanitized", &["--package", "edgepuck-formats", "--lib", "--tests"]),

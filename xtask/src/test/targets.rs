@@ -1,42 +1,42 @@
-//! Checks of other targets: the Raspberry Pi, and systems of Metal and of Direct3D 12.
+//! Checks for other targets: the Raspberry Pi, and systems with Metal and with Direct3D 12.
 
-use super::{go_without, meanwhile::Meanwhile, test_programs};
+use super::meanwhile::{Meanwhile, nice};
+use super::{go_without, lints, lints::by_clippy, test_programs};
 use crate::summary::{Counts, Summary, check};
 use anyhow::ensure;
 use std::{env::current_exe, process::Command};
 use xtask::{build_pi, pi_target, workspace::cargo, workspace::standard_library};
 
-/// A check: its name, and whether it fails where it cannot run.
+/// A check: it is given its name, and whether it fails where it cannot run.
 type Check = fn(&mut Summary, &str, bool) -> anyhow::Result<Counts>;
 
 const METAL: &str = "aarch64-apple-darwin";
 const DX12: &str = "x86_64-pc-windows-msvc";
 
-/// The target that each check needs the standard library of, its name, and the check.
+/// The target whose standard library each check needs, the name of the check, and the check.
 const CHECKS: [(&str, &str, Check); 5] = [
-    (METAL, "Metal lints", |_, name, _| lints(name, cargo(&SIM_GPU).args(["--target", METAL]))),
-    (DX12, "Direct3D 12 lints", |_, name, _| lints(name, cargo(&SIM_GPU).args(["--target", DX12]))),
+    (METAL, "Metal lints", |_, name, _| lint_sim_gpu(name, METAL)),
+    (DX12, "Direct3D 12 lints", |_, name, _| lint_sim_gpu(name, DX12)),
     (pi_target::TRIPLE, "Raspberry Pi lints", |_, name, _| {
-        lints(name, pi_target::cargo(&["clippy"]).args(LIBRARY))
+        lints::check(name, &mut nice(pi_tests().arg("--no-run")))
     }),
     (pi_target::TRIPLE, "Raspberry Pi tests", tests),
     (pi_target::TRIPLE, "Raspberry Pi binary", binary),
 ];
 
-/// Lints the ray-casting library, for systems whose part of wgpu no other step compiles.
-const SIM_GPU: [&str; 3] = ["clippy", "--package", "sim-gpu"];
+/// The code that depends on the processor: the classifier as a library, its unit tests, which
+/// include those of every kernel, and the comparison of its logits with PyTorch's. All other tests
+/// run natively only, but tests/peers/debian_package.py emulates the program.
+const LIBRARY: [&str; 6] =
+    ["--package", "infer-cpu", "--no-default-features", "--lib", "--test", "parity"];
 
-/// What depends on the processor: the classifier as a library, and its tests. What reads command
-/// lines and packets is tested natively; tests/peers/debian_package.py emulates the program.
-const LIBRARY: [&str; 5] = ["--package", "infer-cpu", "--no-default-features", "--lib", "--tests"];
-
-/// Starts to make the binary, which takes one core minutes; what checks it waits for Cargo's lock.
+/// Starts to build the binary in the background.
 pub fn build_meanwhile() -> anyhow::Result<Meanwhile> {
     ensure!(standard_library(pi_target::TRIPLE)?.is_dir(), "there is no standard library for it");
-    Meanwhile::start("build-pi", Command::new("nice").arg(current_exe()?).arg("build-pi"))
+    Meanwhile::start("build-pi", &mut nice(Command::new(current_exe()?).arg("build-pi")))
 }
 
-/// Runs the checks; those that cannot run here fail where they are `required`.
+/// Runs the checks. Those that cannot run here fail where they are `required`.
 pub fn run(summary: &mut Summary, required: bool) {
     for (target, name, check) in CHECKS {
         let lack = format!("Rust's standard library for it is missing: rustup target add {target}");
@@ -47,8 +47,16 @@ pub fn run(summary: &mut Summary, required: bool) {
     }
 }
 
-fn lints(name: &str, clippy: &mut Command) -> anyhow::Result<Counts> {
-    check(name, clippy.args(["--", "--deny", "warnings"]))
+/// Lints the ray-casting library for a system whose part of wgpu no other step compiles.
+fn lint_sim_gpu(name: &str, target: &str) -> anyhow::Result<Counts> {
+    let lints = ["clippy", "--package", "sim-gpu", "--target", target, "--", "--deny", "warnings"];
+    check(name, &mut nice(&cargo(&lints)))
+}
+
+fn pi_tests() -> Command {
+    let mut tests = by_clippy(pi_target::cargo(&["test", "--no-fail-fast"]));
+    tests.args(LIBRARY);
+    tests
 }
 
 /// Tests the library with the Raspberry Pi's instructions.
@@ -62,11 +70,10 @@ fn tests(summary: &mut Summary, name: &str, required: bool) -> anyhow::Result<Co
         let required = required && cfg!(target_os = "linux");
         return go_without(summary, name, pi_target::NO_EMULATOR, required);
     }
-    let mut tests = pi_target::cargo(&["test", "--no-fail-fast"]);
-    test_programs::run(summary, tests.args(LIBRARY))
+    test_programs::run(summary, &mut nice(&pi_tests()))
 }
 
-/// Checks that a binary for the Raspberry Pi can be made, and is as small as promised.
+/// Checks that a binary for the Raspberry Pi can be built, and is as small as promised.
 fn binary(_: &mut Summary, name: &str, _: bool) -> anyhow::Result<Counts> {
     eprintln!("== {name}: cargo xtask build-pi");
     build_pi::run(&build_pi::Args::default()).map(|()| Counts::PASSED)
