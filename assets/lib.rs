@@ -28,7 +28,7 @@ pub const SENSORS: [(&str, &str); 21] = [
 /// Diffuse reflectivities of materials, by name, as TOML.
 pub const MATERIALS: &str = include_str!("materials.toml");
 
-/// What `edgepuck corrupt` makes, as TOML.
+/// The corruptions of `edgepuck corrupt`, as TOML.
 pub const CORRUPTIONS: &str = include_str!("corruptions.toml");
 
 /// The built-in scene recipes, the default one first: a recipe's name and its TOML.
@@ -51,6 +51,15 @@ pub const DEFAULT_SCENE: [(&str, &str); 2] = [
     ("scenes/two_chairs.toml", include_str!("scenes/two_chairs.toml")),
     ("meshes/chair/chair_0046.obj", include_str!("meshes/chair/chair_0046.obj")),
 ];
+
+/// The job file of Slurm that `edgepuck cluster` prints, with keys in braces.
+pub const SLURM_JOB: &str = include_str!("jobs/slurm.txt");
+/// The job file of Kubernetes that `edgepuck cluster` prints, with keys in braces.
+pub const KUBERNETES_JOB: &str = include_str!("jobs/kubernetes.txt");
+/// The job file of HyperQueue that `edgepuck cluster` prints, with keys in braces.
+pub const HYPERQUEUE_JOB: &str = include_str!("jobs/hyperqueue.txt");
+/// The script of a task of Kubernetes or HyperQueue, with the key `{command}`.
+pub const TASK_SCRIPT: &str = include_str!("jobs/task.txt");
 
 /// The record of `cargo xtask trade` that ships, as CSV: what `edgepuck advise`
 /// recommends from.

@@ -16,8 +16,8 @@ pub struct CardArgs {
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
 
-    /// Licence of the dataset, an SPDX identifier such as CC-BY-4.0. It depends on the licence of your
-    /// meshes, from which the scans derive
+    /// Licence of the dataset, an SPDX identifier such as CC-BY-4.0. It depends on the licence of
+    /// your meshes, from which the scans derive
     #[arg(long, value_name = "SPDX", value_parser = license)]
     license: Option<String>,
 

@@ -97,8 +97,8 @@ pub struct Row {
     /// Mean Chamfer distance (the sum of both directions) to the clean VLP-32C scan in f64 from the
     /// same place, over a sample of the scans that have points.
     pub chamfer_m: Option<f64>,
-    /// Largest difference of a logit from that in f32 with the same sampler and number of points.
-    /// A CPL chooses points in the row's precision, so that the points may differ.
+    /// Largest difference of a logit from that in f32 with the same sampler and number of points. A
+    /// CPL chooses points in the row's precision, so that the points may differ.
     pub logit_error: Option<f64>,
     /// Share of clouds with the same answer as the reference: the reference scan, the f64 caster,
     /// or the network in f32 with all T-Nets, the same sampler and the same number of points.

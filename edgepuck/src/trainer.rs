@@ -49,8 +49,8 @@ fn exit_code(status: ExitStatus) -> u8 {
     status.code().and_then(|code| u8::try_from(code).ok()).unwrap_or(1)
 }
 
-/// The training program: the one that the environment names, else the one that the checkout
-/// builds, the one beside this program, or the one on PATH.
+/// The training program: the one that the environment names, else the one that the checkout builds,
+/// the one beside this program, or the one on PATH.
 fn find(flags: &[OsString]) -> Command {
     if let Some(program) = std::env::var_os(OVERRIDE) {
         return Command::new(program);

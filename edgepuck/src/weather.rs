@@ -21,8 +21,8 @@ pub struct WeatherArgs {
     input: SweepArgs,
 
     /// File to write: .npz, .ply or .csv. It holds the strongest return of each beam that still has
-    /// one. `intensity` is the intensity in the weather, and `medium` is the source of the return: 0 a
-    /// surface, 1 rain, 2 snow, 3 fog
+    /// one. `intensity` is the intensity in the weather, and `medium` is the source of the return:
+    /// 0 a surface, 1 rain, 2 snow, 3 fog
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 
@@ -38,8 +38,9 @@ pub struct WeatherArgs {
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     fog: Option<f64>,
 
-    /// Model of the fog's returns: `physical`, by the scattered power, or `hahner`, in proportion to
-    /// the return of the surface behind the fog, as in the simulation of Hahner et al. (ICCV 2021)
+    /// Model of the fog's returns: `physical`, by the scattered power, or `hahner`, in proportion
+    /// to the return of the surface behind the fog, as in the simulation of Hahner et al. (ICCV
+    /// 2021)
     #[arg(long, value_name = "MODEL", default_value = "physical")]
     fog_model: FogModel,
 
@@ -47,8 +48,8 @@ pub struct WeatherArgs {
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     haze: Option<f64>,
 
-    /// Sensor that recorded the scan: a built-in name or a TOML file. Its detection limit, beam width
-    /// and minimum range determine which returns are detected
+    /// Sensor that recorded the scan: a built-in name or a TOML file. Its detection limit, beam
+    /// width and minimum range determine which returns are detected
     #[arg(long, default_value = "vlp32c", value_name = "NAME")]
     profile: String,
 

@@ -24,9 +24,9 @@ class Mesh(Remade):
         faces: The indices of each triangle's vertices, of shape [m, 3], if `source` is vertices.
         normalize: `unit-sphere` moves the mean of the vertices to the origin and scales the
             farthest of them to 1 m. `bbox` moves the middle of the bounding box there and scales its
-            longest side to 2 m. `none` leaves the mesh where it is, and takes the unit of length for
+            longest side to 2 m. `none` leaves the mesh in its place, and takes the unit of length as
             a metre.
-        up: The upward axis of `source`: y or z. By default, y of OBJ files and z of all else.
+        up: The upward axis of `source`: y or z. By default, y for OBJ files and z for all others.
 
     Raises:
         Error: The file cannot be read, a number is not finite, an index is out of range, or there

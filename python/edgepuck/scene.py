@@ -1,4 +1,4 @@
-"""Scenes that are filled, moved and scanned, and those of files."""
+"""Scenes of meshes, built in Python or read from files."""
 
 from __future__ import annotations
 
@@ -20,10 +20,9 @@ if TYPE_CHECKING:
 
 
 class Scene:
-    """Meshes in the world, for sensors to scan.
+    """Instances of meshes in the world.
 
-    A mesh is added once for each place where it stands; its instances share it, and moving one
-    rebuilds nothing.
+    The instances of a mesh share its data, and moving an instance rebuilds nothing.
 
     >>> import edgepuck as ep
     >>> scene, cube = ep.Scene(), ep.Mesh(*ep.box((1.0, 1.0, 1.0)), normalize="none")
@@ -40,7 +39,7 @@ class Scene:
 
     @classmethod
     def read(cls, file: str | os.PathLike[str]) -> Scene:
-        """Read a scene's TOML file, as `edgepuck scan` does, and the meshes that it names.
+        """Read the TOML file of a scene, like `edgepuck scan`, and the meshes that it names.
 
         Raises:
             Error: The file, or a mesh or sensor that it names, cannot be read.
@@ -65,20 +64,21 @@ class Scene:
         reflectivity: float = 1.0,
         retroreflection: float = 0.0,
     ) -> int:
-        """Add an instance of a mesh, and return its number, which the attribute `object` of scans has.
+        """Add an instance of a mesh. Return its number, which is the `object` of its points in scans.
 
         Args:
             mesh: The mesh.
-            pose: From the mesh's frame to the world's, a matrix of shape [4, 4] without scale.
-            position: Where its origin is, metres, in place of `pose`; at the origin by default.
-            scale: A factor, or one for each axis of the mesh.
-            name: A name, which keys the random numbers of its returns.
-            label: The name of its class.
-            reflectivity: The part of the light that comes back at vertical incidence, 0 to 1.
-            retroreflection: How well it returns light to where it came from, 0 to 1.
+            pose: The pose of the mesh in the world: a matrix of shape [4, 4] without scale.
+            position: The position of the mesh's origin, metres, instead of `pose`. By default, the
+                origin of the world.
+            scale: A factor, or a factor for each axis of the mesh.
+            name: A name, which keys the random numbers of the instance's returns.
+            label: The name of the class.
+            reflectivity: The share of light that returns at vertical incidence, 0 to 1.
+            retroreflection: The strength of retro-reflection, from 0 to 1 (an ideal retro-reflector).
 
         Raises:
-            Error: A value is out of its bounds.
+            Error: A value is out of its limits.
         """
         if not isinstance(mesh, Mesh):
             raise _edgepuck.Error(f"expected an edgepuck.Mesh, found {type(mesh).__name__}")
@@ -91,10 +91,10 @@ class Scene:
     def move(
         self, instance: int, pose: ArrayLike | None = None, *, position: ArrayLike | None = None
     ) -> None:
-        """Move the instance of this number to a pose or a position, as `add` takes them.
+        """Move the instance with this number to a pose or a position, as in `add`.
 
         Raises:
-            Error: There is no such instance, or the pose has a wrong shape or is no rotation.
+            Error: There is no such instance; the pose has a wrong shape or is not a rotation.
         """
         self._scene.move(instance, _pose(pose, position))
 
@@ -143,22 +143,22 @@ class Scene:
         if dropout != 0:
             wanted["dropout"] = {"probability": dropout}
         at = [float(distance), float(elevation), float(azimuth)] if pose is None else _matrix(pose)
-        told = json.dumps(_plain(wanted, "effects"))
+        encoded = json.dumps(_plain(wanted, "effects"))
         key = _arguments.seed(seed)
-        return scan_of(self._scene.scan(sensor._sensor, at, told, list(attributes), key))
+        return scan_of(self._scene.scan(sensor._sensor, at, encoded, list(attributes), key))
 
     def __repr__(self) -> str:
         return f"<Scene of {len(self)} instances>"
 
 
 def scan_scene(file: str | os.PathLike[str], *, adapter: str = "cpu") -> dict[str, Scan]:
-    """Scan the scene in a TOML file, as `edgepuck scan` does: the scan of each sensor by its name."""
+    """Scan the scene in a TOML file, like `edgepuck scan`. Return the scans by the names of sensors."""
     scans = Scene.read(file)._scene.scan_all(adapter)
     return {name: scan_of(columns) for name, columns in scans}
 
 
 def _pose(pose: ArrayLike | None, position: ArrayLike | None) -> list[float]:
-    """The rows of a pose, or of a position alone, or of the origin."""
+    """The rows of the matrix of a pose or a position; without both, of the identity."""
     if pose is not None and position is not None:
         raise _edgepuck.Error("expected a pose or a position, found both")
     if pose is not None:
@@ -183,7 +183,7 @@ def _matrix(pose: ArrayLike) -> list[float]:
 
 
 def _plain(value: Any, key: str) -> Any:
-    """`value`, which stands at `key`, in what JSON has."""
+    """`value`, found at `key`, as types of JSON."""
     if isinstance(value, Mapping):
         return {str(name): _plain(of, f"{key}.{name}") for name, of in value.items()}
     if isinstance(value, (list, tuple, np.ndarray)):

@@ -17,7 +17,7 @@ from .scan import Scan, scan_of
 
 @dataclass(eq=False, repr=False)
 class DrawnScene:
-    """A scene that a recipe drew, what its sensor saw, and what segmentation made of that."""
+    """A scene that a recipe drew, with its scan and the clusters of the scan."""
 
     sensor: str
     """The sensor's name."""

@@ -71,7 +71,7 @@ class Sensor(Remade):
         attributes: Iterable[str] = ("range", "beam", "ring", "time"),
         seed: int = 0,
     ) -> Scan:
-        """Scan one mesh from a place around the origin: `Scene.scan` of a scene with this mesh alone.
+        """Scan one mesh from a position around the origin, like `Scene.scan` of a scene with only it.
 
         Args:
             mesh: The mesh.

@@ -1,4 +1,4 @@
-//! `advise`: one configuration out of what was measured.
+//! `advise`: one configuration, chosen from measurements.
 
 use crate::Folder;
 use std::fs;

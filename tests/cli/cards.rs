@@ -1,5 +1,4 @@
-//! A finished dataset is described for those who find it; `tests/peers/croissant.py` reads what is
-//! written.
+//! `card`: the description of a finished dataset. `tests/peers/croissant.py` reads it.
 
 use crate::Folder;
 
@@ -13,7 +12,7 @@ fn a_dataset_of_either_form_has_a_card_and_metadata() {
     let folder = Folder::with_meshes();
     folder.succeeds(&format!("{WORDS} --out files"));
     folder.succeeds(&format!("{WORDS} --out tars --layout webdataset --tar-clouds 4"));
-    // Beside a manifest, other files are the user's.
+    // Files that the manifest does not list are the user's.
     folder.write("files/train-000001.tar", "mine");
     for (out, manifest) in [("files", "manifest.json"), ("tars", "dataset.json")] {
         folder.succeeds(&format!("card {out} {PUBLICATION}"));
@@ -59,7 +58,7 @@ fn what_cannot_be_described_is_refused_and_nothing_is_replaced() {
         ],
     );
     folder.succeeds("card out --overwrite");
-    // What is made anew is not what the card tells of.
+    // A card does not describe a dataset that was made anew.
     folder.succeeds(&format!("{WORDS} --out out --overwrite --seed 1"));
     assert!(!folder.at("out/README.md").exists() && !folder.at("out/croissant.json").exists());
 }

@@ -1,5 +1,5 @@
-//! Checkpoints as PyTorch before 1.6 saved them: a stream of pickles, then the
-//! tensors' storages.
+//! Checkpoints in the format of PyTorch before 1.6: a stream of pickles, then the storages of the
+//! tensors.
 
 use formats::weights::Tensor;
 use std::collections::BTreeMap;

@@ -1,4 +1,4 @@
-//! Job files of clusters are what their schedulers read, and say how often what is made.
+//! `cluster`: job files that the schedulers can read, with the right tasks.
 
 use crate::Folder;
 use std::process::{Command, Stdio};
@@ -64,7 +64,7 @@ fn words_that_the_job_file_settles_are_refused() {
     folder.refuses(2, &cases);
 }
 
-/// What a task of Kubernetes runs, with the program at hand in place of an image's.
+/// Runs the script of the tasks of Kubernetes with the program of this build.
 #[test]
 #[cfg(unix)]
 fn tasks_of_kubernetes_make_the_whole() {

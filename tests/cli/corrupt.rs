@@ -1,4 +1,4 @@
-//! `corrupt`: what goes wrong with sweeps and with scans of meshes.
+//! `corrupt`: corruptions of sweeps and of mesh scans.
 
 use crate::Folder;
 use formats::labelled::read_labelled;
@@ -12,7 +12,7 @@ const STREET: &str = "attributes = [\"range\", \"ring\", \"time\", \"intensity\"
 const GROUND: &str = "OFF\n4 1 0\n-50 -50 0\n50 -50 0\n50 50 0\n-50 50 0\n4 0 1 2 3\n";
 const WALL: &str = "OFF\n4 1 0\n20 -30 0\n20 30 0\n20 30 6\n20 -30 6\n4 0 3 2 1\n";
 
-/// What `corruptions.csv` says: how many points or clouds each file has.
+/// The numbers of points or clouds of each file, by `corruptions.csv`.
 fn counts(folder: &Folder, file: &str) -> BTreeMap<String, usize> {
     let text = folder.text(file);
     let line = |line: &str| {
@@ -41,7 +41,7 @@ fn a_sweep_is_corrupted_in_every_way_and_twice_alike() {
         assert_eq!(scan.len(), *count, "{file}");
         assert!(scan.positions != sweep.positions || scan.intensity != sweep.intensity, "{file}");
     }
-    // The more it goes wrong, the less is left.
+    // A higher severity leaves fewer points.
     for name in ["wet-ground", "beam-missing", "incomplete-echo", "cross-sensor"] {
         let left = |n: u32| found[&format!("{name}-{n}.npz")];
         assert!(sweep.len() >= left(1) && left(1) >= left(2) && left(2) > left(3), "{name}");
@@ -52,14 +52,15 @@ fn a_sweep_is_corrupted_in_every_way_and_twice_alike() {
     let farthest = farthest.map(|(a, b)| (a[0] - b[0]).abs()).fold(0.0, f32::max);
     assert!((2.0..5.0).contains(&farthest), "{farthest}");
 
-    // Bare points have no rings and no times, and what needs them is left out and named.
+    // A file with only points has no rings and no times: corruptions that need them are left out,
+    // and reported.
     folder.write("cloud.xyz", "5 0 0\n9 1 0\n0 0 0\nnan nan nan\n");
     let said = folder.succeeds("corrupt cloud.xyz --reflectivity 0.5 --out bare");
     for part in ["motion-blur-1: left out", "no times", "cross-sensor-3: left out", "no rings"] {
         assert!(said.contains(part), "{part}: {said}");
     }
     assert_eq!(counts(&folder, "bare/corruptions.csv").len(), 15);
-    // What needs no light needs no intensities and no detection limit.
+    // Corruptions that do not depend on power need no intensities and no detection limit.
     folder.succeeds("corrupt cloud.xyz --only crosstalk --profile kinect-v2 --out lightless");
     assert!(folder.scan("lightless/crosstalk-1.npz").intensity.is_none());
 }

@@ -1,4 +1,4 @@
-//! `gen-dataset`: the same bytes whatever the way they are made.
+//! `gen-dataset`: the same bytes for any threads, shards and interruptions.
 
 use crate::{Folder, meshes};
 use formats::labelled::read_labelled;
@@ -61,7 +61,7 @@ fn merged_shards_are_the_whole() {
         let words = format!("gen-dataset meshes --out part{shard} --shard {shard}/3 {LAYOUT}");
         folder.edgepuck(&words).output().unwrap();
     }
-    // What failed in a part failed in the whole.
+    // A mesh that failed in a part also failed in the whole.
     folder.exits(3, "merge-dataset part1 part3 part2 --out merged");
     folder.assert_same_tree("whole", "merged");
     folder.refuses(1, &[("merge-dataset part1 part3 --out incomplete", "2")]);

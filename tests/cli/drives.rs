@@ -1,4 +1,4 @@
-//! `gen-drive`: a drive as a capture, with the truth beside it.
+//! `gen-drive`: a drive as a capture, with its ground truth.
 
 use std::ops::ControlFlow;
 
@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::Folder;
 
-/// A row of walls, and no noise.
+/// A row of walls, without noise.
 const WALLS: &str = r#"
 variants = 2
 [ground]
@@ -49,7 +49,7 @@ fn a_drive_comes_back_from_its_packets_when_the_sensors_motion_is_undone() {
                 let [x, y, z] = found.point_m.map(f64::from);
                 let at = [x, y, z].into();
                 let pose = motion.pose(start_s + found.after_us * 1e-6, 0.0);
-                // Where it would be if the sensor had stood still since the first packet.
+                // The position if the sensor had not moved since the first packet.
                 let [moved, still] =
                     [pose, motion.pose(0.0, 0.0)].map(|p| p.to_world(at).to_array());
                 if moved[2] > 0.3 {
@@ -68,8 +68,8 @@ fn a_drive_comes_back_from_its_packets_when_the_sensors_motion_is_undone() {
     assert!(f64::from(n_inside_as_seen) < 0.9 * f64::from(n), "{n_inside_as_seen} of {n}");
 }
 
-/// Whether a wall of the truth holds a point of the world: distances are told in 4 mm, azimuths in
-/// 0.01 degree, which is 5 mm at 30 m.
+/// Whether a point of the world is on a wall of the ground truth. Packets have distances in steps
+/// of 4 mm and azimuths in steps of 0.01 degrees, which are 5 mm at 30 m.
 fn holds(wall: &Value, at: [f64; 3]) -> bool {
     let number = |value: &Value| value.as_f64().unwrap();
     let (sin, cos) = number(&wall["yaw_deg"]).to_radians().sin_cos();

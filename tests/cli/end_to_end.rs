@@ -1,10 +1,10 @@
-//! From a mesh to a scan to its class, by the programs and the weights that ship.
+//! From a mesh to a scan to its class, with the programs and the bundled weights.
 
 use crate::{Folder, in_repository};
 use formats::cloud_file::read_cloud;
 use infer_cpu::{Classifier, Options};
 
-/// Shapes that no bundled network was trained on: of another seed.
+/// Shapes of another seed, on which no bundled network was trained.
 #[test]
 fn scans_of_new_shapes_are_recognised_by_the_weights_that_ship() {
     let folder = Folder::new();
@@ -24,7 +24,7 @@ fn scans_of_new_shapes_are_recognised_by_the_weights_that_ship() {
             }
         }
     }
-    // Its accuracy on 400 scans of the default set is on its card; of 80 scans
-    // of another seed, nine standard deviations less is still this.
+    // Its accuracy on 400 scans of the default set is on its card; of 80 scans of another seed,
+    // nine standard deviations less is still this.
     assert!(all == 80 && right >= 56, "{right} of {all}");
 }

@@ -1,4 +1,4 @@
-//! What the training program ends with is what `edgepuck` ends with.
+//! `edgepuck` ends with the exit code of the training program.
 
 use crate::{Folder, said};
 use std::fs;

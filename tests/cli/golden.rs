@@ -1,8 +1,8 @@
-//! The bytes that the programs write: `tests/golden/bytes.toml` has their hashes. Its sister
-//! tests say what is right; this one says that nothing has changed.
+//! The bytes that the programs write: `tests/golden/bytes.toml` has their hashes. Its sister tests
+//! say what is right; this one says that nothing has changed.
 //!
-//! `UPDATE_GOLDEN=1 cargo test -p edgepuck --test cli golden` rewrites the file after a change
-//! that is meant.
+//! `UPDATE_GOLDEN=1 cargo test -p edgepuck --test cli golden` rewrites the file after a change that
+//! is meant.
 
 use crate::{Folder, in_repository};
 use formats::cloud_file::read_cloud;

@@ -1,4 +1,4 @@
-//! From PyTorch's checkpoints to model files.
+//! `import-weights`: from PyTorch checkpoints to model files.
 
 use crate::{Folder, checkpoints, in_repository};
 use formats::model_card::{ModelCard, Normalization};
@@ -12,7 +12,7 @@ type Tensors = BTreeMap<String, Tensor>;
 
 type Change<'a> = &'a dyn Fn(&mut Tensors);
 
-/// What `tests/golden/checkpoints/make.py` wrote under our name `name`.
+/// The tensor that `tests/golden/checkpoints/make.py` wrote under our name `name`.
 fn golden_value(name: &str, element: usize) -> f32 {
     let step = (name.bytes().map(usize::from).sum::<usize>() + 7 * element) % 61;
     let step = step as f32;
@@ -30,13 +30,13 @@ fn read(path: &Path) -> (Tensors, ModelCard) {
     (names.map(|name| (name.clone(), file.read(&name).unwrap())).collect(), card)
 }
 
-/// The words that import a checkpoint.
+/// The command line that imports a checkpoint.
 fn words(checkpoint: &Path, flags: &str) -> String {
     format!("import-weights {} --out m.safetensors {flags}", checkpoint.display())
 }
 
 impl Folder {
-    /// Imports a checkpoint with these flags; its tensors and its card.
+    /// Imports a checkpoint with these flags. Returns its tensors and its card.
     fn imports(&self, checkpoint: &Path, flags: &str) -> (Tensors, ModelCard) {
         self.succeeds(&words(checkpoint, flags));
         read(&self.at("m.safetensors"))

@@ -1,4 +1,4 @@
-//! A run that is killed at any moment goes on to the same bytes.
+//! A run that is killed at any time resumes, and gives the same bytes.
 
 use crate::{Folder, meshes, terminate};
 use formats::rng::StreamKey;
@@ -15,8 +15,8 @@ fn a_killed_run_resumes_to_the_same_bytes() {
     let folder = Folder::with_meshes();
     folder.succeeds("gen-dataset meshes --out unbroken --adapter cpu");
     let words = "gen-dataset meshes --out broken --adapter cpu --resume";
-    // Moments from before the first scan to the packing, and some that differ
-    // on every run; the last runs through.
+    // Times from before the first scan to the packing, some of which differ in every run. The last
+    // run is not killed.
     let random: Vec<u64> = (0..6).map(random_below_300).collect();
     println!("random moments, ms: {random:?}");
     let fixed = [2, 5, 9, 14, 20, 30, 40, 60, 90, 130, 180, 240, 320];
@@ -26,7 +26,7 @@ fn a_killed_run_resumes_to_the_same_bytes() {
         while child.try_wait().unwrap().is_none() && Instant::now() < killed_at {
             std::thread::sleep(Duration::from_millis(1));
         }
-        // SIGKILL: nothing can be tidied up.
+        // After SIGKILL, the program cannot clean up.
         let _ = child.kill();
         child.wait().unwrap();
     }
@@ -42,13 +42,13 @@ fn a_run_that_is_told_to_end_says_so_and_goes_on_later() {
     folder.succeeds("gen-dataset meshes --out unbroken --adapter cpu");
     let words = "gen-dataset meshes --out broken --adapter cpu --resume";
     let mut codes = Vec::new();
-    // Sooner or later the signal comes while meshes are scanned.
+    // One of the signals comes while meshes are scanned.
     for milliseconds in (0..40).map(|n| 3 + 4 * n) {
         let mut child = folder.edgepuck(words).stderr(Stdio::null()).spawn().unwrap();
         std::thread::sleep(Duration::from_millis(milliseconds));
         let was_there = terminate(&child);
         let code = child.wait().unwrap().code();
-        // A program that has not yet begun is ended by the signal itself.
+        // The signal itself ends a program that does not handle it yet.
         assert!(matches!(code, Some(0 | 75) | None), "{code:?}");
         codes.push(code);
         if code == Some(0) || !was_there {
@@ -69,7 +69,7 @@ fn a_folder_in_use_is_refused_unless_told_otherwise() {
     assert!(refused.contains("--resume") && refused.contains("--overwrite"), "{refused}");
     let other = format!("{words} --resume --seed 9");
     folder.refuses(1, &[(&other, "config.seed: 0 against 9")]);
-    // Another list of meshes is another dataset.
+    // A different list of meshes is a different dataset.
     folder.write("meshes/ball/train/ball_0009.off", meshes::off(8, 0.5));
     folder.refuses(1, &[(&format!("{words} --resume"), "meshes")]);
     folder.write("out/mine.txt", "mine");

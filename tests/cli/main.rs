@@ -1,4 +1,4 @@
-//! The command line as a user meets it: the real binary, in folders of its own.
+//! The command line: the tests run the real binary in temporary folders.
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 
@@ -55,7 +55,7 @@ impl Folder {
         self.0.path().join(file)
     }
 
-    /// Writes a file and makes the folders that it is in.
+    /// Writes a file and creates its folders.
     fn write(&self, file: &str, content: impl AsRef<[u8]>) {
         let path = self.at(file);
         fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -74,27 +74,27 @@ impl Folder {
         read_scan(&self.at(file)).unwrap_or_else(|error| panic!("{error}"))
     }
 
-    /// `edgepuck` with these words, which spaces separate.
+    /// `edgepuck` with these arguments, separated by spaces.
     fn edgepuck(&self, words: &str) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_edgepuck"));
         command.current_dir(&self.0).args(words.split_whitespace());
         command
     }
 
-    /// Runs the words and expects success; returns what the program said.
+    /// Runs the arguments and expects success. Returns the output.
     fn succeeds(&self, words: &str) -> String {
         self.exits(0, words)
     }
 
-    /// Runs the words and expects this exit code; returns what the program said.
+    /// Runs the arguments and expects this exit code. Returns the output.
     fn exits(&self, code: i32, words: &str) -> String {
         let output = self.edgepuck(words).output().unwrap();
         assert_eq!(output.status.code(), Some(code), "{words}\n{}", said(&output));
         said(&output)
     }
 
-    /// Expects of each of `cases`, words and a part of the message, that the words
-    /// end with this exit code and the message.
+    /// Expects that the arguments of each of `cases` end with this exit code and a message that
+    /// contains the second part.
     fn refuses(&self, code: i32, cases: &[(&str, &str)]) {
         for (words, part) in cases {
             let said = self.exits(code, words);
@@ -108,8 +108,8 @@ impl Folder {
     }
 }
 
-/// Sends SIGTERM to `child`; says whether it was there. Shells know `kill`, even where there is no
-/// program of that name.
+/// Sends SIGTERM to `child`, and returns whether it was running. The shell has `kill` even if there
+/// is no program of that name.
 #[cfg(unix)]
 fn terminate(child: &std::process::Child) -> bool {
     let kill = format!("kill {}", child.id());

@@ -3,8 +3,7 @@
 use crate::Folder;
 use std::fmt::Write;
 
-/// Writes nine tori of different thickness in three classes to `meshes`, as a
-/// tree like ModelNet's.
+/// Writes nine tori with different thicknesses in three classes to `meshes`, in ModelNet's layout.
 pub fn write_tree(folder: &Folder) {
     for (class, thickness) in [("ring", 0.1), ("donut", 0.3), ("ball", 0.6)] {
         for (i, split) in [(1, "train"), (2, "train"), (3, "test")] {

@@ -1,6 +1,6 @@
-//! Weights that others trained, against the logits that PyTorch gave.
+//! Compares the logits of weights from other repositories with those of PyTorch.
 //!
-//! References: `../shared/data/reference`, where it is present.
+//! The references are in `../shared/data/reference`, if it is present.
 
 use crate::Folder;
 use formats::labelled::{LabelledSet, read_labelled};
@@ -9,7 +9,7 @@ use infer_cpu::{Classifier, Normalization, Options, Precision};
 use ndarray::Array2;
 use test_support::{need, shared_data};
 
-/// The clouds that references are of, and a checkpoint imported into a folder.
+/// The clouds of the references, and an imported checkpoint in a folder.
 fn imported(checkpoint: &str) -> Result<(LabelledSet, Folder), String> {
     let checkpoint = shared_data(&format!("checkpoints/{checkpoint}.pth"))?;
     let clouds = shared_data("modelnet40-clouds/dev.npz")?;
@@ -22,8 +22,8 @@ fn loaded(folder: &Folder, options: &Options) -> Classifier {
     Classifier::load(&folder.at("m.safetensors"), options).unwrap()
 }
 
-/// 64 points from the first by farthest point sampling, as that network was
-/// trained. 1020 of 1234 is 82.66 %.
+/// 64 points from the first by farthest point sampling, as that network was trained. 1020 of 1234
+/// is 82.66 %.
 #[test]
 fn the_network_of_3dcertify_gives_its_reference_logits_and_accuracy() {
     let (set, folder) = need!(imported("3dcertify_64p_natural"));
@@ -46,8 +46,8 @@ fn the_network_of_3dcertify_gives_its_reference_logits_and_accuracy() {
     for (i, expected) in reference.rows().into_iter().enumerate() {
         let prediction = classifier.classify(set.cloud(i)).unwrap();
         right += usize::from(prediction.class == set.labels[i]);
-        // Logits reach 45: f32 of other orders of summation differ by some
-        // 50 roundings of that, 50 * 45 / 2^24.
+        // Logits reach 45: f32 of other orders of summation differ by some 50 roundings of that, 50
+        // * 45 / 2^24.
         for (found, expected) in prediction.logits.iter().zip(expected) {
             assert!((found - expected).abs() < 1.4e-4, "{i}: {found} for {expected}");
         }
@@ -72,8 +72,8 @@ fn the_baseline_s_network_gives_its_reference_log_probabilities() {
     }
 }
 
-/// fp16 and int8 cost a few clouds in a hundred at most: far more would be a
-/// fault, not rounding. 95 % agreement of 300 clouds is six sigma from 90 %.
+/// fp16 and int8 cost a few clouds in a hundred at most: far more would be a fault, not rounding.
+/// 95 % agreement of 300 clouds is six sigma from 90 %.
 #[test]
 fn cheaper_precisions_agree_with_fp32_on_trained_weights() {
     let (set, folder) = need!(imported("3dcertify_64p_natural"));

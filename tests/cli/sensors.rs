@@ -1,8 +1,8 @@
-//! `profile`, and scans by sensors that are no table of lasers on a head.
+//! `profile`, and scans by sensors that are not rotating heads.
 
 use crate::Folder;
 
-/// What an Ouster of two beams tells of itself.
+/// The metadata of an Ouster with two beams.
 const METADATA: &str = r#"{
   "beam_altitude_angles": [10.0, -10.0], "beam_azimuth_angles": [3.0, -3.0],
   "lidar_origin_to_beam_origin_mm": 15.8, "lidar_mode": "512x10",
@@ -28,7 +28,7 @@ fn profile_lists_the_sensors_and_describes_each() {
 #[test]
 fn a_profile_is_checked_and_what_looks_odd_of_it_is_said() {
     let folder = Folder::new();
-    // Elevations in radians, a beam that is there twice, and a limit that no surface reaches.
+    // Elevations in radians, a duplicate beam, and a limit that no surface reaches.
     folder.write(
         "odd.toml",
         "name = \"odd\"\nrange = { max_m = 100 }\ndetection = { reflectivity = 1, range_m = 50 }\n\

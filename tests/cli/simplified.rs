@@ -3,8 +3,7 @@
 use crate::{Folder, meshes};
 use serde_json::Value;
 
-/// A mesh of 20,000 triangles, most of them smaller than the VLP-32C can tell
-/// apart from 3 m.
+/// A mesh of 20,000 triangles, most of them smaller than the VLP-32C can tell apart from 3 m.
 fn with_fine_torus() -> Folder {
     let folder = Folder::new();
     folder.write("meshes/ring/test/ring_0001.off", meshes::off(100, 0.3));
@@ -21,8 +20,8 @@ fn the_manifest_says_what_was_simplified_and_how_far() {
     let (before, after) = (&mesh["triangles"], &mesh["simplified"]["triangles"]);
     assert_eq!(before.as_u64(), Some(20_000));
     assert!(after.as_u64().unwrap() < 10_000, "{after}");
-    // A quarter of the VLP-32C's smallest step, 0.33 degrees in elevation or 0.2 in azimuth at
-    // 600 rpm, at the nearest point, 2 m away, is 1.7 mm: Sensor's own test has it exactly.
+    // A quarter of the VLP-32C's smallest step, 0.33 degrees in elevation or 0.2 in azimuth at 600
+    // rpm, at the nearest point, 2 m away, is 1.7 mm: Sensor's own test has it exactly.
     let bound_m = mesh["simplified"]["bound_m"].as_f64().unwrap();
     assert!((0.001..0.003).contains(&bound_m), "{bound_m}");
     let told = format!("simplified: {after} triangles cast at for {before} in the files");
@@ -43,8 +42,8 @@ fn a_dataset_of_simplified_meshes_is_the_same_again_and_keeps_its_hits() {
     let [simplified, whole] = ["one", "whole"].map(|out| {
         folder.scan(&format!("{out}/rotational/clean/ring/test/ring_0001_v0.npz")).len() as f64
     });
-    // A millimetre of 1 m moves the silhouette by as much: of a ring as thick as
-    // this, less than 1 point in 100.
+    // A millimetre of 1 m moves the silhouette by as much: of a ring as thick as this, less than 1
+    // point in 100.
     assert!((simplified / whole - 1.0).abs() < 0.01);
     let manifest = folder.text("whole/manifest.json");
     assert!(!manifest.contains("simplif"), "without the flag: {manifest}");

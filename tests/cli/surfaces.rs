@@ -1,4 +1,4 @@
-//! `sample-surfaces`: what scans are compared with.
+//! `sample-surfaces`: points of whole meshes and visible points.
 
 use crate::Folder;
 use formats::labelled::read_labelled;
@@ -28,9 +28,9 @@ fn surfaces_are_sampled_whole_and_as_a_sensor_sees_them() {
         let mean = |cloud: &[[f32; 3]]| cloud.iter().map(|p| p[0]).sum::<f32>() / 200.0;
         let [front, back] = [view, view + 2].map(|view| mean(seen.cloud(view)));
         assert!(front > back, "{name}: {front}, {back}");
-        // In the whole's frame: nothing beyond it but what other samples miss.
+        // In the frame of the whole mesh: visible points exceed it only as far as samples differ.
         assert!(seen.cloud(view).iter().all(|p| radius(p) < 1.2));
-        // Of 1,200 points looked at not all are seen, and not none.
+        // Some of the 1,200 points are visible, and some are not.
         let n_raw = seen.n_raw.as_ref().unwrap()[view];
         assert!((64..1200).contains(&n_raw), "{n_raw}");
     }

@@ -20,7 +20,7 @@ fn scenes_are_scanned_cut_labelled_and_packed_alike_every_time() {
     let classes = set.classes.clone().unwrap();
     assert!(classes.is_sorted() && classes.contains(&"other".to_owned()), "{classes:?}");
     assert!(set.len() > 50, "{} clusters", set.len());
-    // Sensor frame: no sensor of the recipe sees a cluster beyond its range.
+    // In the sensor frame, no cluster is beyond the range of the recipe's sensors.
     let farthest = set.range_m.as_ref().unwrap().iter().fold(0.0, |far: f32, r| far.max(*r));
     assert!((5.0..200.0).contains(&farthest), "{farthest} m");
 

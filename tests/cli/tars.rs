@@ -1,4 +1,4 @@
-//! Tars of samples are the same by however many they are made, and are handed over once.
+//! Tars of samples are the same for any number of tasks, and are handed over once.
 
 use crate::{Folder, meshes, terminate};
 use std::fs;
@@ -82,7 +82,7 @@ fn one_part_leaves_the_others_alone() {
     assert_eq!(folder.bytes("out/train-000001.tar"), before);
     assert_eq!(folder.text("out/train-config.json"), "mine");
     folder.succeeds("gen-dataset --verify out");
-    // Meshes of another class would change what labels mean.
+    // Meshes of another class would change the meaning of labels.
     folder.write("meshes/aaa/train/a.off", meshes::off(8, 0.5));
     let other = format!("{WORDS} --out out --shard 2/2 --overwrite");
     folder.refuses(1, &[(&other, "this part has other settings, other meshes")]);
@@ -126,7 +126,7 @@ fn a_tar_is_handed_over_once_and_a_failing_command_is_tried_again() {
         let words = format!("{WORDS} --out out --resume --on-shard");
         folder.edgepuck(&words).arg(command).output().unwrap()
     };
-    // It fails for the first tar until there is a folder for it.
+    // The command fails until there is a folder for the first tar.
     let late = "test -d store || { test -e tried && mkdir store; touch tried; exit 1; }; cp {} store/{name}";
     let done = run(late);
     assert_eq!(done.status.code(), Some(0), "{}", String::from_utf8_lossy(&done.stderr));
@@ -134,7 +134,7 @@ fn a_tar_is_handed_over_once_and_a_failing_command_is_tried_again() {
         let own = folder.at("out").join(tar.file_name());
         assert_eq!(fs::read(own).unwrap(), fs::read(tar.path()).unwrap());
     }
-    // All were handed over: another command is not run.
+    // All tars were handed over: the command does not run again.
     assert_eq!(run("touch again; false").status.code(), Some(0));
     assert!(!folder.at("again").exists());
 }
@@ -155,13 +155,13 @@ fn a_run_that_is_told_to_end_leaves_no_half_of_a_tar() {
     let words = format!("{WORDS} --out out --resume --shard 1/2");
     let words = words.replace("--views 3", "--views 900").replace("clouds 4", "clouds 1500");
     let mut codes = Vec::new();
-    // Sooner or later the signal comes while a tar is written.
+    // One of the signals comes while a tar is written.
     for milliseconds in (0..60).map(|n| 20 + 10 * n) {
         let mut child = folder.edgepuck(&words).stderr(Stdio::null()).spawn().unwrap();
         std::thread::sleep(Duration::from_millis(milliseconds));
         let _ = terminate(&child);
         let code = child.wait().unwrap().code();
-        // A program that has not yet begun is ended by the signal itself.
+        // The signal itself ends a program that does not handle it yet.
         assert!(matches!(code, Some(0 | 75) | None), "{code:?}");
         for file in fs::read_dir(folder.at("out")).into_iter().flatten() {
             let path = file.unwrap().path();
@@ -176,7 +176,7 @@ fn a_run_that_is_told_to_end_leaves_no_half_of_a_tar() {
     folder.succeeds(&words);
 }
 
-/// A billion views of nine meshes: one part of a hundred million is made like any other.
+/// A billion views of nine meshes: one part in a hundred million is made like any other.
 #[test]
 fn a_task_of_a_very_large_dataset_does_its_part_alone() {
     let folder = Folder::with_meshes();
@@ -191,7 +191,7 @@ fn a_task_of_a_very_large_dataset_does_its_part_alone() {
     assert!(part.contains("train-000006.tar"), "{part}");
 }
 
-/// A scheduler's signal ends the command as well: the task is to be gone on with, and has not failed.
+/// The signal of a scheduler also ends the command. The task has not failed, and can resume.
 #[test]
 #[cfg(unix)]
 fn a_run_that_is_told_to_end_while_a_tar_is_handed_over_is_interrupted() {

@@ -160,7 +160,7 @@ fn sensors_and_objects_of_a_scene_move_along_trajectories() {
     let folder = Folder::new();
     folder.write("wall.off", WALL);
     folder.write("ego.tum", "# t p q\n100 0 0 0 0 0 0 1\n101 10 0 0 0 0 0 1\n");
-    // It comes 1 m nearer in a tenth of a second.
+    // The wall comes 1 m nearer in a tenth of a second.
     folder.write("car.tum", "100 0 0 0 0 0 0 1\n100.1 -1 0 0 0 0 0 1\n");
     let moves = |sensor: &str| {
         scene("quantise_m = true")
@@ -176,13 +176,13 @@ fn sensors_and_objects_of_a_scene_move_along_trajectories() {
     let [raw, deskewed] = ["raw.npz", "deskewed.npz"].map(|file| folder.scan(file));
     assert_eq!(raw.range_m, deskewed.range_m);
     assert!(raw.positions != deskewed.positions && raw.len() > 1000);
-    // In a tenth of a second the sensor comes 1 m.
+    // In a tenth of a second, the sensor moves 1 m.
     let farthest = deskewed.sensor_m.unwrap().iter().fold(0f32, |far, at| far.max(at[0]));
     assert!((0.9..1.0).contains(&farthest), "{farthest} m");
     let [nearest, farthest] = [f32::min, f32::max]
         .map(|ends| deskewed.positions.iter().map(|at| at[0]).reduce(ends).unwrap());
     assert!(nearest < 19.1 && farthest > 19.9, "the wall comes from 20 m: {nearest} {farthest}");
-    // KITTI's lines have no times: they begin at 0.
+    // KITTI's lines have no times: the first is at 0.
     folder.write("car.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 -1 0 1 0 0 0 0 1 0\n");
     let early = moves("trajectory = \"ego.tum\"\nstart_s = 100\n").replace("car.tum", "car.txt");
     folder.write("early.toml", early);
@@ -227,13 +227,13 @@ fn a_sensor_moves_evenly_where_its_effects_say_so() {
         beams.zip(seen).collect::<std::collections::BTreeMap<_, _>>()
     };
     let (moves, rests) = (ranges("moves.npz"), ranges("rests.npz"));
-    // Ahead the wall comes nearer by 10 m/s; the first beams are fired forward, the last again.
+    // The wall ahead comes nearer at 10 m/s. The first and the last beams point forward.
     let ahead = rests.iter().filter(|(_, (range_m, _))| (20.0..20.1).contains(range_m));
     let mut n = 0;
     for (beam, (range_m, time_s)) in ahead {
         let Some((found_m, _)) = moves.get(beam) else { continue };
         let off_m = f64::from(range_m - found_m) - 10.0 * f64::from(*time_s);
-        // The turn of 3 degrees lengthens it by 1 / cos, 0.03 m.
+        // The rotation of 3 degrees lengthens the range by 1 / cos, 0.03 m.
         assert!(off_m.abs() < 0.2, "beam {beam} at {time_s} s: {off_m}");
         n += 1;
     }

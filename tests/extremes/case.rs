@@ -1,4 +1,4 @@
-//! The files of cases: found, read, checked.
+//! Finds, reads and checks the files of cases.
 
 use std::ffi::OsStr;
 use std::path::Path;
@@ -13,16 +13,16 @@ use crate::scan::Scan;
 use crate::scene::ManyObjects;
 use crate::sweep::Sweep;
 
-/// Set to 1, heavy cases run.
+/// The environment variable that enables heavy cases if it is 1.
 const HEAVY: &str = "EDGEPUCK_HEAVY";
 
-/// A file of a case: one of the kinds, and why its outcome must be.
+/// The file of a case of any kind, with the derivation of its outcome.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
-    /// Why the outcome is what it must be.
+    /// The derivation of the expected outcome.
     derivation: String,
-    /// Whether it takes gigabytes or minutes.
+    /// Whether the case needs gigabytes or minutes.
     #[serde(default)]
     heavy: bool,
     scan: Option<Scan>,
@@ -33,11 +33,10 @@ struct File {
     sweep: Option<Sweep>,
 }
 
-/// A case of whichever kind, as the test that it is.
+/// A case of any kind, as a test.
 type Check = Box<dyn FnOnce() + Send>;
 
-/// A test for each file, whatever its name; a file that cannot be read is a test
-/// that fails.
+/// A test for each file. A file that cannot be read is a failing test.
 pub fn trials() -> Vec<Trial> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("extremes/cases");
     let mut trials = vec![Trial::test("what_is_misspelt_is_named", what_is_misspelt_is_named)];
@@ -84,7 +83,7 @@ fn parse(text: &str, path: &Path) -> Result<(bool, Check), String> {
     }
 }
 
-/// A case that says nothing, or something else than it seems to, is no test.
+/// Refuses a case that expects nothing, or whose keys have no effect.
 fn what_is_misspelt_is_named() -> Result<(), libtest_mimic::Failed> {
     let sample = "[sample]\npoints = [[0, 0, 0]]\nsampler = \"voxel\"\nvoxel_size = 1\n";
     let whole = format!("derivation = \"one\"\n{sample}kept = [0]\n");

@@ -1,6 +1,5 @@
-//! The whole chain: a mesh in a scene is scanned with effects, and the cloud
-//! sampled and classified. What the chain gives far away is what it gives at the
-//! world's origin.
+//! The whole pipeline: a mesh in a scene is scanned with effects, and the cloud is sampled and
+//! classified. Far from the origin, the pipeline gives the same results as at the origin.
 
 use std::path::{Path, PathBuf};
 
@@ -12,21 +11,21 @@ use sim_gpu::internals::scene::SceneFile;
 use sim_gpu::{Caster, Scene};
 use tests::adapter::casters;
 
-/// How far a point may be from where it is at the origin, from the sensor, metres.
+/// Largest distance of a point, relative to the sensor, from the same point at the origin, metres.
 const WITHIN_M: f64 = 1e-4;
-/// How far apart logits may be in f32, as a part of the largest.
+/// Largest difference of logits in f32, as a share of the largest logit.
 const LOGITS_WITHIN: f64 = 1e-3;
-/// Points that farthest point sampling keeps.
+/// Number of points that farthest point sampling selects.
 const POINTS: usize = 16;
 
-/// A chair of 40 m radius at 1e7 m from the world's origin, seen from 200 m with
-/// 0.1 m of noise, quantised to 4 mm, thinned to 16 points, classified in every
-/// precision down to int8. Coordinates of 1e7 m are whole multiples of 2^-29 m,
-/// 2e-9: ranges move by as much, times the tangent of the incidence, and a range
-/// within that of the border of a quantum moves by 4 mm; of some hundred points
-/// hardly one. Positions are kept as f32 from a whole metre near the sensor: of up
-/// to 200 m by 1.5e-5 m, two roundings of half as much. So the cloud is the one at
-/// the origin to 1e-4 m of 40: 2.5e-6, and the logits to 1e-3.
+/// A chair with a radius of 40 m, 1e7 m from the origin of the world, is scanned from 200 m with
+/// 0.1 m of noise and a quantum of 4 mm, sampled to 16 points, and classified in all precisions.
+///
+/// Coordinates of 1e7 m are multiples of 2^-29 m = 2e-9 m. Ranges change by this times the tangent
+/// of the incidence. A range so close to the border of a quantum changes by 4 mm, which is unlikely
+/// for a few hundred points. Positions are f32, relative to a whole metre near the sensor: up to
+/// 200 m, two roundings change them by 1.5e-5 m. Therefore the cloud agrees with that at the origin
+/// within 1e-4 m, or 2.5e-6 of its radius, and the logits within 1e-3.
 pub fn a_chair_far_away_and_noisy_is_classified_as_at_the_origin() {
     let scenes = [dvec3(1e7, -1e7, 1e7), DVec3::ZERO].map(scene);
     for caster in casters(&scenes[0].effects) {
@@ -76,7 +75,7 @@ fn assets() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets")
 }
 
-/// The points in the world.
+/// The points in the frame of the world.
 fn scan(scene: &SceneFile, caster: &OpenCaster) -> Vec<DVec3> {
     let caster = Caster::named(caster.name()).unwrap();
     let scan = Scene::try_from(scene).unwrap().scan_mounted(0).with(&caster).run().unwrap();

@@ -8,7 +8,7 @@ use serde::Deserialize;
 use crate::cloud::Cloud;
 use crate::model::{Model, ModelFile};
 
-/// A cloud, a model, and what comes of them.
+/// A cloud, a model, and the expected answer.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Classify {
@@ -16,49 +16,49 @@ pub struct Classify {
     cloud: Cloud,
     /// Another cloud, for `expect.same`.
     other: Option<Cloud>,
-    /// By their names on the command line; as the model was trained, if absent.
+    /// Samplers, by their names on the command line. If absent, the sampler of the training.
     samplers: Option<Vec<String>>,
-    /// How many points samplers keep.
+    /// Number of points that samplers select.
     points: Option<usize>,
-    /// By their names on the command line; all, if absent.
+    /// Precisions, by their names on the command line. If absent, all precisions.
     precisions: Option<Vec<String>>,
     knob: Option<Knob>,
     expect: Expect,
 }
 
-/// What is turned, and to which values; each must give what `expect` says.
+/// A parameter and its values. Each value must give the expected answer.
 #[derive(Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum Knob {
-    /// Coordinates are so many times as large.
+    /// Factors for all coordinates.
     Scale(Vec<f64>),
-    /// Coordinates lie elsewhere.
+    /// Offsets of all coordinates.
     Offset(Vec<[f64; 3]>),
 }
 
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct Expect {
-    /// The cloud is refused, and the error holds this.
+    /// A part of the error, if the cloud is refused.
     refused: Option<String>,
     points: Option<usize>,
     used: Option<usize>,
-    /// At least 1 of them and at most so many.
+    /// Largest number of selected points; the smallest is 1.
     used_at_most: Option<usize>,
     label: Option<String>,
     confidence: Option<f64>,
-    /// What the network computed in, where another precision overflowed.
+    /// The precision of the computation, if the wanted precision overflowed.
     computed_in: Option<String>,
     /// Whether int8 clips activations.
     clipped: Option<bool>,
-    /// The largest logit's magnitude is above this.
+    /// The largest logit has a larger magnitude than this.
     logits_above: Option<f64>,
-    /// The logits of the other cloud, and of each value of the knob, are those of
-    /// the cloud to within this part of the largest; 0 is to the bit.
+    /// Largest difference between the logits of the cloud and those of the other cloud or of a
+    /// value of the parameter, as a share of the largest logit. 0 requires equal bits.
     same: Option<f64>,
 }
 
-/// One way to compute.
+/// A combination of precision and kernels.
 #[derive(Clone)]
 struct Way {
     precision: Precision,
@@ -67,7 +67,7 @@ struct Way {
 }
 
 impl Classify {
-    /// Classifies in every way.
+    /// Classifies with all combinations.
     pub fn check(&self) {
         let model = self.model.file();
         let cloud = self.cloud.points();
@@ -86,7 +86,7 @@ impl Classify {
         }
     }
 
-    /// The other cloud, and the cloud at each value of the knob.
+    /// The other cloud, and the cloud at each value of the parameter.
     fn turned(&self, cloud: &[[f64; 3]]) -> Vec<(String, Vec<[f64; 3]>)> {
         let mapped = |name: String, map: &dyn Fn([f64; 3]) -> [f64; 3]| {
             (name, cloud.iter().copied().map(map).collect())
@@ -141,7 +141,7 @@ impl Classify {
 }
 
 impl Expect {
-    /// That the answer is the expected one; its logits.
+    /// Checks the answer, and returns its logits.
     fn check(&self, what: &str, found: Result<&Prediction, Error>) -> Option<Vec<f32>> {
         if let Some(part) = &self.refused {
             let error = found.err().unwrap_or_else(|| panic!("{what}: not refused"));
@@ -151,7 +151,7 @@ impl Expect {
         let found = found.unwrap_or_else(|error| panic!("{what}: {error}"));
         let largest = found.logits.iter().fold(0.0f32, |most, x| most.max(x.abs()));
         assert!(largest.is_finite(), "{what}: {:?}", found.logits);
-        // The largest of n probabilities; a sum of n rounds to n * 2^-53.
+        // The largest of n probabilities is 1 / n or more; their sum is rounded to n * 2^-53.
         let least = 1.0 / found.logits.len() as f64 - 1e-12;
         let confidence = found.confidence();
         assert!((least..=1.0).contains(&confidence), "{what}: {confidence}");
@@ -171,7 +171,7 @@ impl Expect {
     }
 }
 
-/// Asserts that logits differ by at most this part of the largest.
+/// Asserts that logits differ by at most this share of the largest.
 pub fn assert_same(what: &str, part: f64, one: &[f32], other: &[f32]) {
     let largest = one.iter().fold(0.0f32, |most, x| most.max(x.abs()));
     let error = |(a, b): (&f32, &f32)| (f64::from(*a) - f64::from(*b)).abs();

@@ -1,23 +1,23 @@
-//! Clouds that a case names.
+//! The clouds of cases.
 
 use serde::Deserialize;
 
 use crate::stream;
 
-/// A cloud by its rule.
+/// A cloud, defined by a rule.
 #[derive(Clone, Deserialize)]
 #[serde(tag = "rule", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Cloud {
-    /// As they are listed.
+    /// Listed points.
     Points { points: Vec<[f64; 3]> },
     /// One point, n times.
     Repeated { point: [f64; 3], n: usize },
-    /// n points on a twisted strip, and perhaps one far from it.
+    /// n points on a twisted strip, and optionally one far from it.
     Strip { n: usize, outlier: Option<[f64; 3]> },
-    /// n points on the surface of an upright vase: a round foot, a belly, a neck.
+    /// n points on the surface of an upright vase with a round foot, a belly and a neck.
     Vase { n: usize },
-    /// n points spread evenly over a cube, read from a stream of bytes as they are
-    /// made: nothing of them is ever on a disk.
+    /// n points, uniform in a cube, which are read from a stream of bytes and never stored on a
+    /// disk.
     Streamed { n: usize },
 }
 
@@ -39,7 +39,7 @@ fn strip(i: usize, n: usize) -> [f64; 3] {
     [t.cos(), t.sin() * (i % 3) as f64, t / 6.0]
 }
 
-/// Heights evenly spread, angles by the golden section.
+/// Equidistant heights, with angles by the golden section.
 fn vase(i: usize, n: usize) -> [f64; 3] {
     let height = (i as f64 + 0.5) / n as f64;
     let radius = 0.18 + 0.12 * (5.0 * height + 0.4).sin();

@@ -1,4 +1,4 @@
-//! Cases of effects at the ends of what they may be given: a sensor inside a cube.
+//! Cases of effects with extreme parameters, for a sensor inside a cube.
 
 use formats::scan::{Attribute, Column};
 use glam::DVec3;
@@ -10,11 +10,11 @@ use sim_gpu::internals::sensor::SensorProfile;
 use tests::adapter::casters;
 use tests::{casting, meshes};
 
-/// A VLP-32C in the middle of a cube that has one reflectivity.
+/// A VLP-32C in the middle of a cube with one reflectivity.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InCube {
-    /// As a scene has them; one after the other.
+    /// Effects with the keys of a scene. Each is applied in its own scan.
     effects: Vec<toml::Table>,
     half_m: f64,
     #[serde(default = "white")]
@@ -25,9 +25,9 @@ pub struct InCube {
 #[derive(Deserialize)]
 #[serde(untagged, deny_unknown_fields)]
 enum Expect {
-    /// All of the effects are refused, with this in the message.
+    /// A part of the error, if all effects are refused.
     Refused { refused: String },
-    /// How many points there are, at least and at most, and where.
+    /// The limits of the number of points, and their position.
     Points { points: [usize; 2], range_m: Option<[f32; 2]> },
 }
 
@@ -36,7 +36,7 @@ fn white() -> f32 {
 }
 
 impl InCube {
-    /// Scans on every caster.
+    /// Scans with all casters.
     pub fn check(&self) {
         for table in &self.effects {
             let parsed: Result<Effects, _> = table.clone().try_into();

@@ -1,15 +1,14 @@
-//! What the product does at the ends of what it may be given.
+//! Tests with extreme inputs.
 //!
-//! A case is a file: `cases/KIND/NAME.toml`. It holds what goes in, at most one
-//! knob and its values, what must come out, and in words why (`derivation`).
-//! Each runs on every caster there is, or, where it classifies, in every
-//! precision and on every kernel. To add a case, add a file: it is found, and
-//! its name is the test's. [`case`] has the keys that all share, the file named
-//! for a kind has that kind's. A key that is unknown fails the run.
+//! A case is a file `cases/KIND/NAME.toml`. It holds the input, at most one parameter with several
+//! values, the expected output, and its derivation in words (`derivation`). A case runs on all
+//! casters or, if it classifies, in all precisions and with all kernels. To add a case, add a file,
+//! whose name becomes the name of the test. [`case`] has the keys of all kinds, and the module
+//! named after a kind has the keys of that kind. An unknown key fails the run.
 //!
-//! Cases that take gigabytes or minutes say `heavy = true`: they run where
-//! `EDGEPUCK_HEAVY=1`, and are named as skipped where not. What no table says
-//! plainly, a relation between several scans, is in [`rules`].
+//! Cases that need gigabytes or minutes have `heavy = true`. They run if `EDGEPUCK_HEAVY=1`;
+//! otherwise, they are reported as skipped. [`rules`] tests relations between several scans, which
+//! a table cannot express.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 

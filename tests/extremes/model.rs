@@ -1,4 +1,4 @@
-//! Models that a case names, perhaps with other weights than they have.
+//! The models of cases, with optional changes of their weights.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -10,31 +10,31 @@ use tempfile::TempDir;
 
 use crate::tiny_model;
 
-/// A model, and what is changed in it.
+/// A model with changes.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Model {
-    /// A bundled model; without a name, a small one of weights by rule, with both
-    /// T-Nets and the classes a, b, c, d.
+    /// A bundled model. If absent, a small model with weights by a rule, both T-Nets and the
+    /// classes a, b, c and d.
     bundled: Option<String>,
-    /// Tensors, by their names, to be multiplied by a factor.
+    /// Factors of tensors, by the names of the tensors.
     #[serde(default)]
     scale: BTreeMap<String, f32>,
-    /// Batch norms of this variance behind every layer that may have one.
+    /// The variance of a batch norm that is added after each layer that can have one.
     variance: Option<f32>,
-    /// What int8 is told of every layer's largest activation.
+    /// The calibrated largest activation of all layers, for int8.
     activation_range: Option<f32>,
 }
 
-/// A model's file, there as long as this is.
+/// The file of a model, which is removed when this is dropped.
 pub struct ModelFile {
-    /// Where it is.
+    /// The path.
     pub path: PathBuf,
     _folder: Option<TempDir>,
 }
 
 impl Model {
-    /// The file of the model, changed as asked.
+    /// Writes the model with its changes.
     pub fn file(&self) -> ModelFile {
         let bundled = self.bundled.as_ref().map(|name| {
             Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -76,8 +76,8 @@ fn whole(path: &Path) -> (ModelCard, BTreeMap<String, Tensor>) {
     (card, names.map(|name| (name.clone(), file.read(&name).unwrap())).collect())
 }
 
-/// Adds norms that leave activations alone but for their variance: each stack's
-/// last vector layer has none, the others count through point and vector layers.
+/// Adds batch norms that change only the variance of activations. The last vector layer of each
+/// stack has no batch norm; the numbers of the others continue from point layers to vector layers.
 fn add_norms(tensors: &mut BTreeMap<String, Tensor>, variance: f32) {
     for prefix in ["feat.stn.", "feat.fstn.", "feat.", ""] {
         let layers = |kind: &str| -> Vec<String> {

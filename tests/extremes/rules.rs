@@ -1,4 +1,4 @@
-//! Relations between several scans, which no table of one says plainly.
+//! Relations between several scans, which the table of one case cannot express.
 
 use glam::{DAffine3, DMat3, DVec3, dvec3};
 use libtest_mimic::Trial;
@@ -44,7 +44,7 @@ pub fn trials() -> Vec<Trial> {
     ]
 }
 
-/// Casts on all casters, holds each to the oracle, and returns what all found.
+/// Casts with all casters, compares each with the oracle, and returns the common result.
 fn scan(name: &str, target: &Target, pose: &Pose, pattern: &BeamPattern) -> Vec<Hits> {
     let job = job(target, pose, pattern);
     let cast = |caster: &&OpenCaster| {
@@ -59,15 +59,14 @@ fn view(centre: DVec3) -> Pose {
     Pose::view(3.0, 20f64.to_radians(), 0.3, centre)
 }
 
-/// Where a ray from within leaves the cube.
+/// The point at which a ray from within leaves the cube.
 fn leaves_cube(from: DVec3, direction: DVec3) -> f64 {
     ((direction.signum() - from) / direction).min_element()
 }
 
-/// Which side of a surface a sensor on it stands on is a matter of the last
-/// bit, beam by beam: it is blind, or looks past the surface. At range 0 no
-/// angle is small, so the judge of other tests has no say; on an edge, f32 and
-/// f64 may choose differently.
+/// The last bit decides for each beam on which side of the surface the sensor is: the beam sees
+/// nothing, or passes the surface. At range 0, no angle is small, so that the oracle of other tests
+/// does not apply; on an edge, f32 and f64 may choose differently.
 fn a_sensor_on_a_surface_is_blind_or_looks_past_it() {
     let cube = target(&cube());
     let mut random = Random::new("on a surface");
@@ -97,8 +96,8 @@ fn a_sensor_on_a_surface_is_blind_or_looks_past_it() {
     }
 }
 
-/// An object without triangles beside others, in one batch: uncast it would
-/// be tried at no cost, and cast it must not borrow its neighbours' triangles.
+/// An object without triangles among others in one batch. It must not get the triangles of other
+/// objects.
 fn an_empty_object_in_a_batch_has_no_hits() {
     let pattern = builtin("generic-static");
     let [empty, full] = [TriangleMesh::default(), torus(20)].map(|mesh| target(&mesh));
@@ -115,14 +114,13 @@ fn an_empty_object_in_a_batch_has_no_hits() {
     }
 }
 
-/// Every triangle of `mesh` is kept, whatever a survey says.
+/// Keeps all triangles of `mesh`, regardless of the survey.
 fn unsurveyed(mesh: TriangleMesh) -> Target {
     let kept = (0..mesh.triangles.len() as u32).collect();
     Target::new(Surface::new(mesh, kept), Builder::Sah)
 }
 
-/// Coincident triangles, near enough for f64 to be asked and far enough for
-/// f32 to answer by itself.
+/// Coincident triangles, both so near that f64 decides and so far that f32 decides.
 fn of_coincident_triangles_the_lowest_index_is_hit() {
     let single = soup(50, 1.0);
     let copies = |order: [[usize; 3]; 3]| {
@@ -153,7 +151,7 @@ fn of_coincident_triangles_the_lowest_index_is_hit() {
     }
 }
 
-/// An object that its scene squeezes, against the squeezed mesh.
+/// Compares an object with a non-uniform scale with a mesh that has this scale.
 fn a_squeezed_object_is_seen_as_its_squeezed_mesh() {
     let mesh = torus(40);
     let pattern = builtin("vlp32c");
@@ -175,7 +173,7 @@ fn a_squeezed_object_is_seen_as_its_squeezed_mesh() {
                 judge(&job, &pattern, &found).assert_kept("squeezed");
                 let found = ranges(&found, &pattern);
                 let differing = truth.iter().zip(&found).filter(|pair| match pair {
-                    // The squeeze's inverse amplifies roundings by 10^3.
+                    // The inverse of the scale amplifies roundings by 10^3.
                     (Some(a), Some(b)) => (a - b).abs() > 1e-9,
                     (a, b) => a.is_some() != b.is_some(),
                 });

@@ -1,19 +1,19 @@
-//! Cases of which points a sampler keeps.
+//! Cases of samplers.
 
 use infer_cpu::sampler::{SamplerKind, SamplerSpec};
 use serde::Deserialize;
 
-/// A cloud, a sampler and the points that it keeps.
+/// A cloud, a sampler and the selected points.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sample {
     points: Vec<[f64; 3]>,
     sampler: Kind,
-    /// Edge of a voxel, in the cloud's unit.
+    /// The edge of a voxel in the unit of the cloud.
     voxel_size: Option<f64>,
-    /// How many points to keep.
+    /// The number of points to select.
     m: Option<usize>,
-    /// Indices, in the sampler's order.
+    /// The expected indices, in the order of the sampler.
     kept: Vec<u32>,
 }
 

@@ -1,5 +1,5 @@
-//! Cases of one mesh and one sensor. Every caster's hits are held to the f64
-//! oracle, with and without culling, and to what the case expects.
+//! Cases of one mesh and one sensor. The hits of all casters, with and without culling, are
+//! compared with the f64 oracle and with the expected output.
 
 use glam::{DQuat, DVec3};
 use serde::Deserialize;
@@ -21,12 +21,12 @@ use tests::random::Random;
 
 use crate::shape::Shape;
 
-/// A mesh, a sensor, its beams and what they find.
+/// A mesh, a sensor, its beams and the expected hits.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scan {
     mesh: Shape,
-    /// `morton`; the surface area heuristic, if absent.
+    /// The builder: `morton`, or the surface area heuristic if absent.
     builder: Option<String>,
     sensor: Place,
     beams: Beams,
@@ -34,7 +34,7 @@ pub struct Scan {
     expect: Expect,
 }
 
-/// Where the sensor stands.
+/// The pose of the sensor.
 #[derive(Deserialize)]
 #[serde(untagged, expecting = "a sensor has `at_m` or `distance_m`", deny_unknown_fields)]
 enum Place {
@@ -45,31 +45,31 @@ enum Place {
 #[derive(Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum Beams {
-    /// Those of a sensor that comes with the program.
+    /// The beams of a built-in sensor.
     Sensor(String),
-    /// In these directions.
+    /// Beams in these directions.
     Directions(Vec<DVec3>),
-    /// So many, anywhere.
+    /// A number of beams in random directions.
     Random(usize),
-    /// At these points.
+    /// Beams to these points.
     AtPoints(Vec<DVec3>),
-    /// At random points of a box.
+    /// Beams to random points in a box.
     AtBox { n: usize, low: DVec3, high: DVec3 },
-    /// At points spread evenly from one to another, both included.
+    /// Beams to equidistant points from one point to another, both included.
     AtSegment { n: u32, from: DVec3, to: DVec3 },
-    /// At the mesh's vertices and at the middles of its edges.
+    /// Beams to the vertices of the mesh and to the middles of its edges.
     AtCornersAndEdges {},
 }
 
-/// What is turned, and to which values; each must give what `expect` says.
+/// A parameter and its values. Each value must give the expected hits.
 #[derive(Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum Knob {
-    /// Everything is so many times as large.
+    /// Factors for all lengths.
     Scale(Vec<f64>),
-    /// Everything stands elsewhere, metres.
+    /// Offsets of the mesh and the sensor, metres.
     OffsetM(Vec<DVec3>),
-    /// The sensor stands so far back along its own place, metres.
+    /// Distances of the sensor from the origin in its direction, metres.
     DistanceM(Vec<f64>),
 }
 
@@ -77,16 +77,15 @@ enum Knob {
 #[serde(deny_unknown_fields)]
 struct Expect {
     ranges: Option<Ranges>,
-    /// Relative error allowed of `ranges`.
+    /// Largest relative error of `ranges`.
     #[serde(default = "roundings")]
     relative: f64,
     hits: Option<usize>,
     hits_at_least: Option<usize>,
     decided_in_f64: Option<usize>,
-    /// Each value of the knob gives what the case gives without it.
+    /// The relation of the hits at each value of the parameter to those without it.
     same: Option<Same>,
-    /// Whether hits are held to the oracle: not where a case is about rays that
-    /// none can judge.
+    /// Whether hits are compared with the oracle. False for rays whose hits are undefined.
     #[serde(default = "yes")]
     judged: bool,
 }
@@ -95,29 +94,28 @@ struct Expect {
 #[serde(untagged, expecting = "`aim`, `leaves-cube`, `miss`, or a list of ranges")]
 enum Ranges {
     All(Rule),
-    /// One a beam, metres; `inf` for a beam that misses.
+    /// The range of each beam, metres; `inf` for a beam that misses.
     Each(Vec<f64>),
 }
 
 #[derive(Clone, Copy, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum Rule {
-    /// Every beam ends where it is aimed.
+    /// All beams end at their targets.
     Aim,
-    /// Every beam leaves the cube from -1 to 1, in which the sensor is.
+    /// All beams end at the cube from -1 to 1, in which the sensor is.
     LeavesCube,
-    /// No beam finds anything.
+    /// No beam hits.
     Miss,
 }
 
 #[derive(Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum Same {
-    /// Beam by beam the same triangle, ranges within this part of themselves
-    /// once the scale is taken out.
+    /// All beams hit the same triangles, and the scaled ranges differ by at most this share.
     Relative(f64),
-    /// Ranges within so many metres; so many beams may differ, each at a
-    /// silhouette.
+    /// Largest difference of ranges, metres, and largest number of beams that may differ more, each
+    /// at a silhouette.
     Metres { within: f64, silhouettes: usize },
 }
 
@@ -129,7 +127,7 @@ fn yes() -> bool {
     true
 }
 
-/// One setting of the knob.
+/// One value of the parameter.
 #[derive(Clone, Copy, Debug)]
 enum Setting {
     Plain,
@@ -138,7 +136,7 @@ enum Setting {
     DistanceM(f64),
 }
 
-/// A setting made ready to be cast, and what each beam must find, if told.
+/// A setting that is ready to cast, with the expected range of each beam, if there is one.
 struct Scene {
     target: Target,
     pose: Pose,
@@ -147,7 +145,7 @@ struct Scene {
 }
 
 impl Scan {
-    /// Casts every setting on every caster.
+    /// Casts all settings with all casters.
     pub fn check(&self) {
         let settings = self.knob.as_ref().map_or(vec![Setting::Plain], Knob::settings);
         let reference = self.expect.same.as_ref().map(|same| (same, self.cast_all(Setting::Plain)));
@@ -161,7 +159,7 @@ impl Scan {
         }
     }
 
-    /// What every caster finds, once it was checked.
+    /// The checked hits of all casters.
     fn cast_all(&self, setting: Setting) -> (Scene, Vec<Hits>) {
         let scene = self.scene(setting);
         let check = |caster: &&OpenCaster| {
@@ -200,7 +198,7 @@ impl Scan {
 }
 
 impl Scene {
-    /// As a scan does: a target too large for the adapter goes to the CPU.
+    /// Casts like a scan: a target that is too large for the adapter is cast on the CPU.
     fn cast(&self, caster: &OpenCaster, culling: Culling) -> Hits {
         let job = self.job(culling);
         let jobs = std::slice::from_ref(&job);
@@ -237,7 +235,7 @@ impl Place {
 }
 
 impl Beams {
-    /// The pattern, and the points that its beams are aimed at, if any.
+    /// The pattern, and the targets of its beams, if there are any.
     fn pattern(
         &self,
         mesh: &TriangleMesh,
@@ -360,7 +358,7 @@ impl Same {
     }
 }
 
-/// How many beams find another range, each of which must be at a silhouette.
+/// The number of beams with another range, each of which must be at a silhouette.
 fn differing(first: (&Scene, &Hits), second: (&Scene, &Hits), within: f64) -> usize {
     let [here, there] = [first, second].map(|(scene, hits)| ranges(hits, &scene.pattern));
     let job = first.0.job(Culling::On);

@@ -1,4 +1,4 @@
-//! Cases of scenes of very many objects.
+//! Cases of scenes with very many objects.
 
 use std::fmt::Write;
 
@@ -11,14 +11,14 @@ use sim_gpu::{Caster, Scan, Scene};
 use tests::adapter::casters;
 use tests::meshes::cuboid;
 
-/// Cubes of 1 m on a square lattice, seen from above its middle.
+/// Cubes of 1 m on a square lattice, scanned from above the middle.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ManyObjects {
     objects: usize,
-    /// From one cube to the next, metres.
+    /// Distance between adjacent cubes, metres.
     apart_m: f64,
-    /// Of the sensor above the cubes' middles, metres.
+    /// Height of the sensor above the middles of the cubes, metres.
     height_m: f64,
     sensor: String,
     expect: Expect,
@@ -28,14 +28,14 @@ pub struct ManyObjects {
 #[serde(deny_unknown_fields)]
 struct Expect {
     points_at_least: usize,
-    /// Different objects among the points' at least.
+    /// Smallest number of different objects that points are on.
     seen_at_least: usize,
-    /// How far a point may be from the cube that it is said to be on, and a range
-    /// from that to the nearest cube, metres.
+    /// Largest distance of a point from its cube, and largest difference of a range from that to
+    /// the nearest cube, metres.
     within_m: f64,
 }
 
-/// Points whose cube is looked for among all of them.
+/// Number of points whose cube is searched among all cubes.
 const JUDGED: usize = 500;
 
 impl ManyObjects {
@@ -73,7 +73,7 @@ impl ManyObjects {
 
     fn place(&self, i: usize) -> DVec3 {
         let side = (self.objects as f64).sqrt().ceil() as usize;
-        // Off the lattice's middle, so that no beam meets an edge by rule.
+        // Off the middle of the lattice, so that beams do not systematically meet edges.
         let along = |k: usize| (k as f64 - (side - 1) as f64 / 2.0) * self.apart_m + 0.123;
         DVec3::new(along(i % side), along(i / side), 0.0)
     }

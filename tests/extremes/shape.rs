@@ -1,42 +1,42 @@
-//! Meshes that a case names.
+//! The meshes of cases.
 
 use glam::{DQuat, DVec3, dvec3};
 use serde::Deserialize;
 use sim_gpu::internals::mesh::TriangleMesh;
 use tests::meshes;
 
-/// A mesh by its rule.
+/// A mesh, defined by a rule.
 #[derive(Clone, Deserialize)]
 #[serde(tag = "shape", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Shape {
-    /// No triangle.
+    /// A mesh without triangles.
     Empty {},
-    /// From -1 to 1.
+    /// A cube from -1 to 1.
     Cube {},
     /// Two triangles from -1 to 1 in the plane z = 0.
     Square {},
-    /// The cube, each face of n x n squares.
+    /// The cube with n x n squares on each face.
     TiledCube { n: u32 },
-    /// A wavy torus of 2 n^2 triangles.
+    /// A wavy torus with 2 n^2 triangles.
     Torus { n: u32 },
-    /// A unit sphere of 20 * 4^level triangles.
+    /// A unit sphere with 20 * 4^level triangles.
     Icosphere { level: u32 },
-    /// n triangles anywhere in the cube.
+    /// n random triangles in the cube.
     Soup { n: u32, size: f64 },
-    /// As they are listed.
+    /// Listed triangles.
     Triangles { vertices: Vec<DVec3>, triangles: Vec<[u32; 3]> },
-    /// So many slivers from one apex at -x to tips at x = 1, so far apart.
+    /// Slivers from one apex at -x to tips at x = 1, with a number and a spacing.
     Fan { slivers: u32, apart: f64 },
-    /// Squares that overlap in a plane, none alike.
+    /// Different squares that overlap in a plane.
     Layers {},
-    /// Several at once.
+    /// Several meshes together.
     Together { parts: Vec<Shape> },
-    /// A cube of this half side about the origin.
+    /// A cube with this half side around the origin.
     SmallCube { half: f64 },
 }
 
 impl Shape {
-    /// The mesh.
+    /// Makes the mesh.
     pub fn mesh(&self) -> TriangleMesh {
         match self {
             Self::Empty {} => TriangleMesh::default(),

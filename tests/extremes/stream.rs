@@ -1,11 +1,11 @@
-//! A cloud that comes as a stream of bytes, in KITTI's layout.
+//! A cloud as a stream of bytes in KITTI's layout.
 
 use std::io::{self, Cursor, Read};
 use std::path::Path;
 
 use formats::cloud_file::{CloudFormat, read_cloud_from};
 
-/// The n points of a stream.
+/// Reads the n points of a stream.
 pub fn read(n: usize) -> Vec<[f64; 3]> {
     // Before the first record is an empty rest.
     let mut rest = Cursor::new([0; RECORD]);
@@ -14,10 +14,10 @@ pub fn read(n: usize) -> Vec<[f64; 3]> {
         .unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Bytes of x, y, z and intensity.
+/// Number of bytes of x, y, z and intensity.
 const RECORD: usize = 16;
 
-/// Records that are made as they are read.
+/// Records that are generated while they are read.
 struct Made {
     n: usize,
     next: usize,
@@ -27,7 +27,7 @@ struct Made {
 impl Read for Made {
     fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
         if self.rest.position() == RECORD as u64 && self.next < self.n {
-            // Weyl sequences of three irrational steps: spread evenly, and distinct.
+            // Weyl sequences with three irrational steps are uniform and distinct.
             let at = |step: f64| ((self.next as f64 * step).fract() as f32).to_le_bytes();
             let fields = [at(0.819_172_5), at(0.671_043_6), at(0.549_700_4), [0; 4]];
             self.rest = Cursor::new(bytemuck::cast(fields));

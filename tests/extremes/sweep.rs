@@ -1,33 +1,32 @@
-//! Cases of what a sweep is cut into.
+//! Cases of segmentation.
 
 use edgepuck_segment::{Label, Segmenter, Settings, Sweep as Input};
 use serde::Deserialize;
 
-/// A sweep, by parts that are listed or made by a rule, and how many of its points are
-/// what.
+/// A sweep, listed or made by rules, and the expected numbers of points of each kind.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sweep {
-    /// Points as they are, on the lowest ring.
+    /// Listed points, on the lowest ring.
     #[serde(default)]
     points: Vec<[f32; 3]>,
-    /// A sensor of 32 rings, -25 to 6 degrees, over even ground that is this high, metres.
+    /// The height of flat ground below a sensor with 32 rings from -25 to 6 degrees, metres.
     ground_z: Option<f64>,
-    /// The same sensor within an upright pipe of this radius, metres.
+    /// The radius of an upright pipe around the same sensor, metres.
     pipe_m: Option<f64>,
-    /// How often each ring is fired in a turn.
+    /// Number of firings of each ring in a revolution.
     #[serde(default = "columns")]
     columns: usize,
-    /// Whether the points come with their rings.
+    /// Whether the points have rings.
     #[serde(default = "yes")]
     rings: bool,
-    /// Points that are ground.
+    /// Expected number of ground points.
     ground: usize,
-    /// Points of each cluster.
+    /// Expected number of points of each cluster.
     clusters: Vec<usize>,
-    /// Points that are in no cluster, because there are too few of them or too many.
+    /// Expected number of points in no cluster, because it would be too small or too large.
     small: usize,
-    /// Points that are nothing.
+    /// Expected number of invalid points.
     invalid: usize,
 }
 
@@ -42,7 +41,7 @@ fn yes() -> bool {
 const RINGS: u16 = 32;
 
 impl Sweep {
-    /// Cuts the sweep, twice: what is left in memory changes nothing.
+    /// Segments the sweep twice, to show that the state in memory changes nothing.
     pub fn check(&self) {
         let (mut points, mut rings) = (self.points.clone(), vec![0; self.points.len()]);
         let mut add = |ring, point: [f64; 3]| {

@@ -1,5 +1,5 @@
-//! Adam with an L2 term in the gradient, as in PyTorch's `Adam(weight_decay)` (Kingma and
-//! Ba 2015, algorithm 1).
+//! Adam with an L2 term in the gradient, as in PyTorch's `Adam(weight_decay)` (Kingma and Ba 2015,
+//! algorithm 1).
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};

@@ -1,7 +1,7 @@
 //! Augmentation: chooses, drops and moves the points of a cloud.
 //!
-//! Random numbers are keyed by the run's seed, the epoch and the cloud, so that an
-//! augmented cloud does not depend on the thread or the batch.
+//! Random numbers are keyed by the run's seed, the epoch and the cloud, so that an augmented cloud
+//! does not depend on the thread or the batch.
 
 use std::borrow::Cow;
 
@@ -18,8 +18,8 @@ use crate::recipe::{Augment, Axis, Recipe, Sampling};
 pub struct TrainingCloud {
     /// Its points.
     pub points: Vec<[f32; 3]>,
-    /// All points from which `points` were chosen, moved in the same way. Empty if the
-    /// network has no EdgeConv layer.
+    /// All points from which `points` were chosen, moved in the same way. Empty if the network has
+    /// no EdgeConv layer.
     pub neighborhood: Vec<[f32; 3]>,
     /// The weight of the first point: 1, plus 1 for each dropped point.
     pub first_weight: f32,
@@ -73,8 +73,8 @@ pub fn augment(
     TrainingCloud { points, neighborhood, first_weight, target }
 }
 
-/// The validation clouds `held`, followed by a copy of each, varied and turned as in
-/// training, so that the choice of a checkpoint also depends on disturbed clouds.
+/// The validation clouds `held`, followed by a copy of each, varied and turned as in training, so
+/// that the choice of a checkpoint also depends on disturbed clouds.
 #[must_use]
 pub fn varied_too(held: &Clouds, recipe: &Recipe) -> Clouds {
     let mut both = held.clone();
@@ -102,8 +102,7 @@ fn one_hot(label: usize, n_classes: usize) -> Vec<f32> {
     (0..n_classes).map(|class| f32::from(u8::from(class == label))).collect()
 }
 
-/// Chooses the points of cloud `i` for the network, after varying and centring a cluster in
-/// metres.
+/// Chooses the points of cloud `i` for the network, after varying and centring a cluster in metres.
 fn choose(clouds: &Clouds, i: usize, recipe: &Recipe, draws: &mut Draws) -> ChosenPoints {
     let cloud = clouds.set.cloud(i);
     let cloud: Cow<'_, [[f32; 3]]> = if recipe.normalization.is_metric() {
@@ -150,8 +149,8 @@ fn mix(points: &mut [[f32; 3]], other: &[[f32; 3]], draws: &mut Draws) -> f32 {
     n as f32 / all as f32
 }
 
-/// Drops points at random. The chance is the same for all points of a cloud, and uniform
-/// from 0 to `most`. The first point stays, because the baseline moves dropped points onto it.
+/// Drops points at random. The chance is the same for all points of a cloud, and uniform from 0 to
+/// `most`. The first point stays, because the baseline moves dropped points onto it.
 fn drop_points<T>(points: &mut Vec<T>, most: f64, draws: &mut Draws) {
     let chance = most * draws.unit();
     let mut is_first = true;

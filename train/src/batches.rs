@@ -26,8 +26,7 @@ fn size(n: usize, recipe: &Recipe) -> usize {
     recipe.clouds_per_epoch.unwrap_or(n)
 }
 
-/// Starts preparing the batches of `epoch`, in an order that depends on the seed and the
-/// epoch.
+/// Starts preparing the batches of `epoch`, in an order that depends on the seed and the epoch.
 pub fn start<'s>(
     scope: &'s Scope<'s, '_>,
     clouds: &'s Clouds,
@@ -50,8 +49,8 @@ pub fn start<'s>(
 }
 
 /// The clouds of an epoch in random order, each with the number of its earlier draws. With
-/// `balance`, the share of a class of n clouds is in proportion to n^(1 - balance), give or
-/// take one cloud.
+/// `balance`, the share of a class of n clouds is in proportion to n^(1 - balance), give or take
+/// one cloud.
 fn order(labels: &[usize], n_classes: usize, epoch: u32, recipe: &Recipe) -> Vec<(usize, u32)> {
     let all = 0..labels.len();
     let groups: Vec<Vec<usize>> = if recipe.balance > 0.0 {

@@ -1,20 +1,19 @@
-//! The calibration of a network on validation clouds: the temperature of its confidences, and
-//! the energy above which it answers `unknown`.
+//! The calibration of a network on validation clouds: the temperature of its confidences, and the
+//! energy above which it answers `unknown`.
 
 use infer_cpu::energy;
 
 /// The range of temperatures that is searched.
 const TEMPERATURES: [f64; 2] = [0.05, 20.0];
-/// Steps of the search. Each leaves 0.618 of the range, so that 40 steps leave 3e-8 of the
-/// range of the logarithm, which is 6.
+/// Steps of the search. Each leaves 0.618 of the range, so that 40 steps leave 3e-8 of the range of
+/// the logarithm, which is 6.
 const STEPS: usize = 40;
 
-/// The temperature at which the mean negative log-likelihood of `labels` under
-/// softmax(`logits` / temperature) is smallest (Guo et al. 2017, "On calibration of
-/// modern neural networks").
+/// The temperature at which the mean negative log-likelihood of `labels` under softmax(`logits` /
+/// temperature) is smallest (Guo et al. 2017, "On calibration of modern neural networks").
 ///
-/// This mean is convex in the inverse of the temperature, so that a golden-section search
-/// over the logarithm finds its only minimum. Without clouds the temperature is 1.
+/// This mean is convex in the inverse of the temperature, so that a golden-section search over the
+/// logarithm finds its only minimum. Without clouds the temperature is 1.
 #[must_use]
 pub fn temperature(logits: &[Vec<f32>], labels: &[usize]) -> f64 {
     if logits.is_empty() {
@@ -37,8 +36,7 @@ pub fn temperature(logits: &[Vec<f32>], labels: &[usize]) -> f64 {
     low.midpoint(high).exp()
 }
 
-/// The smallest of `energies` that `share` of them do not exceed. `None` if there are no
-/// energies.
+/// The smallest of `energies` that `share` of them do not exceed. `None` if there are no energies.
 #[must_use]
 pub fn quantile(mut energies: Vec<f64>, share: f64) -> Option<f64> {
     energies.sort_by(f64::total_cmp);
@@ -50,8 +48,8 @@ pub fn quantile(mut energies: Vec<f64>, share: f64) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// Of clouds with logits (a, 0), a share p is of class 0: softmax is right at
-    /// a / T = ln(p / (1 - p)).
+    /// Of clouds with logits (a, 0), a share p is of class 0: softmax is right at a / T = ln(p / (1
+    /// - p)).
     #[test]
     fn the_temperature_makes_confidence_the_share_of_right_answers() {
         let logits = vec![vec![6.0, 0.0]; 100];

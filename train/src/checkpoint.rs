@@ -1,5 +1,5 @@
-//! Checkpoints: the exact parameters, running statistics and moments of Adam, in one
-//! safetensors file.
+//! Checkpoints: the exact parameters, running statistics and moments of Adam, in one safetensors
+//! file.
 
 use std::path::Path;
 

@@ -15,8 +15,7 @@ use crate::error::Error;
 /// Clouds with their classes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Clouds {
-    /// The clouds: in the unit sphere, or in metres from the sensor for networks that take
-    /// metres.
+    /// The clouds: in the unit sphere, or in metres from the sensor for networks that take metres.
     pub set: LabelledSet,
     /// Class names in the order of the labels.
     pub classes: Vec<String>,
@@ -53,17 +52,16 @@ impl Clouds {
         formats::hash::of_parts::<Vec<u8>>(parts)
     }
 
-    /// Reads the `split` of the data at `path` and normalises its clouds to the unit sphere.
-    /// `path` is one of:
+    /// Reads the `split` of the data at `path` and normalises its clouds to the unit sphere. `path`
+    /// is one of:
     ///
     /// - a packed NPZ file;
-    /// - the common prefix of two packed files, as gen-dataset writes them:
-    ///   `rotational-noisy` for `rotational-noisy-train.npz` and `rotational-noisy-test.npz`;
+    /// - the common prefix of two packed files, as gen-dataset writes them: `rotational-noisy` for
+    /// -   `rotational-noisy-train.npz` and `rotational-noisy-test.npz`;
     /// - a folder with `train.npz` and `test.npz`;
-    /// - a folder of ModelNet40's HDF5 files (`modelnet40_ply_hdf5_2048`), with feature
-    ///   `hdf5`;
-    /// - a folder of text files as in yanx27/Pointnet_Pointnet2_pytorch. The first
-    ///   `most_points` points of each file are read.
+    /// - a folder of ModelNet40's HDF5 files (`modelnet40_ply_hdf5_2048`), with feature `hdf5`;
+    /// - a folder of text files as in yanx27/Pointnet_Pointnet2_pytorch. The first `most_points`
+    /// -   points of each file are read.
     ///
     /// # Errors
     /// Data that cannot be read; a set without clouds; a coordinate that is not finite.
@@ -71,9 +69,8 @@ impl Clouds {
         Self::read_for(Normalization::UnitSphere, path, split, most_points)
     }
 
-    /// Reads as [`Clouds::read`] does, for a network of this `normalization`. Clouds for a
-    /// network that takes metres stay unchanged, because training and infer-cpu move each of
-    /// them.
+    /// Reads as [`Clouds::read`] does, for a network of this `normalization`. Clouds for a network
+    /// that takes metres stay unchanged, because training and infer-cpu move each of them.
     ///
     /// # Errors
     /// As [`Clouds::read`].
@@ -194,9 +191,8 @@ impl Clouds {
         self.select(&(0..self.len()).filter(is_wanted).collect::<Vec<_>>())
     }
 
-    /// Splits the set into training clouds and a `share` of validation clouds, and returns
-    /// the indices of both. All views of a mesh are on the same side, and each class gives
-    /// the share.
+    /// Splits the set into training clouds and a `share` of validation clouds, and returns the
+    /// indices of both. All views of a mesh are on the same side, and each class gives the share.
     #[must_use]
     pub fn split_validation(&self, share: f64, seed: u64) -> (Vec<usize>, Vec<usize>) {
         let stream = StreamKey::new(seed, "validation", 0);

@@ -1,10 +1,10 @@
 //! Varies clusters in metres as another scan of the same object would, and centres them as
 //! infer-cpu does.
 //!
-//! The sensor is at the origin, so that its error is along the line from the origin to each
-//! point. All variations precede the centring, because in use the mean and the lowest point
-//! of a cluster include the sensor's errors. Only a rotation about the up axis may follow,
-//! since it commutes with the centring.
+//! The sensor is at the origin, so that its error is along the line from the origin to each point.
+//! All variations precede the centring, because in use the mean and the lowest point of a cluster
+//! include the sensor's errors. Only a rotation about the up axis may follow, since it commutes
+//! with the centring.
 
 use infer_cpu::sampler::OutlierFilter;
 
@@ -12,8 +12,8 @@ use crate::cluster_variation::ClusterVariation;
 use crate::draws::Draws;
 use crate::recipe::{Augment, Recipe};
 
-/// A cut must leave this share of a cluster; otherwise it would remove the object and not
-/// only its foot.
+/// A cut must leave this share of a cluster; otherwise it would remove the object and not only its
+/// foot.
 const LEAST_LEFT: f64 = 0.5;
 
 /// Varies and centres `cluster`.
@@ -35,8 +35,8 @@ pub(crate) fn varied(
     centred
 }
 
-/// Varies `cloud`, a whole object in the unit sphere: thins it and adds strays. Then drops
-/// outliers and normalises to the unit sphere, as infer-cpu does.
+/// Varies `cloud`, a whole object in the unit sphere: thins it and adds strays. Then drops outliers
+/// and normalises to the unit sphere, as infer-cpu does.
 pub(crate) fn varied_object(
     cloud: &[[f32; 3]],
     recipe: &Recipe,
@@ -55,8 +55,8 @@ pub(crate) fn varied_object(
     normalized
 }
 
-/// `cluster` without the points that are less than `height` above its lowest point, because
-/// a segmentation removes the ground up to some height.
+/// `cluster` without the points that are less than `height` above its lowest point, because a
+/// segmentation removes the ground up to some height.
 fn cut(cluster: &[[f32; 3]], height: f64) -> Vec<[f32; 3]> {
     let lowest = cluster.iter().fold(f32::INFINITY, |lowest, point| lowest.min(point[2]));
     let stays = |point: &&[f32; 3]| f64::from(point[2]) >= f64::from(lowest) + height;
@@ -106,8 +106,8 @@ const GROUND_POINTS: f64 = 0.3;
 /// Largest distance of the ground below a cluster's lowest point, metres.
 const GROUND_BELOW: f64 = 0.1;
 
-/// Adds strips of ground to a share of clusters. They are level and across the line of
-/// sight, like a sensor's rings.
+/// Adds strips of ground to a share of clusters. They are level and across the line of sight, like
+/// a sensor's rings.
 fn add_ground(
     points: &mut Vec<[f64; 3]>,
     ground_z: Option<f64>,
@@ -149,8 +149,8 @@ fn add_ground(
 }
 
 /// Adds points of other things to a share of clusters. They are uniform in the cluster's box,
-/// enlarged by `stray_reach` to the sides and upwards, and by `reach_below` downwards, which
-/// is 0 if a segmentation has removed the ground.
+/// enlarged by `stray_reach` to the sides and upwards, and by `reach_below` downwards, which is 0
+/// if a segmentation has removed the ground.
 fn add_strays(
     points: &mut Vec<[f64; 3]>,
     variation: &ClusterVariation,

@@ -10,8 +10,8 @@ use crate::limits::{Check, non_negative, share};
 #[serde(deny_unknown_fields, default)]
 pub struct ClusterVariation {
     /// Smallest and largest number of points that a cluster keeps. The number is drawn
-    /// log-uniformly, and the other points are dropped before the centring. If absent, all
-    /// points stay.
+    /// log-uniformly, and the other points are dropped before the centring. If absent, all points
+    /// stay.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub density: Option<[usize; 2]>,
     /// Largest height, metres, of the part that is cut off a cluster's foot.

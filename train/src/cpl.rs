@@ -10,17 +10,17 @@ pub struct Cpl {
     pub front: Vec<usize>,
     /// The number of selected points.
     pub keep: usize,
-    /// How a selection of another size is brought to this size: `truncate`, `cyclic`,
-    /// `nearest` or `weighted`.
+    /// How a selection of another size is brought to this size: `truncate`, `cyclic`, `nearest` or
+    /// `weighted`.
     pub resize: String,
     /// The weight of the encoder's own loss.
     pub weight: f64,
-    /// Whether the network's input T-Net is the encoder. Its pooling over all points then
-    /// selects the points for the other layers and predicts their transform; `front` and
-    /// `weight` are unused.
+    /// Whether the network's input T-Net is the encoder. Its pooling over all points then selects
+    /// the points for the other layers and predicts their transform; `front` and `weight` are
+    /// unused.
     pub shared: bool,
-    /// Whether points are drawn with probabilities in proportion to their scores, and the
-    /// network's loss trains the encoder by a straight-through estimator.
+    /// Whether points are drawn with probabilities in proportion to their scores, and the network's
+    /// loss trains the encoder by a straight-through estimator.
     pub gumbel: bool,
 }
 

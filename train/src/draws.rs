@@ -34,8 +34,8 @@ impl Draws {
         (-2.0 * radius.ln()).sqrt() * (std::f64::consts::TAU * angle).cos()
     }
 
-    /// Swaps points of `cloud` so that the first `n` are a random choice in random order
-    /// (Fisher and Yates).
+    /// Swaps points of `cloud` so that the first `n` are a random choice in random order (Fisher
+    /// and Yates).
     pub fn shuffled(&mut self, cloud: &[[f32; 3]], n: usize) -> Vec<[f32; 3]> {
         let mut points = cloud.to_vec();
         for i in 0..n {

@@ -31,8 +31,7 @@ pub fn confusion(path: &Path, clouds: &Clouds, options: &Options) -> Result<Eval
     Ok(whole)
 }
 
-/// The predictions of the model at `path` for `clouds`, whose classes may differ from the
-/// model's.
+/// The predictions of the model at `path` for `clouds`, whose classes may differ from the model's.
 ///
 /// # Errors
 /// A model or a cloud that infer-cpu refuses.

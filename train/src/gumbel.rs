@@ -1,17 +1,17 @@
-//! A relaxed selection of critical points, with which the network's own loss trains
-//! the point encoder: Gumbel-top-k with a straight-through estimator (Kool et al.
-//! 2019; Bengio et al. 2013). The paper names it as future work.
+//! A relaxed selection of critical points, with which the network's own loss trains the point
+//! encoder: Gumbel-top-k with a straight-through estimator (Kool et al. 2019; Bengio et al. 2013).
+//! The paper names it as future work.
 //!
-//! The forward pass takes the k points with the largest ln(score) + Gumbel noise: k draws
-//! without replacement, with probabilities in proportion to the scores. The backward pass
-//! treats the coordinates of each point as multiplied by a weight w, which is 1 in the
-//! forward pass, and k p in the backward pass, where p = score / Σ scores is the probability
-//! of the first draw. Therefore dL/dw is the dot product of the point and its gradient.
+//! The forward pass takes the k points with the largest ln(score) + Gumbel noise: k draws without
+//! replacement, with probabilities in proportion to the scores. The backward pass treats the
+//! coordinates of each point as multiplied by a weight w, which is 1 in the forward pass, and k p
+//! in the backward pass, where p = score / Σ scores is the probability of the first draw. Therefore
+//! dL/dw is the dot product of the point and its gradient.
 
 use formats::rng::StreamKey;
 
-/// The `keep` rows with the largest perturbed scores, in descending order. The noise of a row
-/// is keyed by `stream` and the row's place in the ranking.
+/// The `keep` rows with the largest perturbed scores, in descending order. The noise of a row is
+/// keyed by `stream` and the row's place in the ranking.
 #[must_use]
 pub fn top(rows: &[u32], scores: &[f64], keep: usize, stream: StreamKey) -> Vec<u32> {
     let perturbed = |(place, (&row, &score)): (usize, (&u32, &f64))| {
@@ -25,8 +25,8 @@ pub fn top(rows: &[u32], scores: &[f64], keep: usize, stream: StreamKey) -> Vec<
     all.into_iter().map(|(_, row)| row).collect()
 }
 
-/// The gradients of `scores`. `weight_gradients` holds dL/dw of each point; it is 0 for points
-/// that were not taken.
+/// The gradients of `scores`. `weight_gradients` holds dL/dw of each point; it is 0 for points that
+/// were not taken.
 #[must_use]
 pub fn score_gradients(scores: &[f64], weight_gradients: &[f64], keep: usize) -> Vec<f64> {
     let total: f64 = scores.iter().sum();

@@ -1,15 +1,14 @@
 //! Starts training from a model's weights instead of random numbers.
 //!
-//! All layers but the last take the model's weights. The last layer takes them, too, if the
-//! model's classes are the first classes of the network; the weights of the other classes
-//! stay random.
+//! All layers but the last take the model's weights. The last layer takes them, too, if the model's
+//! classes are the first classes of the network; the weights of the other classes stay random.
 //!
-//! A shipped model has no batch norms, since they are folded into its linear layers. A new
-//! batch norm with scale 1 and shift 0 would undo the folding, because training normalises
-//! each batch. Therefore the mean and the standard deviation of a layer's outputs on the
-//! training clouds become the running statistics of its batch norm, and also its shift and
-//! scale. The network then gives the model's outputs: exactly with the running statistics,
-//! and approximately with the statistics of a batch.
+//! A shipped model has no batch norms, since they are folded into its linear layers. A new batch
+//! norm with scale 1 and shift 0 would undo the folding, because training normalises each batch.
+//! Therefore the mean and the standard deviation of a layer's outputs on the training clouds become
+//! the running statistics of its batch norm, and also its shift and scale. The network then gives
+//! the model's outputs: exactly with the running statistics, and approximately with the statistics
+//! of a batch.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -86,8 +85,8 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    /// Reads all layers of `model`. Of the last layer, only the first `n_known` classes are
-    /// read. Returns whether the file lacks batch norms, because they are folded.
+    /// Reads all layers of `model`. Of the last layer, only the first `n_known` classes are read.
+    /// Returns whether the file lacks batch norms, because they are folded.
     fn network(&mut self, model: &mut Model, n_known: Option<usize>) -> Result<bool, FormatError> {
         let layers: Vec<LayerMut<'_>> = model.layers();
         let (n, mut is_folded) = (layers.len(), false);
@@ -163,8 +162,8 @@ impl Reader<'_> {
     }
 }
 
-/// Sets all batch norms so that they change nothing on average. The layers come in order,
-/// because the inputs of a layer depend on the batch norms before it.
+/// Sets all batch norms so that they change nothing on average. The layers come in order, because
+/// the inputs of a layer depend on the batch norms before it.
 fn unfold(model: &mut Model, recipe: &Recipe, clouds: &Clouds) {
     let drawn = Recipe { batch: CLOUDS, clouds_per_epoch: Some(CLOUDS), ..recipe.clone() };
     let batch = std::thread::scope(|scope| batches::start(scope, clouds, &drawn, 0).recv());

@@ -1,8 +1,8 @@
 //! Trains PointNet and its Critical Points Layer on any CPU.
 //!
 //! [`run::Job`] trains a network on clouds by a [`recipe::Recipe`], and writes a model file that
-//! infer-cpu reads. A training step is a forward and backward pass of [`network::PointNet`],
-//! whose layers compute their own gradients ([`layer`]), and an update by [`adam::Adam`].
+//! infer-cpu reads. A training step is a forward and backward pass of [`network::PointNet`], whose
+//! layers compute their own gradients ([`layer`]), and an update by [`adam::Adam`].
 
 #![deny(unsafe_code)]
 

@@ -1,8 +1,8 @@
-//! LIME-3D: which parts of a cloud determined a prediction (Tan and Kotthaus, arXiv
-//! 2107.13459; their code, commit of 2021-08-17).
+//! LIME-3D: which parts of a cloud determined a prediction (Tan and Kotthaus, arXiv 2107.13459;
+//! their code, commit of 2021-08-17).
 //!
-//! The method removes parts of the cloud at random. A linear model, whose inputs say which
-//! parts remain, then estimates how much each part adds to the log-probability of the class.
+//! The method removes parts of the cloud at random. A linear model, whose inputs say which parts
+//! remain, then estimates how much each part adds to the log-probability of the class.
 
 use formats::rng::StreamKey;
 use infer_cpu::Classifier;
@@ -87,8 +87,8 @@ pub fn explain(
     Ok(Explanation { class, cluster, attribution, r_squared })
 }
 
-/// k-means whose centres are points of the cloud. The first centres are the farthest points;
-/// in each round a centre moves to the point nearest to its cluster's mean.
+/// k-means whose centres are points of the cloud. The first centres are the farthest points; in
+/// each round a centre moves to the point nearest to its cluster's mean.
 fn clusters(points: &[[f32; 3]], k: usize) -> Vec<usize> {
     let kernels = kernel::available().next().expect("invariant: scalar kernels run everywhere");
     let mut centres = Vec::new();
@@ -124,8 +124,7 @@ fn squared(a: &[f32; 3], b: &[f32; 3]) -> f32 {
 }
 
 /// The parts that remain in each sample. All parts remain in the first sample, and each part
-/// remains in another sample with a probability of one half. A sample without parts is drawn
-/// again.
+/// remains in another sample with a probability of one half. A sample without parts is drawn again.
 fn masks(k: usize, lime: &Lime) -> Vec<Vec<bool>> {
     let stream = StreamKey::new(lime.seed, "lime", 0);
     let mut n = 0;
@@ -151,8 +150,8 @@ fn weight(mask: &[bool], sigma: f64) -> f64 {
     (-(distance / sigma).powi(2)).exp().sqrt()
 }
 
-/// Weighted ridge regression with an intercept that is not penalised. Returns the coefficients
-/// and R².
+/// Weighted ridge regression with an intercept that is not penalised. Returns the coefficients and
+/// R².
 fn ridge(masks: &[Vec<bool>], answers: &[f64], weights: &[f64]) -> (Vec<f64>, f64) {
     let k = masks[0].len();
     let total: f64 = weights.iter().sum();

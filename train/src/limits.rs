@@ -1,7 +1,7 @@
 //! Limits of the numbers in a recipe.
 
-/// Whether a value is within its limits, its key in the recipe, and the values that are
-/// expected there.
+/// Whether a value is within its limits, its key in the recipe, and the values that are expected
+/// there.
 pub(crate) type Check = (bool, &'static str, &'static str);
 
 /// A finite number of 0 or more.

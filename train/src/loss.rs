@@ -15,8 +15,8 @@ pub struct Loss {
     pub correct: usize,
 }
 
-/// The mean cross entropy of `logits` `[clouds, classes]` and `targets`, whose rows sum to 1,
-/// with its gradient, which reuses the memory of the logits.
+/// The mean cross entropy of `logits` `[clouds, classes]` and `targets`, whose rows sum to 1, with
+/// its gradient, which reuses the memory of the logits.
 #[must_use]
 pub fn cross_entropy(mut logits: Matrix, targets: &Matrix) -> (Loss, Matrix) {
     let n = logits.nrows() as f64;

@@ -1,5 +1,5 @@
-//! The program `edgepuck-train`. The commands `train`, `eval`, `explain` and `compare-points`
-//! of `edgepuck` and `cargo xtask` start it.
+//! The program `edgepuck-train`. The commands `train`, `eval`, `explain` and `compare-points` of
+//! `edgepuck` and `cargo xtask` start it.
 
 mod cli;
 

@@ -1,5 +1,5 @@
-//! Products of matrices on several threads. The order of each sum does not depend on the
-//! number of threads.
+//! Products of matrices on several threads. The order of each sum does not depend on the number of
+//! threads.
 
 use ndarray::linalg::general_mat_mul;
 use ndarray::parallel::prelude::*;
@@ -26,8 +26,8 @@ pub fn product(x: ArrayView2<'_, f32>, right: ArrayView2<'_, f32>) -> Matrix {
     out
 }
 
-/// The transpose of `dz` `[n, outputs]` times `x` `[n, inputs]`: the gradient of
-/// the weights, written to `out` `[outputs, inputs]` in C order.
+/// The transpose of `dz` `[n, outputs]` times `x` `[n, inputs]`: the gradient of the weights,
+/// written to `out` `[outputs, inputs]` in C order.
 pub fn gradient(dz: ArrayView2<'_, f32>, x: ArrayView2<'_, f32>, out: &mut [f32]) {
     let inputs = x.ncols();
     out.par_chunks_mut(COLUMNS * inputs).enumerate().for_each(|(chunk, out)| {

@@ -62,8 +62,8 @@ impl Metrics {
         serde_json::from_str(notes)
     }
 
-    /// Whether this epoch is better on the validation set than all earlier epochs. Compares
-    /// the share of correct clouds or, if `by_class`, its mean over classes.
+    /// Whether this epoch is better on the validation set than all earlier epochs. Compares the
+    /// share of correct clouds or, if `by_class`, its mean over classes.
     #[must_use]
     pub fn is_best(&self, epoch: u32, by_class: bool) -> bool {
         let share =

@@ -16,8 +16,8 @@ impl Stack {
         if i == 0 { x } else { self.0[i - 1].base.output() }
     }
 
-    /// Applies all layers to `x` and returns the output of the last. `kept` is the dropout
-    /// mask of the last layer.
+    /// Applies all layers to `x` and returns the output of the last. `kept` is the dropout mask of
+    /// the last layer.
     fn forward<'a>(
         &'a mut self,
         x: ArrayView2<'a, f32>,
@@ -115,8 +115,8 @@ pub struct DenseHead {
 }
 
 impl DenseHead {
-    /// Layers of these `widths`, from the inputs to the outputs. The numbers of the batch
-    /// norms follow those of `n_points` point-wise layers.
+    /// Layers of these `widths`, from the inputs to the outputs. The numbers of the batch norms
+    /// follow those of `n_points` point-wise layers.
     pub fn new(prefix: &str, widths: &[usize], n_points: usize, seed: u64) -> Self {
         let n = widths.len() - 1;
         let hidden = widths.windows(2).take(n - 1).zip(1..).map(|(pair, i)| {

@@ -17,8 +17,8 @@ pub struct Model {
 }
 
 impl Model {
-    /// Runs the forward and backward pass of a batch, which sets the gradients of the
-    /// parameters. `kept` is the dropout mask.
+    /// Runs the forward and backward pass of a batch, which sets the gradients of the parameters.
+    /// `kept` is the dropout mask.
     pub fn learn(&mut self, batch: &Batch, kept: Option<Matrix>, rates: Rates) -> Loss {
         let Some(encoder) = &mut self.encoder else {
             return self.network.learn(batch, kept, rates);

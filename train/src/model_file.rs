@@ -69,8 +69,8 @@ pub fn read_into(
     Ok(())
 }
 
-/// Writes `network` to `path` for release, in f16 and with the batch norms folded into the
-/// linear layers, atomically.
+/// Writes `network` to `path` for release, in f16 and with the batch norms folded into the linear
+/// layers, atomically.
 ///
 /// # Errors
 /// A weight that f16 cannot hold; a file that cannot be written.

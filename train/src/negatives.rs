@@ -1,6 +1,6 @@
-//! Training clouds for the class `unknown` that show no object (outlier exposure: Hendrycks
-//! et al. 2019). No score of a network that was trained only on objects separates them from
-//! objects: such a network takes flat ground for a keyboard with high confidence.
+//! Training clouds for the class `unknown` that show no object (outlier exposure: Hendrycks et al.
+//! 2019). No score of a network that was trained only on objects separates them from objects: such
+//! a network takes flat ground for a keyboard with high confidence.
 
 use formats::labelled::LabelledSet;
 use formats::rng::StreamKey;
@@ -28,8 +28,8 @@ formats::named! {
     }
 }
 
-/// `clouds`, followed by the number of negatives that `recipe` wants. The negatives depend only
-/// on the clouds, the seed, `purpose` and `index`.
+/// `clouds`, followed by the number of negatives that `recipe` wants. The negatives depend only on
+/// the clouds, the seed, `purpose` and `index`.
 #[must_use]
 pub fn added(clouds: Clouds, recipe: &Recipe, purpose: &str, index: u32) -> Clouds {
     let n = (recipe.negatives * clouds.len() as f64) as usize;
@@ -64,8 +64,8 @@ pub fn negative(kind: Negative, clouds: &Clouds, stream: StreamKey) -> Vec<[f32;
     normalized
 }
 
-/// A rough, perhaps sloping rectangle or ellipse at a random azimuth. The points of every
-/// second patch lie in lines, like a scan of the ground.
+/// A rough, perhaps sloping rectangle or ellipse at a random azimuth. The points of every second
+/// patch lie in lines, like a scan of the ground.
 fn patch(draws: &mut Draws) -> Vec<[f64; 3]> {
     let width = draws.between(0.3, 1.0);
     let is_round = draws.unit() < 0.5;

@@ -73,14 +73,14 @@ impl PointNet {
         self.selector = Some(selector);
     }
 
-    /// Runs the forward and backward pass of a batch, which sets the gradients of the
-    /// parameters. `kept` is the dropout mask, `[clouds, last hidden width]`.
+    /// Runs the forward and backward pass of a batch, which sets the gradients of the parameters.
+    /// `kept` is the dropout mask, `[clouds, last hidden width]`.
     pub fn learn(&mut self, batch: &Batch, kept: Option<Matrix>, rates: Rates) -> Loss {
         self.learn_points(batch, kept, rates, false).0
     }
 
-    /// Does the same as [`PointNet::learn`]. If `wants_points`, also returns the gradient of
-    /// the points' coordinates through the trunk and the T-Nets, without the part through the
+    /// Does the same as [`PointNet::learn`]. If `wants_points`, also returns the gradient of the
+    /// points' coordinates through the trunk and the T-Nets, without the part through the
     /// neighborhoods.
     pub fn learn_points(
         &mut self,
@@ -137,8 +137,8 @@ impl PointNet {
         let dpoints = match &mut self.stn {
             Some(stn) => {
                 let (elements, through) = stn.transforms.backward(x, dtransformed.view(), rows);
-                // The T-Net of a selection takes all points, so that its gradient is not that
-                // of the selected points.
+                // The T-Net of a selection takes all points, so that its gradient is not that of
+                // the selected points.
                 let wanted = wants_points && selection.is_none();
                 let predicted = stn.backward(whole.points(), &elements, whole.rows(), wanted);
                 predicted.map(|predicted| through + predicted)
@@ -156,8 +156,8 @@ impl PointNet {
         Some(self.selector?.select(&stn.points.pooled, whole, rates.step))
     }
 
-    /// The coordinates `[rows, 3]` followed by the EdgeConv features of each point. `None` if
-    /// the network has no EdgeConv layer.
+    /// The coordinates `[rows, 3]` followed by the EdgeConv features of each point. `None` if the
+    /// network has no EdgeConv layer.
     fn edge_features(
         &mut self,
         batch: &Batch,
@@ -173,8 +173,7 @@ impl PointNet {
         Some(ndarray::concatenate(Axis(1), &parts).expect("invariant: a row for each point"))
     }
 
-    /// The width of the dropout mask. `None` if there is no hidden layer after the trunk's
-    /// pooling.
+    /// The width of the dropout mask. `None` if there is no hidden layer after the trunk's pooling.
     #[must_use]
     pub fn dropout_width(&self) -> Option<usize> {
         self.head.hidden_width()

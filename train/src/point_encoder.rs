@@ -1,12 +1,12 @@
-//! The point encoder of a Critical Points Layer, which is trained together with the network
-//! after it.
+//! The point encoder of a Critical Points Layer, which is trained together with the network after
+//! it.
 //!
-//! The selection of points has no derivative, so that the gradient of the network's loss does
-//! not reach the encoder, unless the selection is relaxed ([`crate::gumbel`]). Therefore the
-//! encoder has its own classification loss: in training, a linear layer classifies its pooled
-//! features. The gradient of this loss flows through the maximum to the points that won
-//! channels, which are the critical points. A trained encoder can also serve alone, as a
-//! sampler. The code of infer-cpu ranks and resizes the selection.
+//! The selection of points has no derivative, so that the gradient of the network's loss does not
+//! reach the encoder, unless the selection is relaxed ([`crate::gumbel`]). Therefore the encoder
+//! has its own classification loss: in training, a linear layer classifies its pooled features. The
+//! gradient of this loss flows through the maximum to the points that won channels, which are the
+//! critical points. A trained encoder can also serve alone, as a sampler. The code of infer-cpu
+//! ranks and resizes the selection.
 
 use crate::batch::Batch;
 use crate::cpl::Cpl;

@@ -1,5 +1,5 @@
-//! Compares the distance between chosen points and reference points with that of random
-//! choices of the same size.
+//! Compares the distance between chosen points and reference points with that of random choices of
+//! the same size.
 
 use formats::chamfer::{Chamfer, chamfer};
 use formats::rng::StreamKey;

@@ -33,38 +33,37 @@ pub struct Recipe {
     pub points: usize,
     /// The choice of these points from a cloud that has more.
     pub sampling: Sampling,
-    /// The normalisation of clouds: `unit-sphere`, or `metric` or `metric-sight` for clusters
-    /// of any number of points in metres, z up, with the sensor at the origin.
+    /// The normalisation of clouds: `unit-sphere`, or `metric` or `metric-sight` for clusters of
+    /// any number of points in metres, z up, with the sensor at the origin.
     #[serde(with = "by_name", skip_serializing_if = "is_default")]
     pub normalization: Normalization,
-    /// The balance of the classes in an epoch. The share of a class of n clouds is in
-    /// proportion to n^(1 - balance): with 0 as in the data, with 1 equal for all classes.
+    /// The balance of the classes in an epoch. The share of a class of n clouds is in proportion to
+    /// n^(1 - balance): with 0 as in the data, with 1 equal for all classes.
     #[serde(skip_serializing_if = "is_default")]
     pub balance: f64,
-    /// Number of clouds that are drawn for an epoch. If absent, it is the size of the training
-    /// set.
+    /// Number of clouds that are drawn for an epoch. If absent, it is the size of the training set.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub clouds_per_epoch: Option<usize>,
-    /// The classes that the model answers as `unknown`. If there are any, the temperature of
-    /// its confidences is fitted to the validation set.
+    /// The classes that the model answers as `unknown`. If there are any, the temperature of its
+    /// confidences is fitted to the validation set.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub unknown: Vec<String>,
-    /// The model also answers `unknown` if a cloud's energy is above a limit. The limit keeps
-    /// this share of the validation clouds of known classes for which the model finds a known
-    /// class. If absent, there is no limit.
+    /// The model also answers `unknown` if a cloud's energy is above a limit. The limit keeps this
+    /// share of the validation clouds of known classes for which the model finds a known class. If
+    /// absent, there is no limit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub keep_known: Option<f64>,
-    /// Number of clouds without an object that are made for each epoch, as a ratio to the
-    /// number of clouds in the data. They are patches of ground, walls, blobs, pairs and
-    /// slivers of objects. Their class, `unknown`, follows the classes of the data.
+    /// Number of clouds without an object that are made for each epoch, as a ratio to the number of
+    /// clouds in the data. They are patches of ground, walls, blobs, pairs and slivers of objects.
+    /// Their class, `unknown`, follows the classes of the data.
     #[serde(skip_serializing_if = "is_default")]
     pub negatives: f64,
-    /// Whether the model drops outliers before it samples a cloud in the unit sphere. Training
-    /// then drops them, too.
+    /// Whether the model drops outliers before it samples a cloud in the unit sphere. Training then
+    /// drops them, too.
     #[serde(skip_serializing_if = "is_default")]
     pub outlier_filter: bool,
-    /// Share of the training set's instances that are held out to choose the checkpoint. With
-    /// 0, the last checkpoint is chosen.
+    /// Share of the training set's instances that are held out to choose the checkpoint. With 0,
+    /// the last checkpoint is chosen.
     pub validation: f64,
     /// The network's layers.
     pub network: Shape,
@@ -83,8 +82,8 @@ pub struct Recipe {
     pub schedule: Schedule,
     /// The augmentation of clouds.
     pub augment: Augment,
-    /// The variation of clusters in metres before the augmentation. For clouds in the unit
-    /// sphere, only density and strays apply, with the reach in radii.
+    /// The variation of clusters in metres before the augmentation. For clouds in the unit sphere,
+    /// only density and strays apply, with the reach in radii.
     #[serde(skip_serializing_if = "is_default")]
     pub clusters: ClusterVariation,
 }
@@ -157,8 +156,7 @@ pub enum Sampling {
     First,
     /// Points drawn without replacement, anew in each epoch.
     Random,
-    /// Farthest point sampling of a random half or more of the cloud, anew in
-    /// each epoch.
+    /// Farthest point sampling of a random half or more of the cloud, anew in each epoch.
     Fps,
 }
 
@@ -194,8 +192,8 @@ impl Schedule {
     #[must_use]
     pub fn factor(self, progress: f64, epochs: u32) -> f64 {
         match self {
-            // The baseline steps its scheduler before the first epoch, so that the rate falls
-            // one epoch early.
+            // The baseline steps its scheduler before the first epoch, so that the rate falls one
+            // epoch early.
             Self::Step { every, factor } => {
                 factor.powi(((progress.floor() as u32 + 1) / every.max(1)) as i32)
             }
@@ -224,22 +222,22 @@ pub struct Augment {
     pub jitter: f64,
     /// Limit to which jitter is clipped.
     pub jitter_clip: f64,
-    /// Standard deviation of the sensor's error along the ray to each point. The sensor is at
-    /// a distance of 3 radii, an elevation of 20 degrees and a random azimuth; for clusters in
+    /// Standard deviation of the sensor's error along the ray to each point. The sensor is at a
+    /// distance of 3 radii, an elevation of 20 degrees and a random azimuth; for clusters in
     /// metres, it is at the origin.
     pub sensor_noise: f64,
     /// Largest angle of rotation about the up axis, degrees.
     pub rotate_degrees: f64,
-    /// Share of clouds that are rotated. The others keep their direction in the data, with
-    /// which a network of aligned shapes is more accurate.
+    /// Share of clouds that are rotated. The others keep their direction in the data, with which a
+    /// network of aligned shapes is more accurate.
     #[serde(skip_serializing_if = "is_one")]
     pub rotate_share: f64,
     /// The up axis: x, y or z.
     pub up: Axis,
     /// Largest difference from 1 of the uniform factor that stretches each axis.
     pub stretch: f64,
-    /// Share of clouds in which a part is replaced by points of another cloud (PointCutMix-R:
-    /// Zhang et al. 2022).
+    /// Share of clouds in which a part is replaced by points of another cloud (PointCutMix-R: Zhang
+    /// et al. 2022).
     pub cut_mix: f64,
 }
 

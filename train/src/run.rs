@@ -18,12 +18,11 @@ use crate::recipe::{Recipe, Sampling};
 use crate::trainer::{EpochSummary, Trainer};
 use crate::{accuracy_report, batches, checkpoint, init, model_file, negatives};
 
-/// Largest number of points that are read from a text file: the number in the baseline's
-/// files.
+/// Largest number of points that are read from a text file: the number in the baseline's files.
 pub const MOST_POINTS: usize = 10_000;
 
-/// The number of points of a text file that a run needs. The baseline's loader takes the
-/// first points; other samplers and EdgeConv layers need all of them.
+/// The number of points of a text file that a run needs. The baseline's loader takes the first
+/// points; other samplers and EdgeConv layers need all of them.
 #[must_use]
 pub fn points_to_read(recipe: &Recipe) -> usize {
     let is_baseline = recipe.sampling == Sampling::First && recipe.network.edges.is_empty();
@@ -72,13 +71,13 @@ pub enum Progress<'a> {
 }
 
 impl Job<'_> {
-    /// Trains, continuing an interrupted run, and writes the model. At the end, measures
-    /// the model on the clouds at `test` and returns the accuracy as a line of text. Calls
-    /// `report` as the run goes on.
+    /// Trains, continuing an interrupted run, and writes the model. At the end, measures the model
+    /// on the clouds at `test` and returns the accuracy as a line of text. Calls `report` as the
+    /// run goes on.
     ///
     /// # Errors
-    /// Data, a recipe or a checkpoint that cannot be used; a loss that is not finite; a
-    /// file that cannot be read or written.
+    /// Data, a recipe or a checkpoint that cannot be used; a loss that is not finite; a file that
+    /// cannot be read or written.
     pub fn run(
         self,
         test: Option<&Path>,
@@ -104,7 +103,7 @@ impl Job<'_> {
         atomic::sweep_leftovers(&folder)?;
         let mut run = Run::open(folder, &self, &clouds, report)?;
         while run.trainer.epoch < run.trainer.recipe.epochs {
-            run.epoch(&clouds, &held, report)?;
+            run.epoch(&clouds, &held)?;
         }
         run.finish(&self, test, &clouds, &held)
     }
@@ -140,7 +139,7 @@ fn check(clouds: &Clouds, recipe: &Recipe, data: &str) -> Result<(), Error> {
 }
 
 /// A run and its folder.
-struct Run {
+struct Run<'a> {
     folder: PathBuf,
     trainer: Trainer,
     metrics: Metrics,
@@ -148,28 +147,28 @@ struct Run {
     training_set: String,
     /// Digest of the training clouds.
     digest: String,
+    report: &'a mut dyn FnMut(Progress<'_>),
 }
 
-impl Run {
-    /// Opens the run in `folder` at its checkpoint, or starts a new run that learns from
-    /// `clouds`.
+impl<'a> Run<'a> {
+    /// Opens the run in `folder` at its checkpoint, or starts a new run that learns from `clouds`.
     fn open(
         folder: PathBuf,
         job: &Job<'_>,
         clouds: &Clouds,
-        report: &mut dyn FnMut(Progress<'_>),
+        report: &'a mut dyn FnMut(Progress<'_>),
     ) -> Result<Self, Error> {
         let classes = job.recipe.classes(&job.clouds.classes);
         let trainer = Trainer::new(job.recipe.clone(), classes.len())?;
         let training_set = job.data_name.to_owned();
         let metrics = Metrics::default();
         let digest = clouds.digest();
-        let mut run = Self { folder, trainer, metrics, classes, training_set, digest };
+        let mut run = Self { folder, trainer, metrics, classes, training_set, digest, report };
         let path = run.folder.join("checkpoint.safetensors");
         if path.is_file() {
             let notes = checkpoint::read(&path, &mut run.trainer, &run.digest)?;
             let (epoch, epochs) = (run.trainer.epoch, job.recipe.epochs);
-            report(Progress::Resumed { epoch, epochs });
+            (run.report)(Progress::Resumed { epoch, epochs });
             run.metrics = Metrics::from_notes(&notes)
                 .map_err(|cause| FormatError::malformed(&path, "metadata `notes`", cause))?;
         } else if let Some(model) = &job.recipe.init {
@@ -182,14 +181,9 @@ impl Run {
         Ok(run)
     }
 
-    fn epoch(
-        &mut self,
-        clouds: &Clouds,
-        held: &Clouds,
-        report: &mut dyn FnMut(Progress<'_>),
-    ) -> Result<(), Error> {
+    fn epoch(&mut self, clouds: &Clouds, held: &Clouds) -> Result<(), Error> {
         let epoch = self.trainer.epoch + 1;
-        let learnt = self.learn(clouds, report)?;
+        let learnt = self.learn(clouds)?;
         let current = self.folder.join("current.safetensors");
         let card = self.card(None);
         model_file::write(&current, &mut self.trainer.model, &card)?;
@@ -199,7 +193,7 @@ impl Run {
             Some(confusion(&current, held, &Options::default())?)
         };
         let row = self.row(epoch, &learnt, validated.as_ref());
-        report(Progress::Epoch(&row));
+        (self.report)(Progress::Epoch(&row));
         self.metrics.epochs.push(row);
         // Without a validation set, the last epoch is taken.
         if validated.is_none() || self.metrics.is_best(epoch, self.trainer.recipe.balance > 0.0) {
@@ -212,18 +206,14 @@ impl Run {
         checkpoint::write(&path, &mut self.trainer, &self.digest, &notes)
     }
 
-    fn learn(
-        &mut self,
-        clouds: &Clouds,
-        report: &mut dyn FnMut(Progress<'_>),
-    ) -> Result<EpochSummary, Error> {
+    fn learn(&mut self, clouds: &Clouds) -> Result<EpochSummary, Error> {
         let recipe = &self.trainer.recipe;
         let (epoch, epochs, batch) = (self.trainer.epoch + 1, recipe.epochs, recipe.batch);
         let clouds = &negatives::added(clouds.clone(), recipe, "learnt", epoch);
         let steps = batches::count(clouds.len(), recipe);
         self.trainer.learn(clouds, |summary| {
             let step = summary.clouds / batch;
-            report(Progress::Step { epoch, epochs, step, steps, summary });
+            (self.report)(Progress::Step { epoch, epochs, step, steps, summary });
         })
     }
 
@@ -268,8 +258,7 @@ impl Run {
         }
     }
 
-    /// Writes the best weights in the form for release, and measures them once on the test
-    /// clouds.
+    /// Writes the best weights in the form for release, and measures them once on the test clouds.
     fn finish(
         &mut self,
         job: &Job<'_>,
@@ -286,8 +275,8 @@ impl Run {
         let activation_ranges = infer_cpu::activation_ranges_of_set(&shipped, &clouds.set)?;
         let card = ModelCard { activation_ranges, accuracy: accuracy.clone(), ..card };
         model_file::ship(&shipped, &mut self.trainer.model, &card)?;
-        // An interruption before this line leaves files in the run's folder only, and the
-        // next run removes them.
+        // An interruption before this line leaves files in the run's folder only, and the next run
+        // removes them.
         fs::rename(&shipped, job.out).map_err(|source| FormatError::io(job.out, source))?;
         Ok(accuracy)
     }

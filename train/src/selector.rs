@@ -1,5 +1,5 @@
-//! Selects the critical points of the clouds in a batch. The code of infer-cpu ranks and
-//! resizes the selection.
+//! Selects the critical points of the clouds in a batch. The code of infer-cpu ranks and resizes
+//! the selection.
 
 use formats::rng::StreamKey;
 use infer_cpu::sampler::{CriticalPoints, Resize};
@@ -44,9 +44,9 @@ impl CriticalPointSelector {
         self.gumbel
     }
 
-    /// Selects the points of `batch` that win channels of `pooled`, the pooling of all points.
-    /// The weight of a point is the number of its copies in the selection. A relaxed selection
-    /// draws new noise in each `step`.
+    /// Selects the points of `batch` that win channels of `pooled`, the pooling of all points. The
+    /// weight of a point is the number of its copies in the selection. A relaxed selection draws
+    /// new noise in each `step`.
     #[must_use]
     pub fn select(self, pooled: &PooledLayer, batch: &Batch, step: u64) -> Selection {
         let mut chosen = Batch { starts: vec![0], ..Batch::default() };
@@ -78,8 +78,8 @@ impl CriticalPointSelector {
         Selection { batch: chosen, rows: origin }
     }
 
-    /// Adds the gradient through the relaxed selection to `dpooled`, the gradient of the output
-    /// of `pooled`. `dpoints` is the gradient of the selected points' coordinates.
+    /// Adds the gradient through the relaxed selection to `dpooled`, the gradient of the output of
+    /// `pooled`. `dpoints` is the gradient of the selected points' coordinates.
     pub fn add_gradient(
         self,
         pooled: &PooledLayer,
@@ -111,8 +111,8 @@ impl CriticalPointSelector {
     }
 }
 
-/// Numbers the rows within the cloud that begins at row `first`, because a ranking without
-/// critical points falls back to row 0.
+/// Numbers the rows within the cloud that begins at row `first`, because a ranking without critical
+/// points falls back to row 0.
 fn within(winners: &[u32], first: u32) -> Vec<u32> {
     winners.iter().map(|winner| winner - first).collect()
 }

@@ -37,8 +37,8 @@ impl TNet {
         self.transforms = Transforms::around_identity(elements, self.transforms.k);
     }
 
-    /// Propagates the gradient of the transforms' elements. If `wants_input`, returns the part
-    /// of the gradient of `x` that flows through the prediction.
+    /// Propagates the gradient of the transforms' elements. If `wants_input`, returns the part of
+    /// the gradient of `x` that flows through the prediction.
     pub fn backward(
         &mut self,
         x: ArrayView2<'_, f32>,

@@ -64,8 +64,8 @@ impl Trainer {
         Ok(Self { recipe, model: Model { encoder, network }, step: 0, epoch: 0 })
     }
 
-    /// Trains on the clouds of one epoch, except those of an incomplete last batch. Calls
-    /// `report` after each step.
+    /// Trains on the clouds of one epoch, except those of an incomplete last batch. Calls `report`
+    /// after each step.
     ///
     /// # Errors
     /// [`Error::NotFinite`].

@@ -1,5 +1,5 @@
-//! `edgepuck corrupt`: applies the corruptions of Robo3D and ModelNet-C that have a physical cause in
-//! a sensor.
+//! `edgepuck corrupt`: applies the corruptions of Robo3D and ModelNet-C that have a physical cause
+//! in a sensor.
 
 mod objects;
 mod plan;

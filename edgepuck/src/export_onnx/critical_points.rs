@@ -33,8 +33,8 @@ pub fn add(
     Ok(NetInputs { points, cloud: Some(cloud.to_owned()), pooled_stn: is_stn.then_some(pooled) })
 }
 
-/// The features to pool, `[batch, features, all]`, by infer-cpu's choice of a front end, and whether
-/// they are those of the input T-Net.
+/// The features to pool, `[batch, features, all]`, by infer-cpu's choice of a front end, and
+/// whether they are those of the input T-Net.
 fn front(graph: &mut Graph, net: &Net, cloud: &str) -> anyhow::Result<(String, bool)> {
     let mut entry = || transposed(graph, "cpl.entry", cloud);
     match (&net.front, &net.stn, &net.fstn) {

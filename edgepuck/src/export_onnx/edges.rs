@@ -12,9 +12,8 @@ use super::graph::{Graph, int};
 /// The axis of the cloud in `[batch, points, all, 3]`.
 const ALL: i64 = 2;
 
-/// Adds the layers `edges` with their radii, for `points` `[batch, points, 3]`
-/// among `cloud` `[batch, all, 3]`; returns features `[batch, points,
-/// channels]`, one value a layer.
+/// Adds the layers `edges` with their radii, for `points` `[batch, points, 3]` among `cloud`
+/// `[batch, all, 3]`; returns features `[batch, points, channels]`, one value a layer.
 pub fn add(
     graph: &mut Graph,
     edges: &[(f32, Dense)],

@@ -34,8 +34,8 @@ pub fn add(graph: &mut Graph, net: &Net, inputs: &NetInputs) {
     }
 }
 
-/// The features of each point after the trunk, `[batch, features, points]`. The names of values that
-/// are not outputs of layers begin with `prefix`.
+/// The features of each point after the trunk, `[batch, features, points]`. The names of values
+/// that are not outputs of layers begin with `prefix`.
 pub fn trunk(graph: &mut Graph, net: &Net, inputs: &NetInputs, prefix: &str) -> String {
     let mut x = entry(graph, net, inputs, prefix);
     for (i, dense) in net.trunk.iter().enumerate() {
@@ -97,8 +97,8 @@ pub fn convolutions(graph: &mut Graph, layers: &[Dense], x: &str, prefix: &str) 
     layers.iter().fold(x.to_owned(), |x, dense| convolution(graph, dense, &x, prefix))
 }
 
-/// One layer that all points share. If a trunk runs twice, before and after a Critical Points Layer,
-/// both runs share the weights, and differ in `prefix`.
+/// One layer that all points share. If a trunk runs twice, before and after a Critical Points
+/// Layer, both runs share the weights, and differ in `prefix`.
 fn convolution(graph: &mut Graph, dense: &Dense, x: &str, prefix: &str) -> String {
     let Dense { name, inputs, outputs, .. } = dense;
     let kernel = graph.reals(&format!("{name}.weight"), &[*outputs, *inputs, 1], &dense.weight);

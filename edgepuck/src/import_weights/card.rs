@@ -11,8 +11,8 @@ use formats::weights::Tensor;
 use super::checkpoint::{Accuracy, Checkpoint};
 use super::table::Table;
 
-/// Flags for the facts on the card that neither the checkpoint nor the table states, or that correct
-/// the table.
+/// Flags for the facts on the card that neither the checkpoint nor the table states, or that
+/// correct the table.
 #[derive(clap::Args)]
 pub struct CardArgs {
     /// File of class names, one per line, in the order of the logits [default: ModelNet40's classes

@@ -17,8 +17,8 @@ const STATES: [&str; 2] = ["model_state_dict.", "state_dict."];
 /// The prefix that `torch.nn.DataParallel` adds to all names.
 const PARALLEL: &str = "module.";
 
-/// Largest number of elements of a model, far above that of any PointNet. Without this limit, a small
-/// file could fill the memory by a view that repeats one element.
+/// Largest number of elements of a model, far above that of any PointNet. Without this limit, a
+/// small file could fill the memory by a view that repeats one element.
 const MOST_ELEMENTS: usize = 1 << 27;
 
 /// A checkpoint whose tensors are read on demand.

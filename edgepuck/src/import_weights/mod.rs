@@ -65,8 +65,8 @@ pub fn run(args: &ImportWeightsArgs) -> anyhow::Result<Outcome> {
 /// The metadata of `--calibrate`, which need the loaded network.
 type Ranges = Option<(String, String)>;
 
-/// Checks that infer-cpu loads a model file with these tensors, and calibrates the model. Errors name
-/// the checkpoint, and also give a tensor's name in the checkpoint.
+/// Checks that infer-cpu loads a model file with these tensors, and calibrates the model. Errors
+/// name the checkpoint, and also give a tensor's name in the checkpoint.
 fn check(
     args: &ImportWeightsArgs,
     names: &Names,

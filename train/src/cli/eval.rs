@@ -28,15 +28,15 @@ pub struct EvalArgs {
     /// The model file
     #[arg(long, value_name = "FILE")]
     model: PathBuf,
-    /// Labelled clouds: a packed NPZ file, NPZ files of clusters (repeat the flag),
-    /// or data with a test part in any form that `train --data` accepts
+    /// Labelled clouds: a packed NPZ file, NPZ files of clusters (repeat the flag), or data with a
+    /// test part in any form that `train --data` accepts
     #[arg(long, value_name = "PATH", required = true)]
     data: Vec<PathBuf>,
     /// Precision of the inference: f32, f32-fc16, f16 or i8
     #[arg(long, default_value = "f32")]
     precision: Precision,
-    /// Whether outliers are dropped before sampling, from clouds in the unit sphere [default: as
-    /// in training]
+    /// Whether outliers are dropped before sampling, from clouds in the unit sphere [default: as in
+    /// training]
     #[arg(long, value_name = "YES")]
     outlier_filter: Option<bool>,
     /// Write the confusion matrix, or the table for clusters, to this CSV file
@@ -56,8 +56,8 @@ struct ObjectArgs {
     /// classes that the model does not answer as `unknown`]
     #[arg(long, value_name = "CLASSES", value_delimiter = ',')]
     known: Vec<String>,
-    /// TOML file that maps labels of the data to classes of the model, such as
-    /// `pedestrian = "person"`; `rider = ""` leaves such objects out
+    /// TOML file that maps labels of the data to classes of the model, such as `pedestrian =
+    /// "person"`; `rider = ""` leaves such objects out
     #[arg(long, value_name = "FILE")]
     map: Option<PathBuf>,
     /// Count all views of an object as one, by the track in the id, FRAME#TRACK

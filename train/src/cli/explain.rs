@@ -1,5 +1,4 @@
-//! `explain`: shows which points determined a prediction, by LIME-3D and by
-//! critical points.
+//! `explain`: shows which points determined a prediction, by LIME-3D and by critical points.
 
 use std::path::PathBuf;
 
@@ -28,15 +27,13 @@ pub struct ExplainArgs {
     /// Number of parts into which LIME-3D divides the cloud
     #[arg(long, default_value_t = 20, value_name = "K")]
     clusters: usize,
-    /// Number of copies of the cloud, each with some parts removed, that
-    /// LIME-3D classifies
+    /// Number of copies of the cloud, each with some parts removed, that LIME-3D classifies
     #[arg(long, default_value_t = 1000, value_name = "N")]
     samples: usize,
     /// Seed of all random numbers
     #[arg(long, default_value_t = 0, value_name = "N")]
     seed: u64,
-    /// Draw the cloud, with the points that both methods mark, into this SVG
-    /// file
+    /// Draw the cloud, with the points that both methods mark, into this SVG file
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
 }
@@ -99,8 +96,7 @@ fn check(args: &ExplainArgs) -> Result<(), Usage> {
     }
 }
 
-/// The distance between the critical points and the points that LIME-3D finds strongest, as
-/// text.
+/// The distance between the critical points and the points that LIME-3D finds strongest, as text.
 fn report(
     points: &[[f32; 3]],
     found: &Explanation,

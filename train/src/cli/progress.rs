@@ -1,5 +1,5 @@
-//! The progress of a training on standard error: a bar for the current epoch, and a line for
-//! each finished one.
+//! The progress of a training on standard error: a bar for the current epoch, and a line for each
+//! finished one.
 
 use indicatif::{ProgressBar, ProgressStyle};
 use train::run::Progress;

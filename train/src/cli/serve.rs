@@ -1,6 +1,6 @@
-//! `serve`: times training steps for `cargo xtask bench train`. Each request is a line
-//! of text, and each answer is a line with a JSON object;
-//! `xtask/lab/peers/infer/turns.py` describes the protocol.
+//! `serve`: times training steps for `cargo xtask bench train`. Each request is a line of text, and
+//! each answer is a line with a JSON object; `xtask/lab/peers/infer/turns.py` describes the
+//! protocol.
 
 use std::collections::BTreeMap;
 use std::io::{BufRead as _, Write as _, stdin, stdout};

@@ -13,15 +13,14 @@ use super::progress::shown;
 /// Flags of `train`.
 #[derive(clap::Args, Debug)]
 pub struct TrainArgs {
-    /// Training data: a packed NPZ file; the common prefix of two packed files,
-    /// such as `rotational-noisy` for rotational-noisy-train.npz and
-    /// rotational-noisy-test.npz; a folder with train.npz and test.npz; a
-    /// folder of ModelNet40's HDF5 files; or a folder of text files as in
-    /// yanx27/Pointnet_Pointnet2_pytorch
+    /// Training data: a packed NPZ file; the common prefix of two packed files, such as
+    /// `rotational-noisy` for rotational-noisy-train.npz and rotational-noisy-test.npz; a folder
+    /// with train.npz and test.npz; a folder of ModelNet40's HDF5 files; or a folder of text files
+    /// as in yanx27/Pointnet_Pointnet2_pytorch
     #[arg(long, value_name = "PATH")]
     data: PathBuf,
-    /// Test data, on which the accuracy is measured once, after training [default: the test part
-    /// of --data, if there is one]
+    /// Test data, on which the accuracy is measured once, after training [default: the test part of
+    /// --data, if there is one]
     #[arg(long, value_name = "PATH")]
     test: Option<PathBuf>,
     /// Recipe (TOML), which the flags below override [default: the settings of the baseline]
@@ -32,15 +31,14 @@ pub struct TrainArgs {
     /// weights of further classes start from random numbers [default: random numbers]
     #[arg(long, value_name = "MODEL")]
     init: Option<PathBuf>,
-    /// Network: pointnet, or cpl (pointnet after a Critical Points Layer)
-    /// [default: the recipe's]
+    /// Network: pointnet, or cpl (pointnet after a Critical Points Layer) [default: the recipe's]
     #[arg(long, value_name = "NAME", value_parser = ["pointnet", "cpl"])]
     arch: Option<String>,
     /// Number of points of each cloud for the network or its Critical Points Layer
     #[arg(long, value_name = "N")]
     points: Option<usize>,
-    /// Widths of the layers of the Critical Points Layer's point encoder,
-    /// beginning with the 3 coordinates
+    /// Widths of the layers of the Critical Points Layer's point encoder, beginning with the 3
+    /// coordinates
     #[arg(long, value_name = "3-W-W", value_parser = parse_widths)]
     front: Option<Widths>,
     /// Number of points that the Critical Points Layer selects

@@ -1,6 +1,6 @@
-//! EdgeConv: a linear layer on the offsets from each point to its neighbors, a batch norm, a
-//! ReLU and the maximum over the neighbors, as infer-cpu's `edge_conv.rs` defines it. It is a
-//! pooled layer whose clouds are the neighborhoods.
+//! EdgeConv: a linear layer on the offsets from each point to its neighbors, a batch norm, a ReLU
+//! and the maximum over the neighbors, as infer-cpu's `edge_conv.rs` defines it. It is a pooled
+//! layer whose clouds are the neighborhoods.
 
 use ndarray::ArrayView2;
 use ndarray::parallel::prelude::*;
@@ -89,8 +89,8 @@ impl Edges {
     }
 }
 
-/// The offsets from `p` to its neighbors within `radius`, divided by `radius`. The first
-/// neighbor is `p` itself; its copies in `others` are left out.
+/// The offsets from `p` to its neighbors within `radius`, divided by `radius`. The first neighbor
+/// is `p` itself; its copies in `others` are left out.
 fn neighbors(p: &[f32; 3], others: &[[f32; 3]], radius: f32) -> Vec<[f32; 3]> {
     let mut offsets = vec![[0.0; 3]];
     for q in others {

@@ -1,5 +1,5 @@
-//! A hidden layer: linear, optional dropout, batch norm, ReLU. It takes each point separately
-//! or, after a pooling, one vector of each cloud.
+//! A hidden layer: linear, optional dropout, batch norm, ReLU. It takes each point separately or,
+//! after a pooling, one vector of each cloud.
 
 use ndarray::ArrayView2;
 
@@ -24,8 +24,8 @@ impl HiddenLayer {
         Self { base: Normed::new(linear, norm, size, seed), saved: Saved::default(), kept: None }
     }
 
-    /// Applies the layer to `x` `[rows, inputs]`. `kept` is the dropout mask before the batch
-    /// norm. Its elements are 0 or 1 / the share of kept features.
+    /// Applies the layer to `x` `[rows, inputs]`. `kept` is the dropout mask before the batch norm.
+    /// Its elements are 0 or 1 / the share of kept features.
     pub fn forward(
         &mut self,
         x: ArrayView2<'_, f32>,

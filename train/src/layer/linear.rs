@@ -17,8 +17,8 @@ pub struct Linear {
 }
 
 impl Linear {
-    /// A layer with random weights, named `name`. Weights and biases are uniform in ±1/√inputs,
-    /// as in PyTorch's `Linear` and `Conv1d`.
+    /// A layer with random weights, named `name`. Weights and biases are uniform in ±1/√inputs, as
+    /// in PyTorch's `Linear` and `Conv1d`.
     #[must_use]
     pub fn new(name: &str, inputs: usize, outputs: usize, seed: u64) -> Self {
         let limit = 1.0 / (inputs as f64).sqrt();
@@ -73,8 +73,7 @@ impl Linear {
         self.bias.gradient.copy_from_slice(bias.as_slice().expect("invariant: contiguous"));
     }
 
-    /// Sets only the gradient of the weights. Before a batch norm, the gradient of the bias is
-    /// 0.
+    /// Sets only the gradient of the weights. Before a batch norm, the gradient of the bias is 0.
     pub fn backward_products(&mut self, x: ArrayView2<'_, f32>, dz: ArrayView2<'_, f32>) {
         matrix::gradient(dz, x, &mut self.weight.gradient);
     }

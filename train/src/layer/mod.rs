@@ -1,13 +1,13 @@
 //! The layers of PointNet, with hand-written gradients.
 //!
 //! # Rows with weights
-//! The baseline's augmentation drops points by moving them onto the first point of the cloud.
-//! Such duplicates do not change a maximum, but they count in the mean and the variance of a
-//! batch norm. Here, dropped points are removed, and the weight of the first point's row is
-//! the number of its duplicates. The forward pass gives the same statistics and outputs. In
-//! the backward pass, the gradient of the row is the sum of the gradients of its duplicates,
-//! so that the share of the batch norm counts once for each duplicate. On average, this saves
-//! seven sixteenths of the work, and it changes results only by rounding.
+//! The baseline's augmentation drops points by moving them onto the first point of the cloud. Such
+//! duplicates do not change a maximum, but they count in the mean and the variance of a batch norm.
+//! Here, dropped points are removed, and the weight of the first point's row is the number of its
+//! duplicates. The forward pass gives the same statistics and outputs. In the backward pass, the
+//! gradient of the row is the sum of the gradients of its duplicates, so that the share of the
+//! batch norm counts once for each duplicate. On average, this saves seven sixteenths of the work,
+//! and it changes results only by rounding.
 
 mod edge;
 mod hidden;

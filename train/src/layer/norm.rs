@@ -52,8 +52,8 @@ impl Norm {
         }
     }
 
-    /// `linear` with this batch norm folded into its weights and biases, computed in f64 from
-    /// the running statistics.
+    /// `linear` with this batch norm folded into its weights and biases, computed in f64 from the
+    /// running statistics.
     #[must_use]
     pub fn folded_into(&self, linear: &Linear) -> Folded {
         let (inputs, outputs) = linear.size();
@@ -74,8 +74,8 @@ impl Norm {
         }
     }
 
-    /// Mixes the statistics of a batch into the running statistics with the share `momentum`,
-    /// as PyTorch does. `mean` does not include `bias`; the variance is over `total` values.
+    /// Mixes the statistics of a batch into the running statistics with the share `momentum`, as
+    /// PyTorch does. `mean` does not include `bias`; the variance is over `total` values.
     pub fn update_statistics(
         &mut self,
         (mean, variance): (&[f32], &[f32]),
@@ -98,8 +98,8 @@ impl Norm {
         [(format!("{name}.running_mean"), mean), (format!("{name}.running_var"), variance)]
     }
 
-    /// Normalises, scales and shifts `z`, and sets negative results to 0. `z` does not include
-    /// the bias, which changes only the running mean.
+    /// Normalises, scales and shifts `z`, and sets negative results to 0. `z` does not include the
+    /// bias, which changes only the running mean.
     pub fn forward(
         &mut self,
         mut z: Matrix,
@@ -133,8 +133,8 @@ impl Norm {
         (out, Saved { normalised: z, inverse })
     }
 
-    /// Sets the gradients of scale and shift from the gradient `dy` of the outputs `y`. Returns
-    /// the gradient of `z`.
+    /// Sets the gradients of scale and shift from the gradient `dy` of the outputs `y`. Returns the
+    /// gradient of `z`.
     pub fn backward(
         &mut self,
         mut dy: Matrix,
@@ -183,8 +183,8 @@ fn slice<'a>(row: &'a mut ndarray::ArrayViewMut1<'_, f32>) -> &'a mut [f32] {
     row.as_slice_mut().expect("invariant: rows are contiguous")
 }
 
-/// Sums `term(z, channel)` times the weight of the row over all rows, and divides by `total`.
-/// The sums of chunks are in f32, and the sum over chunks is in f64.
+/// Sums `term(z, channel)` times the weight of the row over all rows, and divides by `total`. The
+/// sums of chunks are in f32, and the sum over chunks is in f64.
 pub fn column_sums(
     z: &Matrix,
     weights: &[f32],

@@ -3,13 +3,13 @@
 //! The products z = W x, about a thousand for each point, are never stored:
 //!
 //! - The maximum needs one product for each channel and cloud, which infer-cpu's fused kernel
-//!   finds. A batch norm with a scale of 0 or more keeps the order of its values. A scale
-//!   below 0 reverses the order, so that the kernel takes weights of the opposite sign.
-//! - Mean and variance of z follow from those of x: mean(z) = W mean(x), and
-//!   var(z) = w cov(x) wᵀ for each channel's w.
+//! -   finds. A batch norm with a scale of 0 or more keeps the order of its values. A scale below 0
+//! -   reverses the order, so that the kernel takes weights of the opposite sign.
+//! - Mean and variance of z follow from those of x: mean(z) = W mean(x), and var(z) = w cov(x) wᵀ
+//! -   for each channel's w.
 //! - In the backward pass, the gradient G of a channel flows to one point of each cloud and,
-//!   through the statistics of the batch norm, to all points. With the channel's σ and γ, the
-//!   number n of all points, S = ΣG and P = ΣG ẑ over clouds:
+//! -   through the statistics of the batch norm, to all points. With the channel's σ and γ, the
+//! -   number n of all points, S = ΣG and P = ΣG ẑ over clouds:
 //!
 //! ```text
 //! dW  =  γ/σ (Σ G x_winner  -  S mean(x)  -  P cov(x) w / σ)
@@ -56,8 +56,8 @@ struct Saved {
 }
 
 impl PooledLayer {
-    /// A layer with random weights, whose parts are named `linear` and `norm`. With `relu`, a
-    /// ReLU follows.
+    /// A layer with random weights, whose parts are named `linear` and `norm`. With `relu`, a ReLU
+    /// follows.
     #[must_use]
     pub fn new(linear: &str, norm: &str, size: (usize, usize), relu: bool, seed: u64) -> Self {
         Self { base: Normed::new(linear, norm, size, seed), relu, saved: Saved::default() }

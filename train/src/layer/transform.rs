@@ -68,8 +68,8 @@ impl Transforms {
     }
 }
 
-/// The mean of ‖T Tᵀ - 1‖ (Frobenius) over clouds, and its derivative with respect to the
-/// elements: 2 E T / ‖E‖ with the symmetric E = T Tᵀ - 1.
+/// The mean of ‖T Tᵀ - 1‖ (Frobenius) over clouds, and its derivative with respect to the elements:
+/// 2 E T / ‖E‖ with the symmetric E = T Tᵀ - 1.
 #[must_use]
 pub fn orthogonality(transforms: &Transforms) -> (f64, Matrix) {
     let n = transforms.elements.nrows() as f32;

@@ -4,11 +4,11 @@
 /// The separation of negatives, which should have larger scores, from known objects.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Detection {
-    /// The probability that a negative has a larger score than a known object: the area under
-    /// the receiver operating characteristic.
+    /// The probability that a negative has a larger score than a known object: the area under the
+    /// receiver operating characteristic.
     pub auroc: f64,
-    /// The share of negatives that are taken for known objects at the threshold that keeps 95 %
-    /// of the known objects.
+    /// The share of negatives that are taken for known objects at the threshold that keeps 95 % of
+    /// the known objects.
     pub fpr_at_95: f64,
 }
 

@@ -16,8 +16,8 @@ const COLUMNS: usize = 4;
 /// Smallest width of a view, metres, so that a person is drawn smaller than a bus.
 const LEAST_WIDTH_M: f64 = 3.0;
 
-/// Draws those of `objects` that are named wrongly, as SVG: each as the sensor sees it, and
-/// from above with the sensor below. A bar is 1 m long. `clouds` holds each object's points.
+/// Draws those of `objects` that are named wrongly, as SVG: each as the sensor sees it, and from
+/// above with the sensor below. A bar is 1 m long. `clouds` holds each object's points.
 #[must_use]
 pub fn drawing(objects: &[Object], clouds: &[&[[f32; 3]]], labels: &Labels) -> String {
     let each = objects.iter().zip(clouds);

@@ -1,7 +1,7 @@
 //! Scores the answers of a model to objects that were cut out of scans.
 //!
-//! An answer to a known object is right if it is the object's class. An answer to a negative,
-//! such as a tree or a wall, is right if it is `unknown`; any other answer is a false alarm.
+//! An answer to a known object is right if it is the object's class. An answer to a negative, such
+//! as a tree or a wall, is right if it is `unknown`; any other answer is a false alarm.
 
 mod detection;
 mod failures;
@@ -57,8 +57,8 @@ pub struct Answer {
     pub fine: usize,
     /// [`Prediction::energy`].
     pub energy: f64,
-    /// The largest logit of the classes that are not known minus the largest logit of the
-    /// known classes. `None` if there are no classes of either kind.
+    /// The largest logit of the classes that are not known minus the largest logit of the known
+    /// classes. `None` if there are no classes of either kind.
     pub margin: Option<f64>,
 }
 
@@ -73,8 +73,8 @@ impl Object {
     }
 }
 
-/// Classifies `clouds`, read from the file `data`, with the model at `path`. Leaves out clouds
-/// of fewer than `least` points, and those whose labels `labels` leaves out.
+/// Classifies `clouds`, read from the file `data`, with the model at `path`. Leaves out clouds of
+/// fewer than `least` points, and those whose labels `labels` leaves out.
 ///
 /// # Errors
 /// A model or a cloud that infer-cpu refuses.

@@ -29,12 +29,12 @@ impl Share {
     }
 }
 
-/// Gives an object's group: a number that orders the groups, and the group's name. An
-/// object that it gives `None` is in no group.
+/// Gives an object's group: a number that orders the groups, and the group's name. An object that
+/// it gives `None` is in no group.
 pub type Grouping<'a, T> = dyn Fn(&T) -> Option<(usize, String)> + 'a;
 
-/// The share of hits in each group of `objects`, in the order of the groups. `count` returns
-/// the number of hits among some objects and the number of those objects.
+/// The share of hits in each group of `objects`, in the order of the groups. `count` returns the
+/// number of hits among some objects and the number of those objects.
 pub fn shares<T>(
     objects: &[&T],
     grouping: &Grouping<'_, T>,
@@ -53,8 +53,8 @@ pub fn shares<T>(
     groups.into_iter().map(share).collect()
 }
 
-/// The group of a `value` of 0 or more between two of the ascending `edges`: `10 to 20 m`.
-/// A bin includes its lower edge; the last bin has no upper edge.
+/// The group of a `value` of 0 or more between two of the ascending `edges`: `10 to 20 m`. A bin
+/// includes its lower edge; the last bin has no upper edge.
 #[must_use]
 pub fn bin(value: f64, edges: &[usize], unit: &str) -> (usize, String) {
     let next = edges.partition_point(|&edge| edge as f64 <= value);

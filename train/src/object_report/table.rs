@@ -1,5 +1,5 @@
-//! The share of right answers: by class, and within each class by label, range, number of
-//! points, sensor and file.
+//! The share of right answers: by class, and within each class by label, range, number of points,
+//! sensor and file.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -25,8 +25,8 @@ pub struct Table {
 }
 
 impl Table {
-    /// Counts `objects`, whose labels `labels` explains. With `tracks`, all views of a
-    /// track count once in each row: as a hit if more than half of them are hits.
+    /// Counts `objects`, whose labels `labels` explains. With `tracks`, all views of a track count
+    /// once in each row: as a hit if more than half of them are hits.
     #[must_use]
     pub fn new(objects: &[Object], labels: &Labels, tracks: bool) -> Self {
         let mut by_class: BTreeMap<(bool, String), Vec<&Object>> = BTreeMap::new();
@@ -44,8 +44,7 @@ impl Table {
         Self { rows: rows.collect() }
     }
 
-    /// The mean share of right answers over all classes and the negatives. `None` without
-    /// objects.
+    /// The mean share of right answers over all classes and the negatives. `None` without objects.
     #[must_use]
     pub fn balanced(&self) -> Option<f64> {
         let all = || self.rows.iter().filter(|(_, share)| share.group == ALL);
@@ -88,8 +87,8 @@ impl fmt::Display for Table {
     }
 }
 
-/// The rows of one class: right answers among all of its objects, each wrong answer, and
-/// right answers by label, range, number of points, sensor and file.
+/// The rows of one class: right answers among all of its objects, each wrong answer, and right
+/// answers by label, range, number of points, sensor and file.
 fn class_shares(class: &str, objects: &[&Object], labels: &Labels, tracks: bool) -> Vec<Share> {
     let right = |objects: &[&Object]| count(objects, tracks, Object::is_right);
     let named = |group: String, (hits, n): (usize, usize)| Share { group, hits, n };
@@ -114,8 +113,8 @@ fn class_shares(class: &str, objects: &[&Object], labels: &Labels, tracks: bool)
     found
 }
 
-/// The number of hits among `objects`, and the number of objects. With `tracks`, a track
-/// counts once.
+/// The number of hits among `objects`, and the number of objects. With `tracks`, a track counts
+/// once.
 fn count(objects: &[&Object], tracks: bool, is_hit: impl Fn(&Object) -> bool) -> (usize, usize) {
     let mut things: BTreeMap<(&str, &str, usize), (usize, usize)> = BTreeMap::new();
     for (number, object) in objects.iter().enumerate() {

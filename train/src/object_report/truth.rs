@@ -7,8 +7,8 @@ use formats::FormatError;
 
 use crate::error::Error;
 
-/// Labels of data sets, with the classes of networks for them. A label that is a class of the
-/// model is not replaced.
+/// Labels of data sets, with the classes of networks for them. A label that is a class of the model
+/// is not replaced.
 const ALIASES: [(&str, &str); 6] = [
     ("pedestrian", "person"),
     ("4wd", "car"),
@@ -50,8 +50,8 @@ impl Labels {
         }
     }
 
-    /// Adds the aliases in the TOML file at `path`, which replace built-in ones:
-    /// `pedestrian = "person"`, or `rider = ""` to leave objects out.
+    /// Adds the aliases in the TOML file at `path`, which replace built-in ones: `pedestrian =
+    /// "person"`, or `rider = ""` to leave objects out.
     ///
     /// # Errors
     /// A file that is not a table of aliases.

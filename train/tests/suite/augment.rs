@@ -29,9 +29,8 @@ fn what_is_dropped_counts_with_the_first_point() {
         assert_eq!(drawn.first_weight, 1.0 + missing as f32);
         dropped += missing;
     }
-    // 15 points that can be dropped, each with a chance that is 0.4375 on
-    // average; the chance's own spread of 0.253 makes a mean over 200 epochs
-    // vary by 15 x 0.253 / √200 = 0.27 points.
+    // 15 points that can be dropped, each with a chance that is 0.4375 on average; the chance's own
+    // spread of 0.253 makes a mean over 200 epochs vary by 15 x 0.253 / √200 = 0.27 points.
     let mean = dropped as f64 / 200.0;
     assert!((mean - 15.0 * 0.4375).abs() < 4.0 * 0.27, "{mean}");
 }
@@ -99,8 +98,8 @@ fn a_sensor_s_noise_is_along_its_rays() {
             sum += error.iter().map(|x| x * x).sum::<f64>();
             n += 1.0;
         }
-        // Rays to points within 1 of a place 3 away are within 20 degrees of
-        // each other, so that two errors span an angle of 40 at most.
+        // Rays to points within 1 of a place 3 away are within 20 degrees of each other, so that
+        // two errors span an angle of 40 at most.
         let length = |e: &[f64; 3]| e.iter().map(|x| x * x).sum::<f64>().sqrt();
         let dot: f64 = errors[0].iter().zip(&errors[1]).map(|(a, b)| a * b).sum();
         across +=

@@ -74,8 +74,8 @@ fn a_draw_has_a_density_of_its_own_and_the_network_its_own_number_of_points() {
     let sizes = |n| drawn(n, &recipe).iter().map(|drawn| drawn.points.len()).collect::<Vec<_>>();
     let of_many = sizes(300);
     assert!(of_many.iter().all(|n| (20..=100).contains(n)), "{of_many:?}");
-    // Half of the draws, log-uniform from 20 to 200, have less than 63 points. Of 40
-    // such draws, 8 to 32 are within 3.8 standard deviations.
+    // Half of the draws, log-uniform from 20 to 200, have less than 63 points. Of 40 such draws, 8
+    // to 32 are within 3.8 standard deviations.
     let few = of_many.iter().filter(|n| **n < 63).count();
     assert!((8..=32).contains(&few), "{of_many:?}");
     assert!(sizes(15).iter().all(|n| *n == 15));
@@ -93,8 +93,8 @@ fn a_sensor_s_noise_is_along_the_rays_from_the_origin() {
         let errors: Vec<[f64; 3]> = (0..200)
             .map(|i| [0, 1, 2].map(|k| f64::from(drawn.points[i][k] - plain.points[i][k])))
             .collect();
-        // The centring moved all of them alike: what is left is along the rays, which
-        // lie within some degrees, so that the height's share is small.
+        // The centring moved all of them alike: what is left is along the rays, which lie within
+        // some degrees, so that the height's share is small.
         let mean = [0, 1, 2].map(|k| errors.iter().map(|e| e[k]).sum::<f64>() / 200.0);
         let square = |e: &[f64; 3]| (0..3).map(|k| (e[k] - mean[k]).powi(2)).sum::<f64>();
         squares += errors.iter().map(square).sum::<f64>();

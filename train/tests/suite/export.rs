@@ -8,30 +8,18 @@ use infer_cpu::{Classifier, Evaluation, Options};
 use train::clouds::Clouds;
 use train::cpl::Cpl;
 use train::model_file;
-use train::recipe::{Recipe, Sampling};
-use train::shape::{Edge, Shape};
+use train::recipe::Recipe;
+use train::shape::Edge;
 use train::trainer::Trainer;
 
 use crate::reference::{self, Reference};
 
 fn recipe(input_transform: bool, feature_transform: bool) -> Recipe {
-    let network = Shape {
-        input_transform,
-        feature_transform,
-        edges: Vec::new(),
-        trunk: vec![16, 24, 40],
-        t_net: vec![16, 40],
-        t_net_head: vec![24],
-        head: vec![32, 20],
-    };
-    Recipe {
-        network,
-        points: 32,
-        batch: 10,
-        epochs: 3,
-        sampling: Sampling::First,
-        ..Recipe::default()
-    }
+    crate::recipe(&format!(
+        "points = 32\nbatch = 10\nepochs = 3\n\
+         [network]\ninput_transform = {input_transform}\nfeature_transform = {feature_transform}\n\
+         trunk = [16, 24, 40]\nt_net = [16, 40]\nt_net_head = [24]\nhead = [32, 20]\n"
+    ))
 }
 
 /// Logits of the trained network by its reference and by infer-cpu, on 100 clouds.
@@ -121,8 +109,8 @@ fn plain_shapes_are_classified() {
     assert!(found.instance_accuracy() > 0.95, "{found:?}");
 }
 
-/// A front end is learnt with the network behind it, and infer-cpu finds both:
-/// it chooses as many points as were asked for, and knows plain shapes by them.
+/// A front end is learnt with the network behind it, and infer-cpu finds both: it chooses as many
+/// points as were asked for, and knows plain shapes by them.
 #[test]
 fn a_point_encoder_and_its_network_classify_plain_shapes_by_few_points() {
     for gumbel in [false, true] {
@@ -159,8 +147,8 @@ fn learns_by_few_points(cpl: Cpl) {
     assert!(found.instance_accuracy() > 0.9, "{found:?}");
 }
 
-/// The coordinates' T-Net is the front end of its own network: what it pools
-/// chooses the points, in training as in infer-cpu.
+/// The coordinates' T-Net is the front end of its own network: what it pools chooses the points, in
+/// training as in infer-cpu.
 #[test]
 fn a_shared_t_net_selects_and_transforms() {
     let (clouds, test) = (crate::clouds(120), crate::test_clouds(150));
@@ -196,8 +184,8 @@ fn a_relaxed_selection_trains_the_point_encoder() {
     assert!(learnt(true) && !learnt(false));
 }
 
-/// An EdgeConv network of 8 of 32 points, compared with its reference: neighbors are
-/// all 32, whoever chose the 8, however many threads there are.
+/// An EdgeConv network of 8 of 32 points, compared with its reference: neighbors are all 32,
+/// whoever chose the 8, however many threads there are.
 #[test]
 fn neighbors_are_searched_among_all_points_whatever_the_sampler_kept() {
     let clouds = crate::clouds(30);

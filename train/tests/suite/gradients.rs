@@ -113,8 +113,8 @@ fn check(shape: &Shape) {
         let reference = Reference { values, clouds: clouds.clone(), around, kept: Some(kept()) };
         reference.loss(shape, &batch.targets, RATES.orthogonality)
     };
-    // Some 30 layers deep, each of fewer than 100 roundings of relative size
-    // 6e-8, magnified by batch norms of four vectors.
+    // Some 30 layers deep, each of fewer than 100 roundings of relative size 6e-8, magnified by
+    // batch norms of four vectors.
     assert!(
         (loss.total - reference(&values)).abs() < 1e-4,
         "{} for {}",
@@ -125,8 +125,7 @@ fn check(shape: &Shape) {
         let largest = gradient.iter().fold(0.0f32, |a, g| a.max(g.abs()));
         let every = gradient.len().div_ceil(12);
         for i in (0..gradient.len()).step_by(every) {
-            // Central differences: off by h² of the third derivative, and by
-            // the loss's 1e-16 / h.
+            // Central differences: off by h² of the third derivative, and by the loss's 1e-16 / h.
             let h = 1e-5;
             let mut at = |by: f64| {
                 values.get_mut(name).expect("it is there").1[i] += by;
@@ -151,8 +150,8 @@ fn gradients_of_edge_convolutions_are_those_of_the_reference() {
     }
 }
 
-/// The loss of what a T-Net chose, by differences of the network's own losses:
-/// the choice itself, a step function, is the same on both sides.
+/// The loss of what a T-Net chose, by differences of the network's own losses: the choice itself, a
+/// step function, is the same on both sides.
 #[test]
 fn gradients_of_a_shared_t_net_are_its_losses_differences() {
     let shape = shape(true, false);
@@ -175,8 +174,8 @@ fn gradients_of_a_shared_t_net_are_its_losses_differences() {
             of_name.for_each(|parameter| parameter.value[i] += by);
             moved.learn(&batch, Some(kept()), RATES).total
         };
-        // f32 losses of about 2 are off by some 2e-7, over 2e-4: 1e-3. Larger
-        // steps meet the curvature of batch norms over four vectors.
+        // f32 losses of about 2 are off by some 2e-7, over 2e-4: 1e-3. Larger steps meet the
+        // curvature of batch norms over four vectors.
         let h = 1e-4;
         let expected = (at(h) - at(-h)) / f64::from(2.0 * h);
         let found = f64::from(gradient[i]);

@@ -7,28 +7,16 @@ use infer_cpu::{Classifier, Options};
 use train::clouds::Clouds;
 use train::init;
 use train::model_file;
-use train::recipe::{Recipe, Sampling};
+use train::recipe::Recipe;
 use train::run::Job;
 use train::shape::Shape;
 use train::trainer::Trainer;
 
 fn recipe() -> Recipe {
-    let network = Shape {
-        trunk: vec![8, 12, 16],
-        t_net: vec![8, 16],
-        t_net_head: vec![8],
-        head: vec![12, 10],
-        ..Shape::default()
-    };
-    let points = 24;
-    Recipe {
-        network,
-        points,
-        batch: 10,
-        epochs: 2,
-        sampling: Sampling::Random,
-        ..Recipe::default()
-    }
+    crate::recipe(
+        "points = 24\nbatch = 10\nepochs = 2\nsampling = \"random\"\n\
+         [network]\ntrunk = [8, 12, 16]\nt_net = [8, 16]\nt_net_head = [8]\nhead = [12, 10]\n",
+    )
 }
 
 fn card(clouds: &Clouds) -> ModelCard {
@@ -71,8 +59,8 @@ fn before_the_first_step_the_network_computes_what_the_model_does() {
     }
 }
 
-/// A batch norm that normalises by a batch hardly changes what a folded layer computes:
-/// the first loss is that of the model, not of random numbers.
+/// A batch norm that normalises by a batch hardly changes what a folded layer computes: the first
+/// loss is that of the model, not of random numbers.
 #[test]
 fn a_folded_model_keeps_what_it_has_learnt_in_training() {
     let clouds = crate::clouds(60);

@@ -16,6 +16,12 @@ mod robust;
 use formats::labelled::{LabelledSet, equal_offsets};
 use formats::rng::StreamKey;
 use train::clouds::Clouds;
+use train::recipe::Recipe;
+
+/// The recipe with this TOML.
+fn recipe(text: &str) -> Recipe {
+    toml::from_str(text).unwrap()
+}
 
 /// `n` clouds of 32 points in three classes: a ball, a disc, a rod.
 fn clouds(n: usize) -> Clouds {

@@ -1,5 +1,5 @@
-//! The reference network: everything in f64 by plain loops, with duplicated points
-//! instead of weights.
+//! The reference network: everything in f64 by plain loops, with duplicated points instead of
+//! weights.
 
 use std::collections::BTreeMap;
 
@@ -21,8 +21,7 @@ pub struct Reference<'a> {
     pub values: &'a Values,
     /// The clouds' points, duplicates and all.
     pub clouds: Vec<Table>,
-    /// The points among which each cloud searches neighbors, if the network has
-    /// EdgeConv layers.
+    /// The points among which each cloud searches neighbors, if the network has EdgeConv layers.
     pub around: Vec<Table>,
     /// The dropout mask. Without it, batch norms use the running statistics.
     pub kept: Option<Matrix>,

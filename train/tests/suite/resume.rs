@@ -3,26 +3,14 @@
 use train::checkpoint;
 use train::error::Error;
 use train::layer::Module;
-use train::recipe::{Recipe, Sampling};
-use train::shape::Shape;
+use train::recipe::Recipe;
 use train::trainer::Trainer;
 
 fn recipe() -> Recipe {
-    let network = Shape {
-        trunk: vec![8, 16],
-        t_net: vec![8, 12],
-        t_net_head: vec![8],
-        head: vec![12],
-        ..Shape::default()
-    };
-    Recipe {
-        network,
-        points: 24,
-        batch: 8,
-        epochs: 4,
-        sampling: Sampling::Random,
-        ..Recipe::default()
-    }
+    crate::recipe(
+        "points = 24\nbatch = 8\nepochs = 4\nsampling = \"random\"\n\
+         [network]\ntrunk = [8, 16]\nt_net = [8, 12]\nt_net_head = [8]\nhead = [12]\n",
+    )
 }
 
 fn parameters(trainer: &mut Trainer) -> Vec<u32> {

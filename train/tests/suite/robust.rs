@@ -1,46 +1,24 @@
-//! What makes a network of whole objects robust: variation, negatives, and weights to
-//! start from.
+//! What makes a network of whole objects robust: variation, negatives, and weights to start from.
 
 use formats::model_card::ModelCard;
 use formats::rng::StreamKey;
 use infer_cpu::{Classifier, Options};
 use train::augment::{augment, varied_too};
-use train::cluster_variation::ClusterVariation;
 use train::init;
 use train::model_file;
 use train::negatives::{Negative, added, negative};
 use train::recipe::{Augment, Recipe, Sampling};
-use train::shape::{Edge, Shape};
 use train::trainer::Trainer;
 
 fn recipe() -> Recipe {
-    let network = Shape {
-        input_transform: false,
-        feature_transform: false,
-        trunk: vec![8, 16],
-        head: vec![12],
-        edges: vec![Edge { radius: 0.5, channels: 4 }],
-        ..Shape::default()
-    };
-    let clusters = ClusterVariation {
-        density: Some([12, 32]),
-        stray_share: 1.0,
-        strays: 2,
-        stray_reach: 0.5,
-        ..ClusterVariation::default()
-    };
-    Recipe {
-        network,
-        clusters,
-        points: 32,
-        batch: 8,
-        sampling: Sampling::Fps,
-        outlier_filter: true,
-        negatives: 0.5,
-        unknown: vec!["unknown".to_owned()],
-        augment: Augment { drop: 0.0, scale: [1.0; 2], shift: 0.0, ..Augment::default() },
-        ..Recipe::default()
-    }
+    crate::recipe(
+        "points = 32\nbatch = 8\nsampling = \"fps\"\noutlier_filter = true\n\
+         negatives = 0.5\nunknown = [\"unknown\"]\n\
+         [network]\ninput_transform = false\nfeature_transform = false\n\
+         trunk = [8, 16]\nhead = [12]\nedges = [{ radius = 0.5, channels = 4 }]\n\
+         [clusters]\ndensity = [12, 32]\nstray_share = 1.0\nstrays = 2\nstray_reach = 0.5\n\
+         [augment]\ndrop = 0.0\nscale = [1.0, 1.0]\nshift = 0.0\n",
+    )
 }
 
 fn largest_radius(cloud: &[[f32; 3]]) -> f32 {
@@ -114,8 +92,7 @@ fn a_negative_fills_the_unit_sphere() {
     }
 }
 
-/// A class that the model lacks is new, and the others are as far from each other as they
-/// were.
+/// A class that the model lacks is new, and the others are as far from each other as they were.
 #[test]
 fn a_network_that_starts_from_a_model_of_fewer_classes_computes_what_the_model_does() {
     let (clouds, folder) = (crate::clouds(24), tempfile::tempdir().unwrap());
