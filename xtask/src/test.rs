@@ -7,6 +7,7 @@ mod meanwhile;
 mod peers;
 pub mod python;
 mod sanitize;
+mod structure;
 mod targets;
 mod test_programs;
 
@@ -23,7 +24,7 @@ const PACKAGES: &str = "xtask/packages.sh";
 /// Flags of `test`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Check only the format, the lints and the unit tests, in a few minutes
+    /// Check only the format, the structure, the lints and the unit tests, in a few minutes
     #[arg(long, conflicts_with = "sanitize")]
     quick: bool,
 
@@ -101,9 +102,10 @@ fn run_all(args: &Args, summary: &mut Summary) {
     fuzz::run(summary, args.fuzz_seconds, fuzz_targets);
 }
 
-/// Checks the format and the lints, which compiles all tests.
+/// Checks the format, the structure and the lints, which compiles all tests.
 fn check_source(summary: &mut Summary) {
     summary.command("format", &mut cargo(&["fmt", "--all", "--check"]));
+    summary.step("structure", structure::check);
     summary.step("lints", |_| {
         let tests = lints::check("lints", compile_all(&["test"]).arg("--no-run"))?;
         // The library of the Python package has no tests.
