@@ -101,5 +101,6 @@ fn princeton_meshes_are_read_in_full_and_agree_with_the_oracle() {
 #[test]
 fn the_720_obj_meshes_are_read_in_full_and_a_sample_agrees_with_the_oracle() {
     let folder = need!(unpacked("meshes20/meshes20.tar.xz"));
-    assert_agreement(&read_in_full(folder.path(), 720), 12);
+    // Of the 36 meshes of each class, one or two.
+    assert_agreement(&read_in_full(folder.path(), 720), 24);
 }

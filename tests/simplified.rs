@@ -160,14 +160,15 @@ fn princeton_keeps_the_bound() {
     let infomr = need!(shared_data("meshes/psb_infomr"));
     let segbench = need!(shared_data("meshes/psb_segbench"));
     for root in [infomr, segbench] {
-        hold_to_the_bound(&root, 2);
+        hold_to_the_bound(&root, 4);
     }
 }
 
 #[test]
 fn a_sample_of_twenty_classes_keeps_the_bound() {
     let folder = need!(unpacked("meshes20/meshes20.tar.xz"));
-    hold_to_the_bound(folder.path(), 12);
+    // Of the 36 meshes of each class, one or two.
+    hold_to_the_bound(folder.path(), 24);
 }
 
 #[test]

@@ -1,7 +1,5 @@
 //! Finite numbers, plausible sizes, open surfaces, connected parts.
 
-use std::collections::{BTreeMap, BTreeSet};
-
 use glam::{DVec3, IVec3};
 use rayon::prelude::*;
 
@@ -57,18 +55,18 @@ fn assert_stands_and_is_of_a_thing_s_size(mesh: &TriangleMesh, what: &str) {
 /// doubled triangles.
 fn is_open(mesh: &TriangleMesh) -> bool {
     let place = |v: DVec3| (v * 1e6).round().to_array().map(|c| c as i64);
-    let mut triangles = BTreeSet::new();
-    let mut edges: BTreeMap<_, u32> = BTreeMap::new();
-    for &triangle in &mesh.triangles {
-        let mut t = corners(mesh, triangle).map(place);
-        t.sort_unstable();
-        if triangles.insert(t) {
-            for edge in [[t[0], t[1]], [t[1], t[2]], [t[0], t[2]]] {
-                *edges.entry(edge).or_default() += 1;
-            }
-        }
-    }
-    edges.values().any(|&n| n == 1)
+    let sorted = |&triangle| {
+        let mut places = corners(mesh, triangle).map(place);
+        places.sort_unstable();
+        places
+    };
+    let mut triangles: Vec<_> = mesh.triangles.iter().map(sorted).collect();
+    triangles.sort_unstable();
+    triangles.dedup();
+    let edges = |[a, b, c]: [_; 3]| [[a, b], [b, c], [a, c]];
+    let mut edges: Vec<_> = triangles.into_iter().flat_map(edges).collect();
+    edges.sort_unstable();
+    edges.chunk_by(|a, b| a == b).any(|same| same.len() == 1)
 }
 
 #[test]
