@@ -260,15 +260,15 @@ impl<S: Simd> Packet<S> {
 
     #[inline(always)]
     fn sheared(&self, corner: &[[f32; LEAF]; 3], i: usize) -> Sheared<S> {
-        let along = self.from_origin(corner, i, 2);
-        let x = self.from_origin(corner, i, 0) - along * self.shear[0];
-        let y = self.from_origin(corner, i, 1) - along * self.shear[1];
+        let along = self.corner_from_origin(corner, i, 2);
+        let x = self.corner_from_origin(corner, i, 0) - along * self.shear[0];
+        let y = self.corner_from_origin(corner, i, 1) - along * self.shear[1];
         Sheared { x, y, along }
     }
 
     /// A coordinate of a corner relative to the origin of each ray.
     #[inline(always)]
-    fn from_origin(&self, corner: &[[f32; LEAF]; 3], i: usize, to: usize) -> f32x8<S> {
+    fn corner_from_origin(&self, corner: &[[f32; LEAF]; 3], i: usize, to: usize) -> f32x8<S> {
         self.by.splat(corner[self.axes[to]][i]) - self.origin[to]
     }
 }
