@@ -16,7 +16,7 @@ use anyhow::{bail, ensure};
 use lints::by_clippy;
 use meanwhile::nice;
 use std::process::Command;
-use xtask::workspace::{cargo, cargo_in_lab, output, root};
+use xtask::workspace::{self, cargo, cargo_in_lab, output, root};
 
 /// The script that lists and installs the packages that tests need.
 const PACKAGES: &str = "xtask/packages.sh";
@@ -80,10 +80,11 @@ fn run_all(args: &Args, summary: &mut Summary) {
     let others = std::thread::scope(|scope| {
         let others = scope.spawn(|| {
             let mut summary = Summary::default();
-            smallest_lints(&mut summary);
-            let mut documentation = cargo_on_all(&["doc", "--no-deps"]);
+            library_lints(&mut summary);
+            let mut documentation = compile_all(&["doc", "--no-deps"]);
             documentation.env("RUSTDOCFLAGS", "--deny warnings");
             summary.command("documentation", &mut nice(&documentation));
+            smallest_lints(&mut summary);
             summary.step("dependencies", |_| infer_cpu_is_light());
             targets::run(&mut summary, install);
             docs::build_site(&mut summary, mdbook);
@@ -106,12 +107,14 @@ fn run_all(args: &Args, summary: &mut Summary) {
 fn check_source(summary: &mut Summary) {
     summary.command("format", &mut cargo(&["fmt", "--all", "--check"]));
     summary.step("structure", structure::check);
-    summary.step("lints", |_| {
-        let tests = lints::check("lints", compile_all(&["test"]).arg("--no-run"))?;
-        // The library of the Python package has no tests.
-        let mut libraries = compile_all(&["build", "--lib", "--profile", "test"]);
-        Ok(tests.and(lints::check("lints", &mut libraries)?))
-    });
+    summary.step("lints", |_| lints::check("lints", compile_all(&["test"]).arg("--no-run")));
+}
+
+/// Lints the libraries without the features that only tests need, the library of the Python package
+/// among them, which has no tests.
+fn library_lints(summary: &mut Summary) {
+    let name = "lints of the libraries";
+    summary.step(name, |_| lints::check(name, &mut nice(&compile_all(&["check", "--lib"]))));
 }
 
 /// Lints the smallest builds: of a first command, and of a machine without a GPU.
@@ -181,13 +184,12 @@ fn tests(summary: &mut Summary, required: bool) -> anyhow::Result<Counts> {
 
 /// The tests in the same files as the code.
 fn unit_tests(summary: &mut Summary) -> anyhow::Result<Counts> {
-    let mut tests = compile_all(&["test", "--no-fail-fast", "--lib"]);
-    // The library of the Python package has no tests, and needs an interpreter to be linked.
-    tests.args(["--exclude", "edgepuck-python"]);
-    for program in ["infer-cpu", "edgepuck-ros2", "xtask"] {
-        tests.args(["--bin", program]);
-    }
-    test_programs::run(summary, &mut tests)
+    let mut cargo = compile_all(&["test", "--no-run"]);
+    cargo.args(["--message-format", "json-render-diagnostics"]);
+    let programs = workspace::unit_tests(&output(&mut cargo)?);
+    programs.into_iter().try_fold(Counts::default(), |counts, mut program| {
+        Ok(counts.and(test_programs::run(summary, &mut program)?))
+    })
 }
 
 /// Lets tests fail without a Vulkan adapter if it is `required`. Otherwise they test the CPU only,

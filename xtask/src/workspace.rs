@@ -118,14 +118,30 @@ pub fn packages(manifest: &str) -> anyhow::Result<Vec<Value>> {
 /// # Errors
 /// Cargo has not built the program.
 pub fn executable(messages: &str, name: &str) -> anyhow::Result<PathBuf> {
-    let messages = messages.lines().filter_map(|m| serde_json::from_str::<Value>(m).ok());
-    let mut programs = messages.filter(|message| {
-        let target = &message["target"];
-        let is_test = message["profile"]["test"].as_bool().unwrap_or(false);
-        target["name"] == name && target["kind"][0] == "bin" && !is_test
+    let mut programs = executables(messages, false).filter(|message| {
+        message["target"]["name"] == name && message["target"]["kind"][0] == "bin"
     });
     let program = programs.find_map(|message| Some(message["executable"].as_str()?.into()));
     program.with_context(|| format!("Cargo has not built the program {name}"))
+}
+
+/// The programs of unit tests, from Cargo's `messages`, each in the folder of its package.
+pub fn unit_tests(messages: &str) -> Vec<Command> {
+    let is_unit = |message: &Value| message["target"]["kind"][0] != "test";
+    let programs = executables(messages, true).filter(is_unit).filter_map(|message| {
+        let mut program = Command::new(message["executable"].as_str()?);
+        program.current_dir(Path::new(message["manifest_path"].as_str()?).parent()?);
+        Some(program)
+    });
+    programs.collect()
+}
+
+/// The messages of Cargo that name an executable, either of tests or of no tests.
+fn executables(messages: &str, are_tests: bool) -> impl Iterator<Item = Value> {
+    let messages = messages.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
+    messages.filter(move |message| {
+        message["profile"]["test"] == are_tests && message["executable"].is_string()
+    })
 }
 
 /// The command line as records and pages show it.
@@ -178,10 +194,13 @@ mod tests {
     fn a_program_is_found_among_tests_and_libraries_of_its_name() {
         let messages = r#"{"reason":"build-script-executed"}
 {"target":{"kind":["lib"],"name":"a"},"profile":{"test":false},"executable":null}
-{"target":{"kind":["bin"],"name":"a"},"profile":{"test":true},"executable":"/t/deps/a-1"}
+{"target":{"kind":["bin"],"name":"a"},"profile":{"test":true},"executable":"/t/deps/a-1","manifest_path":"/a/Cargo.toml"}
 {"target":{"kind":["bin"],"name":"a"},"profile":{"test":false},"executable":"/t/a"}
 not JSON"#;
         assert_eq!(executable(messages, "a").unwrap(), Path::new("/t/a"));
         assert!(executable(messages, "b").is_err());
+        let tests = unit_tests(messages);
+        assert_eq!(tests.len(), 1);
+        assert_eq!(tests[0].get_program(), "/t/deps/a-1");
     }
 }
