@@ -12,8 +12,8 @@ use infer_cpu::sampler::OutlierFilter;
 use infer_cpu::{Classifier, ModelCard, Normalization, Options};
 use std::path::{Path, PathBuf};
 use train::clouds::Clouds;
-use train::evaluate::predictions;
 use train::negatives::{Negative, negative};
+use train::object_report::{Labels, Object, classified};
 
 #[derive(Args, Debug)]
 pub struct RobustnessArgs {
@@ -147,24 +147,21 @@ fn answers(path: &Path, clouds: &Clouds, inputs: &[Input]) -> Result<Table> {
         format!("{name}: right answers of {} objects, filter {shipped} by its card", clouds.len());
     let heading = ["input", "filter off, %", "filter on, %", "called unknown, filter on, %"];
     let mut table = Table::new(title, &heading);
+    let labels = Labels::new(&card.classes, &[]);
     for Input { name, set, is_negative } in inputs {
-        let one = Clouds { set: set.clone(), classes: clouds.classes.clone() };
-        let [off, on] = [false, true].map(|is_on| predictions(path, &one, &filter(is_on)));
-        let (off, on) = (off?, on?);
-        let right = |found: &[infer_cpu::Prediction]| {
-            let labelled = found.iter().zip(&set.labels);
-            let is_right = |(found, label): &(&infer_cpu::Prediction, &usize)| {
-                found.is_unknown == *is_negative && (*is_negative || found.class == **label)
-            };
-            percent(labelled.filter(is_right).count() as f64 / set.len() as f64)
+        let own = || clouds.classes.clone();
+        let classes = if *is_negative { vec!["negative".to_owned()] } else { own() };
+        let one = Clouds { set: set.clone(), classes };
+        let scored = |is_on| classified(path, "", &one, (&labels, 0), &filter(is_on));
+        let (off, on) = (scored(false)?, scored(true)?);
+        let share = |found: &[Object], is_counted: fn(&Object) -> bool| {
+            percent(
+                found.iter().filter(|object| is_counted(object)).count() as f64 / set.len() as f64,
+            )
         };
-        let unknown = on.iter().filter(|found| found.is_unknown).count() as f64;
-        table.push(vec![
-            name.clone(),
-            right(&off),
-            right(&on),
-            percent(unknown / set.len() as f64),
-        ]);
+        let rights = [&off, &on].map(|found| share(found, Object::is_right));
+        let unknown = share(&on, |object| object.answer.class.is_none());
+        table.push([vec![name.clone()], rights.into(), vec![unknown]].concat());
     }
     Ok(table)
 }
