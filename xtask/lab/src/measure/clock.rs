@@ -1,8 +1,7 @@
-//! What a piece of work costs.
+//! The cost of a piece of work.
 //!
-//! Machines are shared, so wall time says as much about the neighbours as
-//! about the work. CPU time of the whole process is the figure to compare:
-//! it holds rayon's threads, and lavapipe's, which live in this process too.
+//! Wall time on a shared machine depends on its other users. The figure to compare is the CPU time of
+//! the whole process, with the threads of rayon and lavapipe.
 
 use cpu_time::ProcessTime;
 use serde::{Deserialize, Serialize};

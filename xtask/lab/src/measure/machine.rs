@@ -1,4 +1,4 @@
-//! What a benchmark record must say of the machine and the program.
+//! The machine and the program of a benchmark record.
 
 use serde::Serialize;
 use sim_gpu::internals::gpu::list_adapters;
@@ -16,7 +16,7 @@ pub struct Machine {
     /// The commit of the working tree, `+` behind it if it has changes; `None`
     /// outside a clone.
     pub commit: Option<String>,
-    /// The processor's name; `None` where the system does not tell.
+    /// The processor's name, where the system states it.
     pub cpu: Option<String>,
     pub threads: usize,
     pub system: String,
@@ -58,8 +58,7 @@ impl Machine {
     }
 }
 
-/// The most memory this process has held so far, bytes; `None` where the
-/// system does not tell.
+/// The peak memory of this process, bytes, where the system states it.
 pub fn peak_memory_bytes() -> Option<u64> {
     let text = field("/proc/self/status", "VmHWM")?;
     let kibibytes: u64 = text.trim_end_matches("kB").trim().parse().ok()?;

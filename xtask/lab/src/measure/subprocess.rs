@@ -7,7 +7,7 @@ use std::fmt::Display;
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
-/// The process; it ends when its input does.
+/// The process; it ends when its input is closed.
 pub struct Subprocess {
     child: Child,
     input: Option<ChildStdin>,

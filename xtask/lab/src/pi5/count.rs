@@ -134,7 +134,7 @@ fn is_kernel(name: &str) -> bool {
     ["gemv::gemv", "fps::step"].iter().chain(&tiles).any(|part| name.contains(part))
 }
 
-/// Whether the function runs on all threads, rather than on the caller's.
+/// Whether the function runs on all threads instead of the caller's alone.
 fn is_shared(name: &str) -> bool {
     let parts = ["kernel::", "engine::chunks", "edge_conv::"];
     matches!(name, "memcpy" | "memset") || parts.iter().any(|part| name.contains(part))

@@ -35,7 +35,7 @@ pub struct Tile {
     pub inputs: usize,
 }
 
-/// All kernels that the model of the Raspberry Pi knows.
+/// All kernels in the model of the Raspberry Pi.
 pub struct Kernels {
     /// In the order of [`Number::ALL`].
     tiles: Vec<Tile>,

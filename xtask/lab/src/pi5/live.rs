@@ -1,4 +1,4 @@
-//! What `infer-cpu live` takes of a Raspberry Pi 5, by stage: instructions under QEMU at a flat
+//! The load of `infer-cpu live` on a Raspberry Pi 5, by stage: instructions under QEMU at a flat
 //! number of them a cycle.
 
 use super::count::{Counter, Counts};
@@ -13,9 +13,9 @@ use std::path::{Path, PathBuf};
 const CLUSTERS: f64 = 20.0;
 const TURNS_HZ: f64 = 10.0;
 
-/// A stage, and what the names of its functions contain. The first stage that fits has a function;
-/// what the compiler has moved into the pipeline's loop, and what several stages call, is the last
-/// one's.
+/// A stage, and parts of the names of its functions. A function belongs to the first stage that
+/// fits. Code that the compiler has moved into the pipeline's loop, and code that several stages
+/// call, belongs to the last.
 const STAGES: [(&str, &[&str]); 5] = [
     ("decode packets", &["live::sensor", "live::packet_clock", "formats::"]),
     ("boxes and tracks", &["oriented_box", "live::tracker", "live::kalman", "live::object"]),

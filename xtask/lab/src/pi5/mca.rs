@@ -14,7 +14,7 @@ const LEAST_VERSION: u32 = 19;
 /// Releases looked for by name, the newest first, before plain `llvm-mca`.
 const VERSIONS: std::ops::RangeInclusive<u32> = LEAST_VERSION..=24;
 const CORE: &str = "neoverse-n1";
-/// Times that code is repeated, so that getting under way weighs nothing.
+/// Repetitions of the code, enough to make its start negligible.
 const ITERATIONS: u32 = 1000;
 
 /// An llvm-mca that models the core.

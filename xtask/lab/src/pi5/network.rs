@@ -25,7 +25,7 @@ pub struct Net {
     pub fcs: Vec<Layer>,
 }
 
-/// The layers of a PointNet; a part that it lacks has none.
+/// The layers of a PointNet; missing parts are empty.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Network {
     pub stn: Net,

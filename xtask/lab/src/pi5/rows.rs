@@ -131,7 +131,7 @@ pub fn times(rows: &[PiRow]) -> Table {
     Table::of(title, rows, &columns)
 }
 
-/// The inner loops and what llvm-mca makes of them.
+/// The inner loops and their costs by llvm-mca.
 pub fn kernels(kernels: &Kernels, version: &str) -> Table {
     let share = |kernel: &Kernel| Some(format!("{:.1}", kernel.share_of_peak()? * 100.0));
     let columns: [Column<'_, &Kernel>; 6] = [

@@ -11,7 +11,7 @@ pub struct Chapter {
     /// Its anchor: letters and hyphens.
     pub id: String,
     pub tab: String,
-    /// Its heading: what a reader wants to know.
+    /// Its heading, a question.
     pub title: String,
     pub body: Markup,
 }

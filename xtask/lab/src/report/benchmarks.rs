@@ -87,7 +87,7 @@ impl Comparison {
         self.classifying.iter().filter(|measured| measured.setting == 1)
     }
 
-    /// The fastest of ours and of the others at the baseline's number of points.
+    /// The fastest engine of ours and of others at the baseline's number of points.
     fn message(&self) -> String {
         const POINTS: usize = 1024;
         let fastest = |ours: bool| {

@@ -16,8 +16,7 @@ use sim_gpu::internals::sensor::{Layout, Rotating, SensorProfile, Uniform, Views
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// The folder that was asked for, or else `folder`, with built-in shapes: `train` and `test` of
-/// each class.
+/// The folder `asked`, or `folder` with built-in shapes: `train` and `test` of each class.
 pub fn meshes(
     asked: Option<&Path>,
     folder: &Path,

@@ -31,7 +31,7 @@ pub struct Comparison {
     view: u32,
     pub adapter: String,
     points: [usize; 2],
-    /// Beams that see another surface, or none.
+    /// Beams that see another surface or miss.
     silhouettes: Vec<u32>,
     /// Of them, those without a silhouette nearby.
     unexplained: usize,

@@ -1,5 +1,5 @@
-//! What a study keeps, so that an interrupted run can be resumed: networks, which
-//! are trained once, results, and the terms of the study.
+//! The files that let an interrupted study be resumed: networks, which are trained once, results, and
+//! the terms of the study.
 
 use std::fs;
 use std::path::Path;
@@ -12,8 +12,7 @@ use train::clouds::Clouds;
 use train::recipe::Recipe;
 use train::run::{Job, Progress};
 
-/// Trains the network called `name` by `recipe` on `clouds` and writes it to
-/// `out`, unless it is there.
+/// Trains the network `name` by `recipe` on `clouds` and writes it to `out`, unless it exists.
 pub fn network(out: &Path, name: &str, recipe: Recipe, clouds: &Clouds) -> anyhow::Result<()> {
     if out.is_file() {
         let trained = Recipe::read(&out.with_extension("run").join("recipe.toml"))?;
@@ -40,8 +39,7 @@ pub fn of_steps(recipe: Recipe, steps: u32, clouds: usize) -> Recipe {
     Recipe { epochs: steps.div_ceil(each).max(1), ..recipe }
 }
 
-/// The result in the JSON file at `path`, or else the one that `make` gives, which
-/// is then written there.
+/// The result in the JSON file at `path`, or the result of `make`, which is written there.
 pub fn result<T: Serialize + DeserializeOwned>(
     path: &Path,
     make: impl FnOnce() -> anyhow::Result<T>,

@@ -157,7 +157,7 @@ impl Network {
         }
     }
 
-    /// The log-probabilities of `points`, which are taken as they are.
+    /// The log-probabilities of `points`, without normalisation.
     pub fn log_probabilities(&self, points: &[[f32; 3]]) -> Result<Vec<f64>> {
         let value: Vec<f64> = points.as_flattened().iter().map(|&x| f64::from(x)).collect();
         let exact = Rows { width: 3, bound: vec![0.0; value.len()], value };

@@ -40,7 +40,7 @@ pub enum Arithmetic {
 /// An engine in tables and records.
 #[derive(Clone, Debug, Serialize)]
 pub struct Label {
-    /// Its name, which `--engines` takes.
+    /// Its name in `--engines`.
     #[serde(rename = "engine")]
     pub name: String,
     pub arithmetic: Arithmetic,

@@ -49,7 +49,7 @@ struct Plan {
     cost_rounds: usize,
     /// Meshes on which costs are measured.
     cost_meshes: usize,
-    /// How all networks are trained, as `train --recipe` takes it.
+    /// The recipe of all networks, as for `train --recipe`.
     recipe: Recipe,
     /// The first is what the others are compared with.
     row: Vec<Row>,

@@ -35,7 +35,7 @@ pub struct StreetsArgs {
 const STREET: &str = include_str!("../../../../../assets/scenes/street.toml");
 const NETWORK: &str = include_str!("../../../../../assets/recipes/street-128.toml");
 
-/// The class of objects that should be called nothing.
+/// The class of objects that should be answered as `unknown`.
 const NEGATIVES: &str = "negatives";
 
 /// The name of the real objects as a set to test on.

@@ -35,7 +35,7 @@ const MODELS: [&str; 3] = ["edge-64", "pointnet-64", "pointnet-1024"];
 /// Half a unit in the last place of f64, relative.
 const U64: f64 = 1.0 / (1u64 << 53) as f64;
 
-/// One value of one parameter, the others being as they are by default.
+/// One value of one parameter, with the defaults of the others.
 #[derive(Clone, Copy)]
 pub struct Setting {
     /// The parameter: scale, offset, distance, N (points or triangles), K (inputs).
@@ -49,7 +49,7 @@ fn settings(all: &[(&'static str, &[f64])]) -> Vec<Setting> {
 }
 
 impl Setting {
-    /// The value of `parameter`, which is `default` unless the setting is of it.
+    /// The value of `parameter`: that of the setting, or `default`.
     fn of(&self, parameter: &str, default: f64) -> f64 {
         if self.parameter == parameter { self.value } else { default }
     }

@@ -1,5 +1,5 @@
-//! Model files that end early: what a layer gives, pooled, comes out as logits
-//! through an identity, computed by `infer-cpu` itself.
+//! Model files that end early: the pooled outputs of a layer become logits through an identity,
+//! computed by `infer-cpu` itself.
 
 use std::collections::BTreeMap;
 use std::path::Path;

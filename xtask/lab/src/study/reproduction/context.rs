@@ -147,7 +147,7 @@ pub fn test(
 #[serde(deny_unknown_fields)]
 pub struct Plan {
     pub about: String,
-    /// Clouds of each class that are learnt from at most, and tested on.
+    /// Most clouds of each class, to train on and to test with.
     pub most_per_class: Option<[usize; 2]>,
     /// Steps of every training on scans and surfaces of meshes, which differ in
     /// size; `recipe.epochs` counts for clouds.
@@ -163,11 +163,11 @@ pub struct Plan {
     pub mesh_points: usize,
     /// Clouds that LIME-3D explains.
     pub explained: usize,
-    /// Clouds with parts taken away, of each.
+    /// Samples of each cloud, with parts removed.
     pub lime_samples: usize,
     /// Random subsets that critical points are compared with.
     pub draws: u32,
-    /// How all networks are trained, but for what an experiment is about.
+    /// The recipe of all networks, before the changes of an experiment.
     pub recipe: Recipe,
 }
 

@@ -135,7 +135,7 @@ fn experiments(context: &ExperimentContext) -> anyhow::Result<()> {
 
 type Experiment = fn(&ExperimentContext) -> anyhow::Result<Section>;
 
-/// In this order each finds the networks that it shares with those before it.
+/// The order lets each experiment find the networks that it shares with earlier ones.
 const EXPERIMENTS: [(&str, Experiment); 6] = [
     ("1-points", samplers::by_count),
     ("2-matrix", sets::matrix),

@@ -150,7 +150,8 @@ impl Plan {
 }
 
 impl Task {
-    /// Tars differ in what they cost: each round takes another, a sixteenth of all tars before the last.
+    /// The costs of tars differ: each round takes another one, a sixteenth of all tars before the
+    /// last.
     fn shard_in(&self, round: u64) -> [u64; 2] {
         let [number, of] = self.shard;
         [number - round * (of / 16), of]

@@ -1,4 +1,4 @@
-//! Sweeps whose points know their laser and their time, real and simulated.
+//! Sweeps with the laser and the time of each point, real and simulated.
 
 use crate::measure::bench_mesh::target;
 use anyhow::{Context, Result, bail};

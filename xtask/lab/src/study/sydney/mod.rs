@@ -217,7 +217,7 @@ impl Folds {
         self.fold.iter().copied().collect::<BTreeSet<_>>().into_iter().collect()
     }
 
-    /// The clouds to learn from where `fold` is tested, and those to test with.
+    /// The clouds to train on when `fold` is tested, and those of `fold`.
     pub fn split(&self, fold: u32) -> [Clouds; 2] {
         [false, true].map(|is_tested| {
             let is_in = |&i: &usize| (self.fold[i] == fold) == is_tested;
@@ -226,7 +226,7 @@ impl Folds {
     }
 }
 
-/// An object's class, and the class that it was given.
+/// An object's class, and its answer.
 pub type Answer = (usize, usize);
 
 /// F1 of `class`, and how many objects it has.
@@ -250,11 +250,11 @@ pub fn mean(answers: &[Vec<Vec<Answer>>]) -> f64 {
     all.iter().sum::<f64>() / all.len().max(1) as f64
 }
 
-/// How often objects are drawn anew for an interval.
+/// Bootstrap draws for an interval.
 const DRAWS: u32 = 1000;
 
-/// The 95 % interval of `statistic` over objects that are drawn anew from each fold, the
-/// same ones for all networks (Efron's bootstrap, percentiles).
+/// The 95 % interval of `statistic` over bootstrap draws of the objects of each fold, the same for
+/// all networks (Efron, percentiles).
 pub fn interval<const N: usize>(
     networks: [&[Vec<Vec<Answer>>]; N],
     statistic: impl Fn([f64; N]) -> f64,

@@ -141,7 +141,7 @@ fn assess(
     Ok(Scanned { row, clouds })
 }
 
-/// The ranges of all rays fired: none where a ray was left out.
+/// The ranges of all fired rays; `None` for culled rays.
 fn of_fired(aimed: &RaySet, ranges: &Ranges, fired: &RaySet) -> Ranges {
     let by_beam: HashMap<u32, Option<f64>> =
         aimed.job.beams.iter().copied().zip(ranges.iter().copied()).collect();

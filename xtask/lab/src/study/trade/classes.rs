@@ -80,7 +80,7 @@ impl TestSet {
         pairs.filter(|(label, answer)| *answer == Some(label.as_str())).count()
     }
 
-    /// Fails if `model` does not know one of the classes.
+    /// Fails if `model` lacks one of the classes.
     pub fn fits(&self, model: &Path) -> Result<()> {
         let classifier = Classifier::load(model, &Options::default())?;
         let known = classifier.classes();

@@ -79,7 +79,7 @@ pub fn rows(model: &Path, set: &TestSet, quick: bool, rounds: usize) -> Result<V
     Ok(rows.concat())
 }
 
-/// A setting, and what came of it.
+/// A setting with its answers and its row.
 struct Measured {
     setting: Classifying,
     answers: Answers,
@@ -216,8 +216,7 @@ fn pi_ms(setting: &Classifying, from: usize, pi: Option<&Modelled>) -> Option<Ve
     .unwrap_or_default()
 }
 
-/// The bundled models that know the classes of `set`, of those the ones with the fewest
-/// classes.
+/// The bundled models with all classes of `set` and the fewest classes in all.
 pub fn bundled(set: &TestSet) -> Result<Vec<PathBuf>> {
     let folder = xtask::workspace::root().join("assets/weights");
     let entries =

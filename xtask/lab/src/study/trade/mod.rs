@@ -111,7 +111,7 @@ fn name_of_meshes(args: &TradeArgs) -> String {
     format!("scans of {}", named.as_deref().unwrap_or("shapes of our own"))
 }
 
-/// The models that know the classes of `set`: the one asked for, or bundled ones.
+/// The models with the classes of `set`: that of `--model`, or bundled ones.
 fn models_for(args: &TradeArgs, set: &TestSet) -> Result<Vec<PathBuf>> {
     if let Some(model) = &args.model {
         set.fits(model)?;

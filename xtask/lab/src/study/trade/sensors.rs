@@ -68,7 +68,7 @@ impl Scanning {
         }
     }
 
-    /// From one firing to the next; cameras and rosettes have none.
+    /// The angle from one firing to the next; `None` for cameras and rosettes.
     pub fn azimuth_step_deg(&self) -> Option<f64> {
         let step_deg = match &self.sensor.layout {
             Layout::Rotating(rotating) => 360.0 * rotating.sequence_us * 1e-6 / rotating.period_s(),
@@ -110,7 +110,7 @@ impl Scanning {
     }
 }
 
-/// Each parameter by itself, the others as in the reference.
+/// Each parameter changed alone, the others as in the reference.
 pub fn one_at_a_time() -> Vec<Scanning> {
     let reference = Scanning::reference;
     let mut all = vec![reference()];
