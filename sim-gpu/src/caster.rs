@@ -23,21 +23,21 @@ pub enum OpenCaster {
 pub enum Casting {
     /// Already done, on the CPU.
     Done(Vec<Cast>),
-    /// On their way through the adapter.
+    /// In flight on the adapter.
     #[cfg(feature = "gpu")]
     Pending(Box<Pending>),
 }
 
-/// Which adapter is to cast.
+/// The choice of an adapter.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum AdapterRequest {
-    /// The best GPU that opens, or else the CPU. Software Vulkan has to be named: it
+    /// The best GPU that opens, or else the CPU. Software Vulkan must be named: it
     /// runs on the same cores as the CPU caster and is slower.
     #[default]
     Auto,
     /// The CPU, without any graphics driver.
     Cpu,
-    /// The first adapter whose name holds this text, letter case ignored.
+    /// The first adapter whose name contains this text, ignoring case.
     Named(String),
 }
 
@@ -111,7 +111,7 @@ impl OpenCaster {
         }
     }
 
-    /// The effects that are modelled.
+    /// The effects that the caster models.
     #[must_use]
     pub fn effects(&self) -> &Effects {
         match self {
@@ -121,8 +121,7 @@ impl OpenCaster {
         }
     }
 
-    /// Whether `target` fits the adapter's bindings; if not, the CPU has to
-    /// cast at it.
+    /// Whether `target` fits the adapter's bindings; if not, the CPU must cast at it.
     #[must_use]
     #[cfg_attr(not(feature = "gpu"), expect(unused_variables, reason = "the CPU takes any target"))]
     pub fn fits(&self, target: &Target) -> bool {
@@ -133,7 +132,7 @@ impl OpenCaster {
         }
     }
 
-    /// Starts casting `jobs` all together.
+    /// Starts casting all `jobs` together.
     ///
     /// # Errors
     /// If the device is lost or out of memory, or a target does not fit.

@@ -1,4 +1,4 @@
-//! Where a sensor stands and how it is turned.
+//! Positions and orientations of sensors and instances.
 //!
 //! Sensor frame: x forward, y left, z up, right-handed (ROS REP 103). World
 //! frame: z up, right-handed, metres.
@@ -17,13 +17,12 @@ pub use trajectory::Trajectory;
 mod orientation;
 mod trajectory;
 
-/// Where a sensor or an instance of a mesh is in the world.
+/// The position and the orientation of a sensor, or of an instance of a mesh, in the world.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
     /// The origin of its frame in the world, metres.
     pub position_m: DVec3,
-    /// Turns vectors of its frame into the world frame; of unit length, written
-    /// `[x, y, z, w]`.
+    /// Turns vectors of its frame into the world frame; of unit length, written `[x, y, z, w]`.
     #[serde(rename = "quaternion_xyzw")]
     pub rotation: DQuat,
 }
@@ -48,17 +47,16 @@ impl Pose {
         Self { rotation: self.rotation * turn, ..self }
     }
 
-    /// `distance_m` from the origin at this elevation and azimuth (counterclockwise from x), looking
-    /// at the origin.
+    /// `distance_m` from the origin at this elevation and azimuth (counterclockwise from x),
+    /// looking at the origin.
     #[must_use]
     pub fn looking_at_origin_deg(distance_m: f64, elevation_deg: f64, azimuth_deg: f64) -> Self {
         let (elevation_rad, azimuth_rad) = (elevation_deg.to_radians(), azimuth_deg.to_radians());
         Self::view(distance_m, elevation_rad, azimuth_rad, DVec3::ZERO)
     }
 
-    /// The sensor at `position_m` that looks at `target_m`, upright: its left
-    /// axis is level. Straight above or below the target, where upright means
-    /// nothing, it is turned as a sensor that came there along azimuth 0.
+    /// The sensor at `position_m` that looks at `target_m`, upright, with a level left axis.
+    /// Straight above or below the target, its orientation is the limit along azimuth 0.
     ///
     /// # Errors
     ///
@@ -72,7 +70,7 @@ impl Pose {
         if to_target == DVec3::ZERO {
             return Err(InvalidValue::new("look_at_m", "expected another point than the position"));
         }
-        // Scaled first, so that neither a square overflows nor one vanishes.
+        // Scaled first, so that squares neither overflow nor vanish.
         let to_target = to_target / to_target.abs().max_element();
         if !to_target.is_finite() {
             return Err(InvalidValue::new(
@@ -88,7 +86,7 @@ impl Pose {
 
     /// The sensor that stands `distance_m` from `target_m` at this elevation
     /// and azimuth (radians, counterclockwise from world x) and looks at it.
-    /// The azimuth decides how it is turned even at elevation +-90 degrees.
+    /// The azimuth determines the orientation even at elevation +-90 degrees.
     #[must_use]
     pub fn view(distance_m: f64, elevation_rad: f64, azimuth_rad: f64, target_m: DVec3) -> Self {
         Self {
@@ -98,9 +96,8 @@ impl Pose {
     }
 }
 
-/// `count` views of `target_m` at equal distance and elevation, spread evenly
-/// over the full circle from the first azimuth on, counterclockwise. None for
-/// a count of 0.
+/// `count` views of `target_m` at equal distance and elevation, spread evenly over the full circle
+/// from the first azimuth on, counterclockwise. None for a count of 0.
 #[must_use]
 pub fn ring_of_views(
     count: u32,
@@ -152,7 +149,7 @@ struct PosesFile {
     pose: Vec<PoseKeys>,
 }
 
-/// The poses of what stands in `file`.
+/// The poses in the text of `file`.
 fn poses(PosesFile { pose }: PosesFile, file: &Path) -> Result<Vec<Pose>, ConfigError> {
     let tables = pose.iter().enumerate();
     let poses: Result<_, InvalidValue> =
@@ -160,8 +157,8 @@ fn poses(PosesFile { pose }: PosesFile, file: &Path) -> Result<Vec<Pose>, Config
     poses.map_err(|invalid| invalid.in_file(file))
 }
 
-/// The rotation of a sensor that stands at this elevation and azimuth as seen
-/// from its target, and looks at the target with a level left axis.
+/// The rotation of a sensor at this elevation and azimuth from its target that looks at the target
+/// with a level left axis.
 fn facing_inwards(elevation_rad: f64, azimuth_rad: f64) -> DQuat {
     let (sin_azimuth, cos_azimuth) = azimuth_rad.sin_cos();
     let forward = -outwards(elevation_rad, azimuth_rad);

@@ -1,4 +1,4 @@
-//! A mesh made ready for casting.
+//! Meshes prepared for casting.
 
 use crate::bvh::{Builder, Bvh};
 use crate::mesh::frame::{Normalize, to_world};
@@ -13,20 +13,20 @@ pub use crate::mesh::unit_frame::UnitFrame;
 /// The surface of a mesh in its unit frame, in f64.
 #[derive(Clone, Debug)]
 pub struct Surface {
-    /// How the object's frame maps to the unit frame.
+    /// The map from the object's frame to the unit frame.
     pub frame: UnitFrame,
-    /// Radius of a sphere around the unit frame's origin that holds every
-    /// triangle, with room for the caster's rounding.
+    /// The radius of a sphere around the unit frame's origin that contains every triangle, with a
+    /// margin for the casters' rounding.
     pub radius: f64,
     vertices: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
-    /// The same, the corners of each in the order of their coordinates.
+    /// The same triangles, with corners sorted by coordinates.
     sorted: Vec<[u32; 3]>,
     kept: Vec<u32>,
 }
 
-/// A mesh made ready for casting: its surface for ranges, and a hierarchy over
-/// it in f32 for finding them. A clone shares both.
+/// A mesh prepared for casting: its surface in f64 for ranges, and a hierarchy in f32 for the
+/// search. A clone shares both.
 #[derive(Clone, Debug)]
 pub struct Target {
     /// The surface, in f64.
@@ -36,8 +36,7 @@ pub struct Target {
 }
 
 impl Surface {
-    /// The triangles of `mesh` that a ray can meet: all that are neither
-    /// degenerate nor duplicates.
+    /// The surface of the triangles of `mesh` that are neither degenerate nor duplicates.
     #[must_use]
     pub fn of_mesh(mesh: TriangleMesh) -> Self {
         let kept = triangle_stats(&mesh).kept;
@@ -56,9 +55,7 @@ impl Surface {
         &self.triangles
     }
 
-    /// The triangles of `mesh` whose indices `kept` lists, ascending;
-    /// `mesh::validate::triangle_stats` lists those that are neither degenerate nor
-    /// duplicates.
+    /// The surface of the triangles of `mesh` with the indices `kept`, ascending.
     #[must_use]
     pub fn new(mesh: TriangleMesh, kept: Vec<u32>) -> Self {
         let used = kept
@@ -69,8 +66,7 @@ impl Surface {
         let farthest = used.map(|v| frame.to_unit(v).length_squared()).fold(0.0, f64::max).sqrt();
         let mut vertices = mesh.vertices;
         vertices.iter_mut().for_each(|v| *v = frame.to_unit(*v));
-        // The sphere must hold the padded boxes' contents as the caster rounds
-        // them: 2^-18 per axis (`bvh::BOX_PADDING`), times sqrt(3).
+        // More than the padding of boxes, 2^-18 on each axis (`bvh::BOX_PADDING`), times sqrt(3).
         let radius = farthest + 1e-5;
         let sorted = mesh.triangles.iter().map(|&corners| sorted(corners, &vertices)).collect();
         Self { frame, radius, vertices, triangles: mesh.triangles, sorted, kept }
@@ -82,8 +78,8 @@ impl Surface {
         self.triangles[index as usize].map(|v| self.vertices[v as usize])
     }
 
-    /// How much of each corner of triangle `index` there is in `point`, which lies in its
-    /// plane, in the unit frame: from 0 to 1, together 1.
+    /// The barycentric coordinates in triangle `index` of `point`, which lies in its plane in the
+    /// unit frame: each from 0 to 1, in sum 1.
     #[must_use]
     pub fn barycentric(&self, index: u32, point: DVec3) -> DVec3 {
         let [a, b, c] = self.corners(index);
@@ -93,12 +89,12 @@ impl Surface {
         let of_b = (to_point.cross(to_c).dot(normal) / twice_area).clamp(0.0, 1.0);
         let of_c = (to_b.cross(to_point).dot(normal) / twice_area).clamp(0.0, 1.0 - of_b);
         let shares = DVec3::new(1.0 - of_b - of_c, of_b, of_c);
-        // The area of a tiny triangle may underflow; all of it is one place then.
+        // The area of a tiny triangle may underflow; any point of it will do.
         if shares.is_finite() { shares } else { DVec3::splat(1.0 / 3.0) }
     }
 
-    /// As [`corners`](Self::corners), in the order of their coordinates: triangles of
-    /// the same three corners are the same here.
+    /// As [`corners`](Self::corners), sorted by coordinates: triangles with the same three corners
+    /// give the same.
     #[must_use]
     #[inline]
     pub(crate) fn sorted_corners(&self, index: u32) -> [DVec3; 3] {
@@ -111,7 +107,7 @@ impl Surface {
         &self.kept
     }
 
-    /// How many triangles a ray can meet.
+    /// The number of triangles that a ray can meet.
     #[must_use]
     pub fn len(&self) -> usize {
         self.kept.len()
@@ -125,8 +121,8 @@ impl Surface {
 }
 
 impl Target {
-    /// Reads the mesh at `path`, turns it z up as its format has it, scales it
-    /// as `normalize` says, and makes it ready for casting.
+    /// Reads the mesh at `path`, turns it z up by the default of its format, applies `normalize`,
+    /// and prepares it for casting.
     ///
     /// # Errors
     /// As [`load`].
@@ -150,7 +146,7 @@ impl Target {
         Self { surface: Arc::new(surface), bvh: Arc::new(bvh) }
     }
 
-    /// Bytes held, for memory budgets.
+    /// The bytes that it takes, for memory budgets.
     #[must_use]
     pub fn bytes(&self) -> usize {
         let Surface { vertices, triangles, sorted, kept, .. } = &*self.surface;
@@ -162,7 +158,7 @@ impl Target {
     }
 }
 
-/// `corners` in the order of their coordinates.
+/// `corners` sorted by coordinates.
 fn sorted(mut corners: [u32; 3], vertices: &[DVec3]) -> [u32; 3] {
     corners.sort_unstable_by(|&a, &b| {
         let [p, q] = [a, b].map(|v| vertices[v as usize]);

@@ -16,7 +16,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 /// ```
 /// # use sim_gpu::Sensor;
 /// let sensor = Sensor::named("vlp32c")?;
-/// assert_eq!(sensor.directions().len(), 57_888);
+/// assert_eq!(sensor.directions().len(), 57_870);
 /// assert_eq!(sensor.rings().iter().max(), Some(&31));
 /// # Ok::<(), sim_gpu::Error>(())
 /// ```

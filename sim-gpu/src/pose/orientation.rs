@@ -7,7 +7,7 @@ use serde::Deserialize;
 use super::Pose;
 use crate::config::{InvalidValue, finite};
 
-/// The keys of a pose, as read; at most one way of orientation at a time.
+/// The keys of a pose, as read, with at most one of the orientations.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct PoseKeys {
@@ -21,13 +21,13 @@ pub(crate) struct PoseKeys {
     pub pitch_deg: Option<f64>,
     /// Angle about x, applied first.
     pub roll_deg: Option<f64>,
-    /// A rotation, of any length but 0.
+    /// A quaternion of any length but 0.
     pub quaternion_xyzw: Option<[f64; 4]>,
 }
 
 impl PoseKeys {
-    /// The pose of a sensor, which must state its orientation. `table` is the
-    /// path of the TOML table, for errors.
+    /// The pose of a sensor, whose orientation is required. `table` is the path of the TOML table,
+    /// for errors.
     pub fn pose(&self, table: &str) -> Result<Pose, InvalidValue> {
         let position_m = self.position_m(table)?;
         if let Some(target_m) = self.look_at_m {
@@ -94,6 +94,6 @@ fn quaternion(key: &str, xyzw: [f64; 4]) -> Result<DQuat, InvalidValue> {
     if largest == 0.0 {
         return Err(InvalidValue::new(key, "expected a rotation, found 0"));
     }
-    // Scaled first, so that no square overflows or vanishes.
+    // Scaled first, so that squares neither overflow nor vanish.
     Ok(DQuat::from_array(xyzw.map(|value| value / largest)).normalize())
 }

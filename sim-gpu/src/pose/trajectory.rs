@@ -9,8 +9,8 @@ use glam::DQuat;
 use super::Pose;
 use crate::config::InvalidValue;
 
-/// Poses at times, ascending. In between, positions are interpolated linearly and rotations
-/// along the shortest turn at an even rate; before the first and after the last they stay.
+/// Poses at ascending times. In between, positions are interpolated linearly and rotations along
+/// the shortest arc at a constant rate; before the first and after the last, poses are constant.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trajectory(Vec<(f64, Pose)>);
 
@@ -18,7 +18,7 @@ impl Trajectory {
     /// These poses at these times, seconds.
     ///
     /// # Errors
-    /// No pose; a time that is not after the one before; numbers that are not finite.
+    /// If there is no pose, times do not ascend, or a number is not finite.
     pub fn new(poses: Vec<(f64, Pose)>) -> Result<Self, InvalidValue> {
         if poses.is_empty() {
             return Err(InvalidValue::new("trajectory", "expected a pose, found none"));
@@ -65,7 +65,7 @@ impl Trajectory {
         }
     }
 
-    /// How far, in metres and in radians, it comes at most from where it is at `from_s`, until
+    /// Bounds of the distance, metres, and the turn, radians, from the pose at `from_s` until
     /// `to_s`.
     #[must_use]
     pub fn reach(&self, from_s: f64, to_s: f64) -> (f64, f64) {
@@ -75,8 +75,8 @@ impl Trajectory {
         let mut turned_rad = 0.0;
         let (mut far_m, mut before) = (0.0f64, start);
         for pose in poses {
-            // A straight way between two poses is nowhere farther than at its ends; a turn is
-            // no more than the sum of its parts.
+            // The distance along a line is largest at one of its ends, and a turn is at most the
+            // sum of its parts.
             far_m = far_m.max(pose.position_m.distance(start.position_m));
             turned_rad += before.rotation.angle_between(pose.rotation);
             before = pose;
@@ -84,7 +84,7 @@ impl Trajectory {
         (far_m, turned_rad)
     }
 
-    /// From when to when poses are known, seconds.
+    /// The times of the first and the last pose, seconds.
     #[must_use]
     pub fn known_s(&self) -> [f64; 2] {
         [self.0[0].0, self.0[self.0.len() - 1].0]

@@ -1,10 +1,9 @@
-//! Scans: what a sensor measures of objects.
+//! Scans of objects.
 //!
-//! [`scan()`] is the whole way in one call; [`scan_many`] casts many scans
-//! together, which keeps a GPU busy; [`scan_objects`] looks at several objects
-//! at once. All three aim the sensor's beams ([`ScanRequest::aim`]), cast them
-//! ([`OpenCaster::cast`]), solve the ranges ([`resolve`]) and make points of them
-//! ([`assemble`]).
+//! [`scan()`] scans one object; [`scan_many`] casts many scans together, which keeps a GPU busy;
+//! [`scan_objects`] scans several objects at once. All three aim the sensor's beams
+//! ([`ScanRequest::aim`]), cast them ([`OpenCaster::cast`]), solve the ranges ([`resolve`]) and
+//! make points of them ([`assemble`]).
 
 mod assemble;
 mod echo;
@@ -31,7 +30,7 @@ use crate::target::Target;
 use formats::Scan;
 use rayon::prelude::*;
 
-/// Why there is no scan.
+/// A scan failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ScanError {
@@ -43,24 +42,23 @@ pub enum ScanError {
     Cast(#[from] CastError),
 }
 
-/// A scan, and what is known of it besides.
+/// A scan, with its hits and counts.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Scanned {
     /// The points.
     pub scan: Scan,
-    /// What became of the returns.
+    /// Counts of the returns by their fate.
     pub tally: Tally,
-    /// What the beams hit before any effect, by object. Where the CPU casts at
-    /// several objects, beams that end on a nearer object may be missing. The CPU gives no
-    /// outputs of effects: it asks them of what becomes a point.
+    /// The hits of the beams before any effect, by object. If the CPU casts at several objects,
+    /// beams that end on a nearer object may be missing. The CPU gives no outputs of effects: it
+    /// computes them only for hits that become points.
     pub hits: Vec<Hits>,
     /// Whether the CPU cast because an object was too large for the adapter.
     pub cast_on_cpu: bool,
 }
 
-/// The scan of `target` that `request` asks for. `target` stands where its mesh
-/// says.
+/// The scan of `target` that `request` asks for. `target` stands where its mesh says.
 ///
 /// # Errors
 /// [`ScanError`]: the adapter failed, or the request asks for what its sensor
@@ -88,8 +86,7 @@ pub fn scan_many(
     scan_all(caster, &scans)
 }
 
-/// The scan that `request` asks for of several objects: each beam returns from
-/// the nearest one.
+/// The scan that `request` asks for of several objects: each beam returns from the nearest one.
 ///
 /// # Errors
 /// As [`scan()`].
@@ -118,7 +115,7 @@ fn scan_all(
     scan_as_asked(caster, &objects.zip(&moved).collect::<Vec<_>>())
 }
 
-/// The scans of requests that have the poses of their sensors.
+/// The scans of requests whose sensors have their poses.
 fn scan_as_asked(
     caster: &OpenCaster,
     requests: &[(&[PlacedTarget], &ScanRequest)],
@@ -157,8 +154,8 @@ fn scan_as_asked(
         .collect()
 }
 
-/// Casts on the CPU at the nearest object first, so that a beam that ends there is
-/// not cast at what stands wholly behind.
+/// Casts on the CPU at the nearest object first, so that a beam that ends there is not cast at
+/// objects behind.
 fn cast_nearest_first(
     objects: &[PlacedTarget],
     request: &ScanRequest,
@@ -174,7 +171,7 @@ fn cast_nearest_first(
         let job = request.aim_where(&objects[i], |beam| ends_m[beam as usize] >= distances_m[i]);
         let codes = cpu::trace::trace(&job.target.bvh.wide, job.rays());
         let answers = Cast { codes, effect_outputs: vec![] };
-        // What effects say is asked of those hits alone that become points.
+        // Effects are computed later, for the hits that become points.
         let hits = resolve(&job, &answers, request.pattern, &Effects::default());
         for hit in &hits.hits {
             let end_m = &mut ends_m[hit.beam as usize];
@@ -185,7 +182,7 @@ fn cast_nearest_first(
     cast.into_iter().flatten().unzip()
 }
 
-/// From what was cast for one request to its scan.
+/// Assembles the scan of one request.
 fn finish(
     caster: &OpenCaster,
     objects: &[PlacedTarget],

@@ -1,4 +1,4 @@
-//! What is wanted of one scan.
+//! The request for a scan.
 
 use crate::aim::{Culling, aim};
 use crate::config::InvalidValue;
@@ -16,21 +16,7 @@ use glam::DAffine3;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// One sensor at one place, and what is wanted of its scan.
-///
-/// [`ScanRequest::new`] fills in the defaults; every field may be set after it:
-///
-/// ```
-/// # use sim_gpu::{pose::Pose, scan::ScanRequest, sensor::Sensor};
-/// # use sim_gpu::formats::scan::Attribute;
-/// # use sim_gpu::glam::DVec3;
-/// let sensor = Sensor::builtin("vlp32c").expect("a built-in sensor");
-/// let pattern = sensor.pattern();
-/// let pose = Pose::look_at(DVec3::new(3.0, 0.0, 1.0), DVec3::ZERO)?;
-/// let mut request = ScanRequest::new(&sensor, &pattern, pose);
-/// request.attributes = [Attribute::Range, Attribute::Ring].into();
-/// # Ok::<(), sim_gpu::config::InvalidValue>(())
-/// ```
+/// A sensor, its pose, and the properties of its scan. [`ScanRequest::new`] fills in the defaults.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct ScanRequest<'a> {
@@ -38,61 +24,58 @@ pub struct ScanRequest<'a> {
     pub sensor: &'a SensorProfile,
     /// The beams of the sensor, [`SensorProfile::pattern`], which many requests share.
     pub pattern: &'a BeamPattern,
-    /// Where the sensor stands, if it does not move.
+    /// The pose of a sensor that does not move.
     pub pose: Pose,
-    /// Its poses over time, if it moves.
+    /// The poses of a sensor that moves.
     pub motion: Option<Arc<Trajectory>>,
     /// The time of trajectories at which the scan begins, seconds; 0 by default.
     pub start_s: f64,
-    /// Whether points of a moving sensor are where it met the surfaces. They are not by
-    /// default: they are where a driver puts them that takes the sensor to stand where the scan
-    /// began.
+    /// Whether the motion of the sensor is compensated in its points. By default points are
+    /// motion-distorted, as a driver that ignores ego-motion reports them.
     pub deskew: bool,
     /// The effects to apply, which must be among those that the caster models;
     /// `None`, the default, applies all of them.
     pub effects: Option<Effects>,
-    /// What each point carries besides its position; nothing by default.
+    /// The attributes of points besides their positions; none by default.
     pub attributes: AttributeSet,
-    /// Keys all random numbers of the scan. Requests of the same key have the
-    /// same noise.
+    /// The stream of all random numbers of the scan. Requests of the same stream have the same
+    /// noise.
     pub stream: StreamKey,
-    /// Whether beams that cannot hit are cast; the scan is the same.
+    /// Whether beams that cannot hit an object are cast. The scan is the same.
     pub culling: Culling,
 }
 
-/// An object that a sensor looks at.
+/// An object in view of a sensor.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct PlacedTarget<'a> {
     /// The object.
     pub target: &'a Target,
-    /// Where it stands; if it moves, in the frame that moves with it.
+    /// Its pose in the world or, if it moves, in the frame that moves with it.
     pub world_from_object: DAffine3,
-    /// The poses of that frame over time, if it moves.
+    /// The poses of the frame of an object that moves.
     pub motion: Option<Arc<Trajectory>>,
     /// Its reflectivity, 0 to 1; 1 by default.
     pub reflectivity: f32,
-    /// Keys the random numbers of the object's returns; `None`, the default,
-    /// takes the request's key.
+    /// The stream of the random numbers of its returns; `None`, the default, is the request's.
     pub stream: Option<StreamKey>,
-    /// Which of it is glass; nothing by default.
+    /// Its panes; none by default.
     pub glass: Option<Glass>,
-    /// How well it reflects light back to where it came from, as road signs and licence
-    /// plates do: above 0, 1 being ideal. 0, the default, is a surface that scatters.
+    /// The quality of a retro-reflector, such as a road sign or a licence plate: up to 1, which is
+    /// ideal. 0, the default, is a surface that scatters.
     pub retroreflection: f64,
-    /// The materials of its triangles, in place of its reflectivity and retroreflection;
-    /// one for all by default.
+    /// The materials of its triangles, instead of its reflectivity and retroreflection; by default
+    /// it has a single one.
     pub materials: Option<&'a Materials>,
 }
 
-/// Panes of an object. Of the light that meets a pane, a mirror image and what
-/// shines through go elsewhere; a sensor sees the rest seldom.
+/// Panes of an object. Glass reflects and transmits most of the light elsewhere, and returns few
+/// beams.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Glass {
     /// The triangles that are glass, as indices into the mesh.
     pub triangles: Range<u32>,
-    /// The part of the beams that return from glass, 0 to 1; the others return
-    /// nothing.
+    /// The part of the beams that return from glass, 0 to 1; the others are lost.
     pub returned: f64,
 }
 
@@ -140,8 +123,7 @@ impl<'a> ScanRequest<'a> {
         }
     }
 
-    /// The same request; if its effects move the sensor, and it has no poses over time, with
-    /// those.
+    /// The same request; if its effects move the sensor, and it has no poses over time, with those.
     pub(super) fn in_motion(&self, cast_effects: &Effects) -> Self {
         let mut request = self.clone();
         let effects = self.effects.as_ref().unwrap_or(cast_effects);
@@ -158,7 +140,7 @@ impl<'a> ScanRequest<'a> {
         self.aim_where(placed, |_| true)
     }
 
-    /// The rays at `placed` of those of the sensor's beams that are wanted.
+    /// The rays of the wanted beams at `placed`.
     pub(super) fn aim_where(
         &self,
         placed: &PlacedTarget,
@@ -167,7 +149,7 @@ impl<'a> ScanRequest<'a> {
         let PlacedTarget { target, reflectivity, stream, .. } = placed;
         let frame = self.frame(placed);
         let stream = stream.unwrap_or(self.stream);
-        // Materials come in when the triangles that were hit are known.
+        // Materials are applied once the triangles that were hit are known.
         let reflectivity = if placed.materials.is_some() { 1.0 } else { *reflectivity };
         let target = (*target).clone();
         let motion = self.motion_at(placed);
@@ -178,19 +160,19 @@ impl<'a> ScanRequest<'a> {
         CastJob { target, frame, motion, beams, aim, stream, reflectivity }
     }
 
-    /// Where the sensor is when the scan begins.
+    /// The pose of the sensor at the start of the scan.
     pub(super) fn pose_at_start(&self) -> Pose {
         self.motion.as_ref().map_or(self.pose, |motion| motion.at(self.start_s))
     }
 
-    /// Where the sensor is when `ray` of the pattern is fired.
+    /// The pose of the sensor when `ray` of the pattern fires.
     pub(super) fn pose_at(&self, ray: u32) -> Pose {
         self.motion
             .as_ref()
             .map_or(self.pose, |motion| motion.at(self.start_s + self.pattern.time_s[ray as usize]))
     }
 
-    /// How the sensor and `placed` move, if one of them does.
+    /// The motion of the sensor and of `placed`, if one of them moves.
     fn motion_at(&self, placed: &PlacedTarget) -> Option<Motion> {
         (self.motion.is_some() || placed.motion.is_some()).then(|| Motion {
             pose: self.pose,
@@ -201,7 +183,7 @@ impl<'a> ScanRequest<'a> {
         })
     }
 
-    /// A distance within which no beam meets `placed`, metres.
+    /// A lower bound of the range of `placed`, metres.
     pub(super) fn nearest_m(&self, placed: &PlacedTarget) -> f64 {
         if self.motion.is_some() || placed.motion.is_some() {
             return 0.0;
@@ -218,7 +200,7 @@ impl<'a> ScanRequest<'a> {
 }
 
 impl<'a> PlacedTarget<'a> {
-    /// `target` where its mesh stands, in the world's frame.
+    /// `target` with the coordinates of its mesh as world coordinates.
     #[must_use]
     pub fn new(target: &'a Target) -> Self {
         Self {

@@ -1,5 +1,4 @@
-//! Scenes in TOML: which objects stand where, which sensors look at them, and which
-//! effects and attributes are wanted.
+//! Scenes in TOML: objects, sensors, effects and attributes.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -20,7 +19,7 @@ mod table;
 #[cfg(test)]
 mod tests;
 
-/// What a scene's file says, checked; the meshes are not read yet.
+/// The content of a scene's file, checked; the meshes are not read yet.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneFile {
     /// Seed of all random effects; default 0.
@@ -29,11 +28,11 @@ pub struct SceneFile {
     pub objects: Vec<SceneObject>,
     /// The sensors, at least one, with different names; one scan each.
     pub sensors: Vec<SceneSensor>,
-    /// The effects that are wanted, for all sensors.
+    /// The effects of all sensors.
     pub effects: Effects,
-    /// The attributes that are wanted, positions aside.
+    /// The attributes of points besides positions.
     pub attributes: AttributeSet,
-    /// Whether and how far meshes are simplified; objects may differ.
+    /// The simplification of meshes; objects may differ.
     pub simplify: Option<Simplify>,
 }
 
@@ -48,27 +47,25 @@ pub struct SceneObject {
     pub label: Option<String>,
     /// The mesh's upward axis, `y` or `z`; `None` is the format's default.
     pub up: Option<Up>,
-    /// `unit-sphere`, `bbox` or `none`. `None`, the default, is `none`: a scene
-    /// places a mesh in its own units.
+    /// `unit-sphere`, `bbox` or `none`. `None`, the default, is `none`: the mesh keeps its units.
     pub normalize: Option<Normalize>,
-    /// Where the mesh's origin comes to stand, metres.
+    /// The position of the mesh's origin, metres.
     pub position_m: DVec3,
-    /// How the mesh is turned, after it was turned upright and scaled.
+    /// The rotation of the upright, scaled mesh.
     pub rotation: DQuat,
-    /// If it moves: the poses over time of the frame in which it stands so.
+    /// The poses over time of the frame that it stands in, if it moves.
     pub motion: Option<Arc<Trajectory>>,
     /// Factors along the mesh's axes once upright, all above 0.
     pub scale: DVec3,
-    /// The part of the light that comes back at vertical incidence, 0..=1.
-    /// Default 1.
+    /// The part of the light that it returns at vertical incidence, 0..=1. Default 1.
     pub reflectivity: f64,
-    /// How well it returns light to where it came from, 0..=1, 1 being an ideal
-    /// retro-reflector; 0, the default, is a surface that scatters.
+    /// The quality of a retro-reflector, 0..=1: 1 is ideal; 0, the default, is a surface that
+    /// scatters.
     pub retroreflection: f64,
-    /// The materials of its faces, OBJ alone; by default one for all.
+    /// The materials of its faces, for OBJ only; by default a single one.
     pub materials: MaterialChoice,
-    /// Whether and how far the mesh is simplified; `Some(None)`, `false` in
-    /// TOML, is not at all. `None`, the default, is as the scene says.
+    /// The simplification of the mesh; `Some(None)`, `false` in TOML, is none. `None`, the default,
+    /// is the scene's.
     pub simplify: Option<Option<Simplify>>,
 }
 
@@ -79,19 +76,18 @@ pub struct SceneSensor {
     pub sensor: SensorProfile,
     /// Default: the sensor's name.
     pub name: String,
-    /// Where it stands; if it moves, when the scan begins.
+    /// Its pose; if it moves, that at the start of the scan.
     pub pose: Pose,
     /// Its poses over time, if it moves.
     pub motion: Option<Arc<Trajectory>>,
     /// The time of all trajectories at which its scan begins, seconds; 0 by default.
     pub start_s: f64,
-    /// Whether points are where a moving sensor met the surfaces, and not where it would put
-    /// them if it stood still; false by default.
+    /// Whether the motion of the sensor is compensated in its points; false by default.
     pub deskew: bool,
 }
 
 impl SceneFile {
-    /// Reads a scene and the sensor profiles it names.
+    /// Reads a scene and its sensor profiles.
     ///
     /// # Errors
     ///
@@ -101,8 +97,8 @@ impl SceneFile {
         Self::from_table(table, file)
     }
 
-    /// Parses a scene that stands in `file`, which need not exist; relative
-    /// paths start from its folder.
+    /// Parses the text of a scene in `file`, which need not exist; relative paths start from its
+    /// folder.
     ///
     /// # Errors
     ///
@@ -160,23 +156,23 @@ impl SceneFile {
 }
 
 impl SceneFile {
-    /// Whether and how far the mesh of `object` is simplified.
+    /// The simplification of the mesh of `object`.
     #[must_use]
     pub fn simplify_of(&self, object: &SceneObject) -> Option<Simplify> {
         object.simplify.unwrap_or(self.simplify)
     }
 
-    /// Whether any mesh is to be simplified.
+    /// Whether any mesh is simplified.
     #[must_use]
     pub fn simplifies(&self) -> bool {
         self.objects.iter().any(|object| self.simplify_of(object).is_some())
     }
 
-    /// That nobody asks for the file's numbers of triangles that are not the
-    /// file's.
+    /// Checks that triangle numbers are not an attribute of simplified meshes, whose triangles
+    /// differ from those of the file.
     ///
     /// # Errors
-    /// If somebody does.
+    /// If they are.
     pub fn check_triangles(&self) -> Result<(), InvalidValue> {
         if self.simplifies() && self.attributes.contains(&Attribute::Triangle) {
             let cause = "a simplified mesh does not have the file's triangles, so that the \
@@ -208,7 +204,7 @@ impl SceneObject {
     }
 }
 
-/// That there is an item and no two have one name.
+/// Checks that there is at least one item, and that names are unique.
 fn check_names<'a>(
     kind: &str,
     names: impl Iterator<Item = &'a String>,

@@ -50,7 +50,7 @@ pub(super) struct ObjectTable {
     pitch_deg: Option<f64>,
     roll_deg: Option<f64>,
     quaternion_xyzw: Option<[f64; 4]>,
-    /// Poses over time, of the frame in which the pose above is.
+    /// The poses over time of the frame of the pose above.
     trajectory: Option<toml::Value>,
     scale: Option<Scale>,
     reflectivity: Option<f64>,
@@ -74,7 +74,7 @@ pub(super) struct SensorTable {
     pitch_deg: Option<f64>,
     roll_deg: Option<f64>,
     quaternion_xyzw: Option<[f64; 4]>,
-    /// Poses over time, in place of the keys above.
+    /// The poses over time, instead of the keys above.
     trajectory: Option<toml::Value>,
     revolutions: Option<NonZeroU32>,
     #[serde(default)]
@@ -83,11 +83,11 @@ pub(super) struct SensorTable {
     deskew: bool,
 }
 
-/// From pose to pose of a trajectory whose file has no times, seconds: KITTI's sensor turns ten
-/// times a second.
+/// The period of poses of a trajectory without times, seconds: KITTI's sensor has 10 revolutions
+/// per second.
 const PERIOD_S: f64 = 0.1;
 
-/// A pose at a time.
+/// A pose and its time.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct TimedPose {
@@ -100,7 +100,7 @@ struct TimedPose {
     quaternion_xyzw: Option<[f64; 4]>,
 }
 
-/// The trajectory that stands at `key`, if there is one.
+/// The trajectory at `key`, if there is one.
 fn trajectory(
     key: String,
     folder: &Path,
@@ -130,7 +130,7 @@ fn trajectory(
     Ok(Some(Arc::new(found)))
 }
 
-/// That poses are known from the scan's begin to its end; one pose alone is of all times.
+/// Checks that the poses cover the scan; a single pose covers all times.
 fn check_known(
     key: &str,
     trajectory: &Trajectory,
@@ -148,8 +148,8 @@ fn check_known(
     Err(InvalidValue::new(key, cause))
 }
 
-/// That an object's poses are of the time at which a sensor scans: it stands before its first and
-/// after its last.
+/// Checks that an object's poses overlap the scan: before its first and after its last, it stands
+/// still.
 pub(super) fn check_moves(
     key: &str,
     trajectory: &Trajectory,
@@ -191,7 +191,7 @@ enum Scale {
     PerAxis([f64; 3]),
 }
 
-/// What an object says of its own simplification.
+/// The simplification of one object.
 #[derive(Clone, Copy, Deserialize)]
 #[serde(untagged, expecting = "expected \"auto\", metres above 0 or false as simplify")]
 enum OwnSimplify {
@@ -275,7 +275,7 @@ impl SensorTable {
         };
         let motion = trajectory(key("trajectory"), folder, self.trajectory)?;
         let (start_s, deskew) = (self.start_s, self.deskew);
-        // Times of Unix are in the thousands of millions.
+        // Unix times are above 1e9.
         within(&key("start_s"), start_s, -1e12..=1e12)?;
         if let Some(motion) = motion {
             if self.position_m.is_some() {
@@ -283,7 +283,7 @@ impl SensorTable {
                 return Err(InvalidValue::new(key("trajectory"), cause));
             }
             if sensor.rings.is_some() {
-                // Rings are cones around one place, in the axes of the world.
+                // Rings are cones around a single point, in world axes.
                 let cause = "cannot move a sensor whose profile has [rings]";
                 return Err(InvalidValue::new(key("trajectory"), cause));
             }
@@ -309,7 +309,7 @@ impl SensorTable {
     }
 }
 
-/// The attributes, if all are known, wanted once, and have their effect.
+/// The attributes, if all are known, unique, and have their effect.
 pub(super) fn check_attributes(
     attributes: &[String],
     effects: &Effects,

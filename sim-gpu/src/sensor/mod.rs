@@ -1,4 +1,4 @@
-//! Sensors: which way each beam points, when it fires, how far it measures.
+//! Sensors: the directions and firing times of beams, and the ranges that they measure.
 //!
 //! A sensor is a TOML profile, built in (`assets/sensors`) or given by path.
 //! Angles are in degrees as in the profile; [`SensorProfile::pattern`] turns them
@@ -52,8 +52,7 @@ pub fn builtin_names() -> impl Iterator<Item = &'static str> {
     SENSORS.into_iter().map(|(name, _)| name)
 }
 
-/// The most rays a sensor may have: an image of 8192 x 8192 pixels. The
-/// pattern of so many takes 2.5 GB.
+/// The most rays of a sensor: an image of 8192 x 8192 pixels, whose pattern takes 2.5 GB.
 pub const MAX_RAYS: u64 = 1 << 26;
 
 /// The most rings: a point's ring has 16 bits.
@@ -65,36 +64,36 @@ const MAX_RINGS: f64 = u16::MAX as f64;
 pub struct SensorProfile {
     /// A short name, as in `--sensor`.
     pub name: String,
-    /// One line for people.
+    /// A description in one line.
     pub description: String,
-    /// Where the constants come from.
+    /// The sources of the constants.
     pub sources: Vec<String>,
     /// The ranges it measures.
     pub range: RangeLimits,
-    /// Typical noise: stated by the maker, applied only where asked for.
+    /// The typical noise that the maker states, applied only on request.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise: Option<TypicalNoise>,
-    /// What it just detects: applied only where the detection effect is named.
+    /// The detection limit, applied only with the detection effect.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub detection: Option<DetectionLimit>,
-    /// How wide its beams are: applied only where the footprint effect is named.
+    /// The width of the beams, applied only with the footprint effect.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub footprint: Option<BeamShape>,
     /// The arrangement of the beams.
     #[serde(flatten)]
     pub layout: Layout,
-    /// Only each so-manyth azimuth step or pixel column is kept; 1 keeps all.
+    /// Every `decimation`-th azimuth step or pixel column is kept; 1 keeps all.
     pub decimation: NonZeroU32,
-    /// Revolutions that one scan holds, or frames of a sensor that does not turn; 1 by default.
+    /// The revolutions per scan, or the frames of a sensor that does not turn; 1 by default.
     #[serde(skip_serializing_if = "is_one")]
     pub revolutions: NonZeroU32,
-    /// Points are snapped to rings after the scan.
+    /// The rings to which points are snapped after the scan.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rings: Option<Rings>,
-    /// So many points are drawn after the scan.
+    /// The sample of points that is drawn after the scan.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sample: Option<Sample>,
-    /// The views this sensor is meant to be used with.
+    /// The recommended views.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub views: Option<Views>,
 }
@@ -112,8 +111,7 @@ pub struct RangeLimits {
     pub min_m: f64,
     /// Farthest range in metres.
     pub max_m: f64,
-    /// The unit in which the sensor reports ranges, metres. Ranges are rounded
-    /// to it only where the quantisation effect is named.
+    /// The unit of reported ranges, metres, applied only with the quantisation effect.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub quantum_m: Option<f64>,
 }
@@ -126,7 +124,7 @@ pub struct TypicalNoise {
     pub typical_sigma_m: f64,
 }
 
-/// How the beams are arranged.
+/// The arrangement of the beams.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Layout {
@@ -151,8 +149,8 @@ impl SensorProfile {
         Some(sensor.expect("invariant: a test parses all built-in profiles"))
     }
 
-    /// Reads a profile; or, where `file` ends with `.json`, the metadata that an Ouster tells of
-    /// itself.
+    /// Reads a profile or, if the name of `file` ends with `.json`, the metadata of an Ouster
+    /// sensor.
     ///
     /// # Errors
     ///
@@ -170,7 +168,7 @@ impl SensorProfile {
     ///
     /// # Errors
     ///
-    /// As [`SensorProfile::load`]; where there is neither such a name nor such a
+    /// As [`SensorProfile::load`]; if there is neither such a name nor such a
     /// file, the error lists the known names.
     pub fn resolve(name_or_path: &str) -> Result<Self, ConfigError> {
         Self::resolve_in(Path::new(""), name_or_path)
@@ -209,10 +207,10 @@ impl SensorProfile {
         rays.into_pattern()
     }
 
-    /// The same sensor with so many revolutions, or frames, in one scan.
+    /// The same sensor with this number of revolutions, or frames, per scan.
     ///
     /// # Errors
-    /// A sensor that makes the same scan again each time; too many rays.
+    /// If all scans of the sensor are equal, or there would be too many rays.
     pub fn with_revolutions(self, revolutions: NonZeroU32) -> Result<Self, InvalidValue> {
         let repeated = Self { revolutions, ..self };
         repeated.check_revolutions()?;
@@ -236,8 +234,7 @@ impl SensorProfile {
         checked_ray_count("revolutions", n_rays)
     }
 
-    /// The same sensor without what its scans do not need: the rows of a table after the last
-    /// that is fired.
+    /// The same sensor without the rows of a table that its scans do not use.
     #[must_use]
     pub fn trimmed(mut self) -> Self {
         if let Layout::Table(table) = &mut self.layout {
@@ -246,9 +243,8 @@ impl SensorProfile {
         self
     }
 
-    /// The same sensor with only each `k`-th azimuth step, or column of
-    /// pixels, starting with the first. Its rays are some of this sensor's, in
-    /// the same order.
+    /// The same sensor with only each `k`-th azimuth step, or column of pixels, starting with the
+    /// first. Its rays are some of this sensor's, in the same order.
     #[must_use]
     pub fn decimated(&self, k: NonZeroU32) -> Self {
         Self { decimation: self.decimation.saturating_mul(k), ..self.clone() }
