@@ -1,5 +1,5 @@
-//! `edgepuck advise`: recommends one configuration for a device, from what
-//! `cargo xtask trade` measured.
+//! `edgepuck advise`: recommends a configuration for a device, from the measurements of `cargo
+//! xtask trade`.
 
 use crate::flags::positive;
 use crate::sampler_config::SamplerConfig;
@@ -14,7 +14,7 @@ use std::path::PathBuf;
 
 /// Flags of `advise`.
 #[derive(clap::Args)]
-pub struct Args {
+pub struct AdviseArgs {
     /// Device that runs the classifier
     #[arg(long, value_enum)]
     device: Device,
@@ -40,15 +40,14 @@ pub struct Args {
     record: Option<PathBuf>,
 }
 
-/// A row and its time on the device.
+/// The time on the device, and the row.
 type Timed<'a> = (f64, &'a Row);
 
-/// Prints one configuration, and why.
+/// Prints one configuration and the reason for it.
 ///
 /// # Errors
-/// A record that cannot be read or does not know the device; limits that no
-/// measured setting keeps.
-pub fn run(args: &Args) -> Result<Outcome> {
+/// A record that cannot be read or lacks the device; limits that no measured setting meets.
+pub fn run(args: &AdviseArgs) -> Result<Outcome> {
     args.check()?;
     let (name, rows) = match &args.record {
         Some(path) => (path.display().to_string(), row::read(path)?),
@@ -59,10 +58,10 @@ pub fn run(args: &Args) -> Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-fn advise(args: &Args, rows: &[Row]) -> Result<String> {
-    // What infer-cpu classifies with: it runs all T-Nets that a model has.
+fn advise(args: &AdviseArgs, rows: &[Row]) -> Result<String> {
+    // infer-cpu runs all T-Nets of a model, so other settings are not a choice.
     let runs_all = |row: &&Row| matches!(row.t_nets.as_str(), "" | "both");
-    // A record may hold samplers that infer-cpu had when it was made and has no more.
+    // An older record may have samplers that infer-cpu no longer has.
     let is_known =
         |row: &&Row| row.sampler.is_empty() || SamplerConfig::named(&row.sampler).is_some();
     let is_choice = |row: &&Row| row.part == Part::Classifier && runs_all(row) && is_known(row);
@@ -81,7 +80,7 @@ fn advise(args: &Args, rows: &[Row]) -> Result<String> {
     Ok(args.text(chosen, &fitting, &timed))
 }
 
-impl Args {
+impl AdviseArgs {
     fn check(&self) -> Result<()> {
         let limits = [self.max_ms, self.min_accuracy, self.max_mb];
         if limits.iter().all(Option::is_none) && self.max_threads.is_none() {
@@ -92,8 +91,7 @@ impl Args {
         Ok(())
     }
 
-    /// Whether accuracy counts before time: where only accuracy is asked for,
-    /// time does.
+    /// Whether accuracy counts before time. With a limit on accuracy alone, time counts first.
     fn accuracy_first(&self) -> bool {
         self.max_ms.is_some() || self.min_accuracy.is_none()
     }
@@ -105,7 +103,8 @@ impl Args {
             && self.max_threads.is_none_or(|most| row.threads.is_some_and(|n| n <= most))
     }
 
-    /// The greater is the better one; of equals the one of fewer threads.
+    /// Orders settings so that the better one is greater; of equal ones, the one with fewer
+    /// threads.
     fn compare(&self, a: &Timed, b: &Timed) -> Ordering {
         let accuracy = a.1.accuracy.total_cmp(&b.1.accuracy);
         let speed = b.0.total_cmp(&a.0);
@@ -113,7 +112,7 @@ impl Args {
         first.then(b.1.threads.cmp(&a.1.threads))
     }
 
-    /// Describes the settings nearest to limits that none of them meets.
+    /// The message if no setting meets the limits: it names the nearest ones.
     fn none_fits(&self, timed: &[Timed]) -> String {
         let mut text = "no measured setting meets these limits".to_owned();
         let fastest = timed.iter().min_by(|a, b| a.0.total_cmp(&b.0));
@@ -158,7 +157,7 @@ impl Args {
                 row.machine
             ),
         };
-        // Within the interval a reader may prefer the cheaper one.
+        // If the difference is not significant, a user may prefer the cheaper setting.
         let as_good = |&&(other_ms, other): &&Timed| {
             other_ms < 0.75 * ms && other.accuracy >= row.accuracy_low
         };
@@ -246,9 +245,9 @@ mod tests {
         ]
     }
 
-    fn asked(max_ms: Option<f64>, min_accuracy: Option<f64>) -> Args {
+    fn asked(max_ms: Option<f64>, min_accuracy: Option<f64>) -> AdviseArgs {
         let (max_mb, max_threads, record) = (None, None, None);
-        Args { device: Device::Pi5, max_ms, min_accuracy, max_mb, max_threads, record }
+        AdviseArgs { device: Device::Pi5, max_ms, min_accuracy, max_mb, max_threads, record }
     }
 
     #[test]
@@ -292,7 +291,7 @@ mod tests {
     fn what_was_not_measured_is_not_advised() {
         let error = advise(&asked(Some(0.1), None), &rows()).unwrap_err().to_string();
         assert!(error.contains("the fastest: small") && error.contains("most accurate: huge"));
-        let here = Args { device: Device::Here, ..asked(Some(5.0), None) };
+        let here = AdviseArgs { device: Device::Here, ..asked(Some(5.0), None) };
         let error = advise(&here, &rows()).unwrap_err().to_string();
         assert!(error.contains("`cargo xtask trade`"), "{error}");
         assert!(asked(None, None).check().unwrap_err().is::<Usage>());

@@ -34,14 +34,14 @@ enum Command {
     /// Scan one scene
     Scan(scan::Args),
     /// Segment a sensor's sweep into ground and clusters
-    Segment(segment::Args),
+    Segment(segment::SegmentArgs),
     /// Add rain, snow, fog or haze to a recorded scan, and label each point
     Weather(weather::WeatherArgs),
     /// Apply sensor corruptions to a sweep or to mesh scans, to make robustness test sets
     Corrupt(Box<corrupt::CorruptArgs>),
     /// Find and classify the objects in a sweep
     #[cfg(feature = "models")]
-    Detect(detect::Args),
+    Detect(detect::DetectArgs),
     /// Draw a picture of a scan from the side, from above and from the front
     Preview(preview_scan::Args),
     /// List the built-in sensors, or check and describe a sensor profile
@@ -74,7 +74,7 @@ enum Command {
     ComparePoints(trainer::TrainerArgs),
     /// Recommend one configuration of the classifier for a device, based on measurements
     #[cfg(feature = "models")]
-    Advise(advise::Args),
+    Advise(advise::AdviseArgs),
 }
 
 /// Runs the command line `words`, which begins with the name of the program. Prints errors and

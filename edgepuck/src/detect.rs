@@ -1,4 +1,4 @@
-//! `edgepuck detect`: the named objects of a whole sweep.
+//! `edgepuck detect`: detects and classifies the objects of a sweep.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -16,7 +16,7 @@ const BUNDLED: &str = "street-128";
 
 /// Flags of `detect`.
 #[derive(clap::Args)]
-pub struct Args {
+pub struct DetectArgs {
     #[command(flatten)]
     input: SweepArgs,
 
@@ -37,8 +37,8 @@ pub struct Args {
     precision: Precision,
 }
 
-/// Cuts the sweep and names its clusters.
-pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+/// Detects the objects of the sweep and writes them.
+pub fn run(args: &DetectArgs) -> anyhow::Result<Outcome> {
     let scan = args.input.read()?;
     let options = Options { precision: args.precision, ..Options::default() };
     let mut detector = Detector::open(&args.model, &options, args.min_points)?;
@@ -70,24 +70,24 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-/// Finds and names the objects of one sweep after the other.
+/// Detects and classifies objects in sweeps.
 pub struct Detector {
     segmenter: Segmenter,
     classifier: Classifier,
 }
 
-/// What a [`Detector`] finds in a sweep.
+/// The objects of a sweep.
 pub struct Detections {
-    /// What each point is part of.
+    /// The label of each point.
     pub labels: Vec<Label>,
-    /// The clusters that have a name, in the order of their numbers.
+    /// The clusters of known classes, in the order of their numbers.
     pub objects: Vec<Object>,
-    /// The number of clusters that have none.
+    /// The number of clusters of unknown class.
     pub n_unknown: usize,
 }
 
 impl Detector {
-    /// With the bundled model, or else that of a file, for clusters of at least
+    /// A detector with the model at a path, or the bundled one, for clusters of at least
     /// `min_points` points.
     pub fn open(model: &Path, options: &Options, min_points: usize) -> anyhow::Result<Self> {
         let classifier = match model == Path::new(BUNDLED) {
@@ -100,7 +100,7 @@ impl Detector {
         Ok(Self { segmenter, classifier })
     }
 
-    /// Cuts `scan`, in the sensor's frame, and names its clusters.
+    /// Segments `scan`, in the sensor's frame, and classifies its clusters.
     pub fn detect(&mut self, scan: &Scan) -> anyhow::Result<Detections> {
         let sweep = Sweep { points: &scan.positions, rings: scan.ring.as_deref() };
         let segmentation = self.segmenter.segment(&sweep)?;
@@ -127,22 +127,22 @@ impl Detector {
     }
 }
 
-/// A cluster that has a name.
+/// A cluster of a known class.
 pub struct Object {
     /// Its number among the clusters.
     pub cluster: u32,
     /// Its class.
     pub class: String,
-    /// The network's confidence in that, 0 to 1.
+    /// The confidence of the network in the class, 0 to 1.
     pub confidence: f64,
     /// The number of its points.
     pub n_points: usize,
-    /// Where it is.
+    /// The box around it.
     pub place: OrientedBox,
 }
 
 impl Object {
-    /// Its class, and where it is seen from above.
+    /// Its class, and its position seen from above.
     fn name(&self) -> (&str, [f32; 2]) {
         let [x, y, _] = self.place.centre_m;
         (&self.class, [x, y])

@@ -1,4 +1,4 @@
-//! `edgepuck segment`: cuts a sweep into ground and clusters.
+//! `edgepuck segment`: segments a sweep into ground and clusters.
 
 use crate::{Outcome, Usage, preview};
 use edgepuck_segment::{Label, Segmentation, Segmenter, Settings, Sweep};
@@ -11,12 +11,12 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// The sweep that a command takes.
+/// The input of `segment` and `detect`.
 #[derive(clap::Args)]
 pub struct SweepArgs {
-    /// Sweep to cut: a scan, .npz or .ply, whose rings are used if it has them; the first turn in a
-    /// capture, .pcap or .pcapng, of a VLP-16's or VLP-32C's packets, or of an Ouster's with
-    /// --metadata; or a cloud in any format that infer-cpu reads; metres, z up
+    /// Sweep in metres, z up: a scan (.npz or .ply, with its rings if it has them); a capture
+    /// (.pcap or .pcapng), of which the first turn is used, of a VLP-16 or VLP-32C, or with
+    /// --metadata of an Ouster; or a cloud in any format that infer-cpu reads
     #[arg(value_name = "SWEEP")]
     pub sweep: PathBuf,
 
@@ -24,14 +24,14 @@ pub struct SweepArgs {
     #[arg(long, value_name = "FILE")]
     metadata: Option<PathBuf>,
 
-    /// Where the sensor is in the sweep, in metres [default: 0 0 0]
+    /// Position of the sensor in the sweep, in metres [default: 0 0 0]
     #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true)]
     sensor: Option<Vec<f64>>,
 }
 
 /// Flags of `segment`.
 #[derive(clap::Args)]
-pub struct Args {
+pub struct SegmentArgs {
     #[command(flatten)]
     input: SweepArgs,
 
@@ -40,19 +40,19 @@ pub struct Args {
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 
-    /// Take the connected components of points within this many metres instead, for clouds that are
-    /// not sweeps of a sensor; there is no ground then
+    /// Compute connected components of points within this many metres instead, for clouds that are
+    /// not sweeps of a sensor; these have no ground
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     radius: Option<f32>,
 }
 
-/// Cuts the sweep.
-pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+/// Segments the sweep and writes the results.
+pub fn run(args: &SegmentArgs) -> anyhow::Result<Outcome> {
     let scan = args.input.read()?;
     let settings = args.radius.map_or_else(Settings::default, Settings::of_components);
     let mut segmenter = Segmenter::new(settings).map_err(|error| Usage(error.to_string()))?;
     let sweep = Sweep { points: &scan.positions, rings: scan.ring.as_deref() };
-    // A robot's second sweep and all that follow find the memory of the first.
+    // The first sweep allocates memory; the time of a later one is typical.
     segmenter.segment(&sweep)?;
     let start = Instant::now();
     let segmentation = segmenter.segment(&sweep)?;
@@ -80,8 +80,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
 }
 
 impl SweepArgs {
-    /// The points, from the sensor, and their rings if the file is a scan that has
-    /// them.
+    /// The points relative to the sensor, and their rings if the file is a scan with rings.
     pub fn read(&self) -> Result<Scan, FormatError> {
         let sensor = self.sensor_m();
         let from_sensor =
@@ -98,7 +97,7 @@ impl SweepArgs {
         Ok(Scan { positions, ring, ..Scan::default() })
     }
 
-    /// The sweep as its file has it, with all that is known of its points.
+    /// The sweep as in its file, with all attributes of the points.
     pub fn read_whole(&self) -> Result<Scan, FormatError> {
         if let Some(scan) = self.read_capture()? {
             return Ok(scan);
@@ -112,7 +111,7 @@ impl SweepArgs {
         Ok(Scan { positions, intensity, ..Scan::default() })
     }
 
-    /// Where the sensor is in the sweep, metres.
+    /// The position of the sensor in the sweep, metres.
     pub fn sensor_m(&self) -> [f64; 3] {
         let given = self.sensor.as_deref().and_then(|xyz| <[f64; 3]>::try_from(xyz).ok());
         given.unwrap_or_default()
@@ -131,14 +130,14 @@ impl SweepArgs {
         }
     }
 
-    /// What a picture of the sweep is called.
+    /// The title of a picture of the sweep.
     pub fn title(&self) -> Cow<'_, str> {
         self.sweep.file_stem().unwrap_or_default().to_string_lossy()
     }
 }
 
-/// Grey for the ground, light grey for what is in no cluster, and for clusters
-/// hues a golden angle apart, so that no two in sequence look alike.
+/// The colour of a label: grey for the ground, light grey for points in no cluster, and for
+/// clusters hues a golden angle apart, so that consecutive ones differ.
 pub fn tint(label: Label) -> RGBColor {
     match label {
         Label::Ground => RGBColor(150, 150, 150),
@@ -151,7 +150,7 @@ pub fn tint(label: Label) -> RGBColor {
     }
 }
 
-/// Writes each cluster, and removes those that a run before left behind.
+/// Writes each cluster, and removes files of further clusters from an earlier run.
 fn write_clusters(folder: &Path, scan: &Scan, found: &Segmentation) -> Result<(), FormatError> {
     let file = |number: usize| folder.join(format!("cluster-{number:04}.npy"));
     for (number, cluster) in found.clusters().enumerate() {

@@ -1,4 +1,4 @@
-//! The largest activation of each layer, for int8.
+//! Calibration for int8: the largest activation of each layer.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -17,17 +17,16 @@ use crate::precision::F32;
 use crate::source::ModelSource;
 use crate::team::Team;
 
-/// Points of a cloud that shapes are drawn into.
+/// Points of a calibration shape.
 const SHAPE_POINTS: usize = 512;
 /// Shapes of each kind.
 const SHAPES: u32 = 12;
 
-/// Clouds of a set that are looked at: more change the largest activations
-/// little.
+/// The most clouds of a set that are used: more hardly change the largest activations.
 #[cfg(feature = "npz")]
 const CLOUDS_OF_SET: usize = 512;
 
-/// [`on_clouds`], on some spread over `set`.
+/// [`on_clouds`] for clouds at even steps through `set`.
 ///
 /// # Errors
 /// A file that is not a model.
@@ -37,9 +36,8 @@ pub fn on_set(path: &Path, set: &LabelledSet) -> Result<BTreeMap<String, f32>, E
     on_clouds(path, (0..set.len()).step_by(step).map(|i| set.cloud(i)))
 }
 
-/// The largest activation of each layer of the model at `path` on `clouds`,
-/// which are normalised as the network takes them, or in metres for a network that
-/// takes metres.
+/// The largest activation of each layer of the model at `path` on `clouds`, which are normalised as
+/// the network expects, or in metres if it expects metres.
 ///
 /// # Errors
 /// A file that is not a model.
@@ -77,8 +75,8 @@ fn on_clouds_of<'a>(
     Ok(observed.filter(|(_, largest)| largest.is_normal()).collect())
 }
 
-/// [`on_clouds`] on spheres, boxes, rods and plates made by rule, for a model
-/// that brings no calibration and a caller without data.
+/// [`on_clouds`] for generated spheres, boxes, rods and plates: for a model without calibration,
+/// where there is no data.
 ///
 /// # Errors
 /// A file that is not a model.
@@ -86,7 +84,7 @@ pub fn on_shapes(path: &Path) -> Result<BTreeMap<String, f32>, Error> {
     on_shapes_of(&ModelSource::File(path.to_path_buf()))
 }
 
-/// The same for a model wherever it is.
+/// [`on_shapes`] for a model from any source.
 ///
 /// # Errors
 /// A source that is not a model.
@@ -95,8 +93,8 @@ pub fn on_shapes_of(model: &ModelSource) -> Result<BTreeMap<String, f32>, Error>
     on_clouds_of(model, clouds.iter().map(Vec::as_slice))
 }
 
-/// A box stretched at random: full, its surface, an ellipsoid's surface, or
-/// two boxes apart.
+/// A randomly stretched shape: a solid box, the surface of a box, the surface of an ellipsoid, or
+/// two separate boxes.
 fn shape(number: u32) -> Vec<[f32; 3]> {
     let key = StreamKey::new(0, "calibration shape", number);
     let unit = |n: usize| 2.0 * key.unit(n as u64) - 1.0;

@@ -1,17 +1,15 @@
-//! Points of a cloud chosen by their coordinates, without a network.
+//! Sampling by coordinates, without a network.
 
 use crate::error::Error;
 use crate::kernel;
 use crate::normalize;
 use crate::sampler::{Sampler, SamplerKind, SamplerSpec};
 
-/// The indices of the points that `spec` chooses of `points`, `[n, 3]`, in
-/// whatever unit.
+/// The indices of the points of `points` `[n, 3]`, in any unit, that `spec` chooses.
 ///
-/// Samplers work in f32, of which a cloud far from 0 would leave little: the
-/// cloud is moved and scaled to the unit sphere first, or, where a voxel size
-/// is given in the cloud's own unit, moved by whole voxels. A critical points
-/// layer needs a model: [`crate::Classifier::sample`].
+/// Samplers compute in f32, which loses precision far from the origin: the cloud is first moved and
+/// scaled to the unit sphere, or, if a voxel size is given (in the cloud's unit), moved by whole
+/// voxels. A Critical Points Layer needs a model: [`crate::Classifier::sample`].
 ///
 /// ```
 /// use infer_cpu::sampler::{SamplerKind, SamplerSpec};
@@ -23,8 +21,8 @@ use crate::sampler::{Sampler, SamplerKind, SamplerSpec};
 /// ```
 ///
 /// # Errors
-/// A specification that cannot be met; a cloud without points, or with a
-/// coordinate that is not finite; sampler `cpl`.
+/// An invalid specification; a cloud without points, or with a coordinate that is not finite; the
+/// sampler `cpl`.
 pub fn choose(points: &[[f64; 3]], spec: &SamplerSpec) -> Result<Vec<u32>, Error> {
     spec.check()?;
     if points.is_empty() {
@@ -43,13 +41,10 @@ pub fn choose(points: &[[f64; 3]], spec: &SamplerSpec) -> Result<Vec<u32>, Error
     Ok(Sampler::new(spec)?.select(&normalized, kernel::fastest())?.to_vec())
 }
 
-/// That all coordinates are finite.
+/// Checks that all coordinates are finite.
 pub fn check_finite(points: &[[f64; 3]]) -> Result<(), Error> {
     match points.iter().position(|point| !point.iter().all(|x| x.is_finite())) {
-        Some(index) => {
-            let [x, y, z] = points[index];
-            Err(Error::NotFinite { index, x, y, z })
-        }
+        Some(index) => Err(Error::NotFinite { index, point: points[index] }),
         None => Ok(()),
     }
 }

@@ -1,4 +1,4 @@
-//! From a cloud to a class.
+//! The classifier: from a cloud to a class.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -19,61 +19,46 @@ use crate::selection::{Selection, front_pass};
 use crate::source::ModelSource;
 use crate::test_time_augmentation::TestTimeAugmentation;
 
-/// A network ready to classify clouds.
+/// A loaded network that classifies clouds.
 ///
-/// Nothing is allocated once it is loaded, but for clouds of more points than
-/// [`Options::capacity`] and for the first that overflows a short precision.
-///
-/// ```
-/// use std::path::Path;
-///
-/// use infer_cpu::{Classifier, Options};
-///
-/// let weights = concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/weights");
-/// let model = Path::new(weights).join("untrained-test.safetensors");
-/// let mut classifier = Classifier::load(&model, &Options::default())?;
-/// let prediction = classifier.classify(&[[0.0, 0.0, 0.1], [0.3, 0.0, 0.1], [0.3, 0.2, 0.0]])?;
-/// assert_eq!(prediction.n_used, 3);
-/// println!("{} ({:.1} %)", prediction.answer(), 100.0 * prediction.confidence());
-/// # Ok::<(), infer_cpu::Error>(())
-/// ```
+/// Once loaded, it allocates memory only for clouds of more points than [`Options::capacity`], and
+/// for the first cloud that overflows a short precision.
 pub struct Classifier {
-    /// The model's bytes, from which the fallback is built; `None` where fp32 is
-    /// asked for, which has no fallback.
+    /// The model's bytes, from which the fallback is built; `None` for fp32, which has no fallback.
     source: Option<ModelSource>,
     card: ModelCard,
     classes: Vec<Arc<str>>,
     options: Options,
     kernels: &'static Kernels,
     network: Box<dyn Forward>,
-    /// fp32, once a cloud overflowed the precision asked for.
+    /// The network in fp32, once a cloud has overflowed the requested precision.
     fallback: Option<Box<dyn Forward>>,
     scratch: Scratch,
-    /// What the cloud at hand met in the precision asked for.
+    /// How far the current cloud left the range of the requested precision.
     events: RangeEvents,
     selection: Selection,
     augmentation: TestTimeAugmentation,
     finite: Vec<[f64; 3]>,
-    /// Height of the ground under the cloud at hand, where it is known.
+    /// Height of the ground under the current cloud, if known.
     ground_z: Option<f64>,
     normalized: Vec<[f32; 3]>,
-    /// Where clouds are filtered before they are sampled.
+    /// Drops outliers before sampling, if enabled.
     outliers: Option<OutlierFilter>,
-    /// Places of the points that [`Classifier::sample`] has chosen.
+    /// Indices of the points that [`Classifier::sample`] has chosen.
     sampled: Vec<u32>,
     unknown: UnknownRule,
     prediction: Prediction,
 }
 
 impl Classifier {
-    /// Loads the model file at `path` and packs it as `options` ask.
+    /// Loads the model file at `path` and packs its weights for `options`.
     ///
-    /// No file is read afterwards: for a precision that can overflow, the
-    /// file's bytes stay in memory.
+    /// It reads no file afterwards: for a precision that can overflow, the bytes of the file stay
+    /// in memory.
     ///
     /// # Errors
-    /// A file that cannot be read or is not a model; options that the model or
-    /// this machine cannot meet.
+    /// A file that cannot be read or is not a model; options that the model or this machine does
+    /// not support.
     pub fn load(path: &Path, options: &Options) -> Result<Self, Error> {
         let source = ModelSource::File(path.to_path_buf());
         let source = match options.precision {
@@ -83,8 +68,7 @@ impl Classifier {
         Self::from_source(source, options)
     }
 
-    /// The same for a model file's bytes, such as a program embeds by
-    /// `include_bytes!`.
+    /// Loads a model from the bytes of a model file, for example from `include_bytes!`.
     ///
     /// # Errors
     /// As [`Classifier::load`].
@@ -147,7 +131,7 @@ impl Classifier {
         Ok(classifier)
     }
 
-    /// A classifier for one thread, which shares the weights.
+    /// A second classifier for one thread, which shares the weights.
     pub(crate) fn twin(&self) -> Result<Self, Error> {
         let options = Options { threads: 1, ..self.options.clone() };
         let threads = |source| Error::Threads { threads: 1, source };
@@ -156,20 +140,20 @@ impl Classifier {
         Self::around(network, self.kernels, self.selection.twin()?, source, card, &options)
     }
 
-    /// What the classifier computes by.
+    /// The options of the classifier.
     pub(crate) fn options(&self) -> &Options {
         &self.options
     }
 
-    /// No answer yet, with room for one.
+    /// An empty prediction, with room for all logits.
     pub(crate) fn no_prediction(&self) -> Prediction {
         Prediction::empty(&self.classes, self.card.temperature, self.options.precision)
     }
 
-    /// Makes room for clouds of `n` points, so that none of them allocates.
+    /// Allocates memory for clouds of up to `n` points.
     ///
     /// # Errors
-    /// More points than can be counted.
+    /// More than 2^28 points.
     pub fn reserve(&mut self, n: usize) -> Result<(), Error> {
         if n > MOST_POINTS {
             return Err(Error::TooMuchRoom(n));
@@ -189,7 +173,7 @@ impl Classifier {
         &self.classes
     }
 
-    /// What the model file says about itself.
+    /// The metadata of the model.
     #[must_use]
     pub fn card(&self) -> &ModelCard {
         &self.card
@@ -207,19 +191,19 @@ impl Classifier {
         self.selection.spec()
     }
 
-    /// Classifies a cloud of points, `[n, 3]`, in metres or, where clouds are
-    /// normalised to the unit sphere and only shape counts, in any unit.
+    /// Classifies a cloud of points, `[n, 3]`, in metres. For a model that normalises clouds to the
+    /// unit sphere, only shape counts, and any unit will do.
     ///
     /// # Errors
     /// A cloud without points; one with a coordinate that is not finite, unless
-    /// [`Options::drop_invalid`]; a network whose arithmetic overflows.
+    /// [`Options::drop_invalid`] is set; a network whose arithmetic overflows.
     pub fn classify(&mut self, points: &[[f32; 3]]) -> Result<&Prediction, Error> {
         self.classify_on_ground(points, None)
     }
 
-    /// The same for a cluster over ground at the height `ground_z`, in metres in the
-    /// cluster's frame, as a segmentation tells it. A model for metres counts heights
-    /// from there; `None` or NaN takes the lowest point for the ground.
+    /// Classifies a cluster above ground at the height `ground_z`, in metres in the cluster's
+    /// frame, as a segmentation states it. A model for metres measures heights from there; with
+    /// `None` or NaN, from the lowest point.
     ///
     /// # Errors
     /// As [`Classifier::classify`].
@@ -233,7 +217,7 @@ impl Classifier {
         self.predict()
     }
 
-    /// The same for coordinates that f32 does not hold.
+    /// Classifies a cloud whose coordinates need the precision of f64.
     ///
     /// # Errors
     /// As [`Classifier::classify`].
@@ -242,9 +226,8 @@ impl Classifier {
         self.predict()
     }
 
-    /// The points that the sampler keeps of a cloud, as indices into it:
-    /// repetitions included, where the sampler makes them. The cloud is
-    /// normalised for the choice, and must be finite.
+    /// The indices of the points that the sampler keeps of a cloud, with repetitions if the sampler
+    /// repeats points. The cloud is normalised first.
     ///
     /// # Errors
     /// A cloud without points, or with a coordinate that is not finite.
@@ -260,7 +243,7 @@ impl Classifier {
         Ok(&self.sampled)
     }
 
-    /// Keeps what is finite of `points`.
+    /// Stores the finite points of `points`.
     fn take(&mut self, points: impl Iterator<Item = [f64; 3]>) -> Result<(), Error> {
         self.finite.clear();
         self.ground_z = None;
@@ -271,8 +254,7 @@ impl Classifier {
             } else if self.options.drop_invalid {
                 self.prediction.n_dropped += 1;
             } else {
-                let [x, y, z] = point;
-                return Err(Error::NotFinite { index, x, y, z });
+                return Err(Error::NotFinite { index, point });
             }
         }
         self.prediction.n_points = self.finite.len();
@@ -283,7 +265,7 @@ impl Classifier {
         }
     }
 
-    /// Normalises the cloud at hand, and once more if that shows outliers.
+    /// Normalises the current cloud, and once more if it drops outliers.
     fn normalize(&mut self) {
         self.normalize_whole();
         self.prediction.n_outliers = 0;
@@ -320,8 +302,8 @@ impl Classifier {
         Ok(&self.prediction)
     }
 
-    /// Takes the normalised cloud through sampler and network; logits are left
-    /// in scratch.
+    /// Runs sampler and network on the normalised cloud; the logits are in `scratch.values`
+    /// afterwards.
     fn forward(&mut self) -> Result<(), Error> {
         let Self { selection, normalized, kernels, network, scratch, .. } = self;
         self.events.add(forward_whole(&**network, selection, normalized, kernels, scratch)?);
@@ -331,7 +313,7 @@ impl Classifier {
         Ok(())
     }
 
-    /// The same in fp32, where the precision asked for overflows.
+    /// Does the same in fp32, after the requested precision has overflowed.
     fn forward_in_f32(&mut self) -> Result<(), Error> {
         if self.fallback.is_none() {
             let Some(source) = &self.source else { return Err(Error::Overflow) };
@@ -347,8 +329,7 @@ impl Classifier {
         if is_sound { Ok(()) } else { Err(Error::Overflow) }
     }
 
-    /// Averages the log-probabilities of several draws, which take the place of
-    /// logits.
+    /// Averages the log-probabilities of several draws, which replace the logits.
     fn vote(&mut self) -> Result<(), Error> {
         self.augmentation.begin(&self.normalized);
         let mut energies = 0.0;
@@ -357,7 +338,7 @@ impl Classifier {
             self.augmentation.turn(vote, &mut self.normalized);
             self.forward()?;
             self.augmentation.count(&self.scratch.values);
-            // The mean log-probabilities have lost it.
+            // Mean log-probabilities no longer contain the energy.
             energies += energy(&self.scratch.values, self.card.temperature);
         }
         self.augmentation.result(&mut self.prediction.logits);
@@ -366,8 +347,8 @@ impl Classifier {
     }
 }
 
-/// Takes `cloud` through the sampler and `network`; logits are left in
-/// `scratch`. Returns how far it left the range of the network's format.
+/// Runs the sampler and `network` on `cloud`; the logits are in `scratch.values` afterwards.
+/// Returns how far the cloud left the range of the network's format.
 fn forward_whole(
     network: &dyn Forward,
     selection: &mut Selection,
@@ -382,20 +363,17 @@ fn forward_whole(
     Ok(scratch.events)
 }
 
-/// Whether outliers are dropped: as the model was trained, unless `options` say
-/// otherwise.
+/// Whether outliers are dropped: as in training, unless `options` say otherwise.
 ///
 /// # Errors
-/// [`Error::OutlierFilter`] where clouds are not normalised to the unit sphere. In
-/// clusters in metres an outlier shrinks nothing, and the filter was not measured to help.
+/// [`Error::OutlierFilter`] if clouds are not normalised to the unit sphere. In metres, an outlier
+/// does not shrink the other points.
 fn filters_outliers(options: &Options, card: &ModelCard) -> Result<bool, Error> {
     let normalization = options.normalization.unwrap_or(card.normalization);
+    let is_unit_sphere = normalization == Normalization::UnitSphere;
     match options.outlier_filter {
-        _ if normalization == Normalization::UnitSphere => {
-            Ok(options.outlier_filter.unwrap_or(card.outlier_filter))
-        }
-        Some(true) => Err(Error::OutlierFilter(normalization)),
-        _ => Ok(false),
+        Some(true) if !is_unit_sphere => Err(Error::OutlierFilter(normalization)),
+        filter => Ok(is_unit_sphere && filter.unwrap_or(card.outlier_filter)),
     }
 }
 
@@ -410,7 +388,7 @@ fn class_names(card: &ModelCard, n_classes: usize) -> Vec<Arc<str>> {
     }
 }
 
-/// The kernels `forced`, or the fastest here that have products in `precision`.
+/// The kernels `forced`, or the fastest of this machine that support `precision`.
 fn choose_kernels(
     precision: Precision,
     forced: Option<KernelName>,

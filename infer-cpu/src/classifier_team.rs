@@ -1,4 +1,4 @@
-//! Many clouds at once, a thread a cloud.
+//! Many clouds at a time, one thread for each.
 
 use std::sync::{Mutex, MutexGuard, PoisonError, RwLock};
 
@@ -7,20 +7,20 @@ use crate::error::Error;
 use crate::prediction::Prediction;
 use crate::team::{Team, Work};
 
-/// Clouds that each thread has waiting for it: large ones and small ones even out.
+/// Clouds per thread in a batch: large and small ones even out.
 const CLOUDS_PER_THREAD: usize = 8;
 
-/// Classifiers that share the weights of one model and work side by side, each in a thread of
-/// its own.
+/// Classifiers that share the weights of one model and run in parallel, each in a thread of its
+/// own.
 ///
-/// A [`Classifier`] of several threads shares out one cloud among them, which pays off for a
-/// single one; clouds that come together are better shared out whole. Answers are the same.
-/// Nothing is allocated for clouds within [`Options::capacity`](crate::Options::capacity).
+/// A [`Classifier`] with several threads divides one cloud among them, which is faster for a single
+/// cloud. For many clouds, one thread per cloud is faster. The predictions are the same. Clouds
+/// within [`Options::capacity`](crate::Options::capacity) cause no allocation.
 pub struct ClassifierTeam {
     team: Team<Clouds>,
 }
 
-/// The clouds at hand, their classifiers and their answers.
+/// The clouds of a batch, the classifiers and the predictions.
 struct Clouds {
     clouds: Vec<RwLock<Cloud>>,
     /// One for each thread.
@@ -34,7 +34,7 @@ struct Cloud {
     ground_z: Option<f32>,
 }
 
-/// What came out for a cloud.
+/// The result for a cloud.
 struct Answer {
     prediction: Prediction,
     error: Option<Error>,
@@ -56,7 +56,7 @@ impl Work for Clouds {
 }
 
 impl ClassifierTeam {
-    /// As many classifiers like `classifier` as that has threads.
+    /// As many classifiers as `classifier` has threads, with the same options.
     ///
     /// # Errors
     /// Threads that cannot be started.
@@ -76,8 +76,8 @@ impl ClassifierTeam {
         Ok(Self { team: Team::new(work, n_threads).map_err(threads)? })
     }
 
-    /// Classifies clouds as [`Classifier::classify_on_ground`] does, each a cloud's points and
-    /// the height of the ground under it, and gives the answers to `each` in order.
+    /// Classifies clouds as [`Classifier::classify_on_ground`] does, given the points of each and
+    /// the height of the ground under it, and passes the predictions to `each` in order.
     pub fn classify_many<'a>(
         &mut self,
         clouds: impl IntoIterator<Item = (&'a [[f32; 3]], Option<f32>)>,
@@ -106,7 +106,8 @@ impl ClassifierTeam {
     }
 }
 
-/// A panic in a worker is a defect, and has been reported; what it left is overwritten.
+/// Ignores poison: a panic in a worker has been reported, and the next cloud overwrites what it
+/// left.
 fn lock<V>(lock: &Mutex<V>) -> MutexGuard<'_, V> {
     lock.lock().unwrap_or_else(PoisonError::into_inner)
 }

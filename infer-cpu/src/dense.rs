@@ -1,11 +1,11 @@
-//! One linear layer as it comes from the file, its batch norm folded.
+//! A linear layer of a model file, with its batch norm folded in.
 
 use formats::weights::Tensor;
 
-/// PyTorch's default epsilon of batch norms, which the baseline keeps.
+/// PyTorch's default epsilon of batch norms, which the baseline uses.
 const BATCH_NORM_EPSILON: f64 = 1e-5;
 
-/// `y = W x + b`, perhaps with a ReLU.
+/// `y = W x + b`, optionally followed by a ReLU.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dense {
     /// The layer's name in the model file.
@@ -41,7 +41,7 @@ impl Dense {
         self.weight[output * self.inputs + input]
     }
 
-    /// Multiplies a batch norm that follows into weights and biases, in f64.
+    /// Folds the batch norm that follows into weights and biases, in f64.
     pub fn fold(&mut self, norm: &BatchNorm) {
         for output in 0..self.outputs {
             let at = |tensor: &Tensor| f64::from(tensor.values[output]);
@@ -54,8 +54,8 @@ impl Dense {
         }
     }
 
-    /// The largest sum of weight magnitudes over the outputs: an activation of
-    /// at most 1 makes no partial sum larger.
+    /// The largest sum of weight magnitudes of an output: with activations of at most 1, no partial
+    /// sum exceeds it.
     #[must_use]
     pub fn gain(&self) -> f32 {
         let rows = self.weight.chunks_exact(self.inputs.max(1));

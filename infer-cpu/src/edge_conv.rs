@@ -1,35 +1,32 @@
-//! Features of a point's neighborhood: an EdgeConv (Wang et al. 2019, *Dynamic Graph CNN*,
-//! equation 8 with features of coordinates' differences alone) before the
-//! trunk's first layer.
+//! Features of a point's neighborhood: an EdgeConv (Wang et al. 2019, *Dynamic Graph CNN*, equation
+//! 8 with features of coordinates' differences alone) before the trunk's first layer.
 //!
-//! A point p of the cloud C gets, for each radius r and channel, beside its
-//! coordinates,
+//! For each radius r and channel, the feature of a point p of the cloud C is
 //!
 //! ```text
 //! max over q in C, |q - p| <= r, of relu(w (q - p) / r + b)
 //! ```
 //!
-//! the extent of its neighborhood in a direction that was learnt: an edge, a
-//! plate and a rod differ in it where a few sampled points do not. Neighbours
-//! are taken from all points, kept by the sampler or not. p is its own
-//! neighbour, so that the maximum is never of nothing. It depends neither on
-//! the order of points nor on repetitions.
+//! the extent of the neighborhood in a learnt direction. It distinguishes an edge, a plate and a
+//! rod where a few sampled points do not. Neighbours are taken from the whole cloud, not from the
+//! sampled points alone. p is its own neighbour, so that the maximum always exists. The feature
+//! depends neither on the order of points nor on repetitions.
 //!
-//! Computed is `relu(max(w q / r) - w p / r + b)`, which is the same but for rounding: a
-//! neighbour costs a maximum instead of a product. Products are computed for a tile of the
-//! cloud at a time, which stays in the first-level cache, and serve all points of a block.
+//! The code computes `relu(max(w q / r) - w p / r + b)`, which is equal up to rounding: each
+//! neighbour then costs a maximum instead of a product. Products are computed for one tile of the
+//! cloud at a time, which stays in the first-level cache, and are shared by all points of a block.
 
 use std::ops::Range;
 
 use crate::dense::Dense;
 
-/// Points of the cloud whose products are at hand at once.
+/// Points of a tile.
 const TILE: usize = 64;
-/// Channels whose maxima stay in registers while neighbours pass. Layers are padded to
-/// whole ones.
+/// Channels whose maxima stay in registers during the loop over neighbours. Layers are padded to
+/// multiples of it.
 const LANES: usize = 32;
 
-/// Some channels, side by side.
+/// A vector of channels.
 type Lanes = [f32; LANES];
 
 /// The layers of all radii.
@@ -37,7 +34,7 @@ type Lanes = [f32; LANES];
 pub struct EdgeConv {
     /// The widest first.
     layers: Vec<EdgeLayer>,
-    /// Weights of x, y and z, divided by the radius, and biases, of all layers.
+    /// The weights of x, y and z of all layers, divided by the radius.
     weights: Vec<[Lanes; 3]>,
     bias: Vec<Lanes>,
 }
@@ -45,37 +42,37 @@ pub struct EdgeConv {
 #[derive(Clone, Debug)]
 struct EdgeLayer {
     squared_radius: f32,
-    /// Its places among the features of all layers.
+    /// The range of its features among those of all layers.
     features: Range<usize>,
-    /// Its places among all layers' weights.
+    /// The range of its weights among those of all layers.
     lanes: Range<usize>,
 }
 
-/// All points of a cloud, coordinate by coordinate, and infinitely far ones that make whole
-/// tiles of them.
+/// All points of a cloud as one array per coordinate, padded with points at infinity to whole
+/// tiles.
 #[derive(Clone, Debug, Default)]
 pub struct Neighborhood {
     axes: [Vec<f32>; 3],
 }
 
-/// The memory in which a block's features arise.
+/// Working memory for the features of a block.
 #[derive(Clone, Debug, Default)]
 pub struct EdgeScratch {
-    /// A tile's points with the weights.
+    /// The products of a tile's points and the weights.
     products: Vec<[Lanes; TILE]>,
-    /// Of the points of a block: all of the first, all of the second, ...
+    /// The maxima of a block, point by point.
     maxima: Vec<Lanes>,
 }
 
 impl Neighborhood {
-    /// Makes room for `n` points.
+    /// Allocates memory for `n` points.
     pub fn reserve(&mut self, n: usize) {
         for axis in &mut self.axes {
             axis.reserve(n.next_multiple_of(TILE).saturating_sub(axis.len()));
         }
     }
 
-    /// Takes `points` in place of what was there.
+    /// Replaces the points.
     pub fn set(&mut self, points: &[[f32; 3]]) {
         for (k, axis) in self.axes.iter_mut().enumerate() {
             axis.clear();
@@ -98,13 +95,13 @@ impl EdgeConv {
         let mut edges = Self::default();
         let mut first = 0;
         for (radius, dense) in layers {
-            let of = |c: usize, value: &dyn Fn(usize) -> f32| -> Lanes {
+            let padded = |c: usize, value: &dyn Fn(usize) -> f32| -> Lanes {
                 std::array::from_fn(|i| if c + i < dense.outputs { value(c + i) } else { 0.0 })
             };
             let from = edges.bias.len();
             for c in (0..dense.outputs).step_by(LANES) {
-                edges.weights.push([0, 1, 2].map(|k| of(c, &|c| dense.at(k, c) / radius)));
-                edges.bias.push(of(c, &|c| dense.bias[c]));
+                edges.weights.push([0, 1, 2].map(|k| padded(c, &|c| dense.at(k, c) / radius)));
+                edges.bias.push(padded(c, &|c| dense.bias[c]));
             }
             let features = first..first + dense.outputs;
             first = features.end;
@@ -115,7 +112,7 @@ impl EdgeConv {
         edges
     }
 
-    /// Whether there is none.
+    /// Whether there are no layers.
     pub fn is_empty(&self) -> bool {
         self.layers.is_empty()
     }
@@ -128,9 +125,9 @@ impl EdgeConv {
         }
     }
 
-    /// Writes the features of the points of `rows` behind their coordinates, layer by layer
-    /// in the order in which they were given; `[points, stride]`. Kernels call it, compiled
-    /// for their vectors.
+    /// Writes the features of the points in `rows` `[points, stride]` behind their coordinates,
+    /// layer by layer in the order of construction. Kernels call this function, so that it is
+    /// compiled for their instruction sets.
     #[inline(always)]
     pub fn features<const FUSED: bool>(
         &self,
@@ -186,7 +183,7 @@ impl EdgeConv {
         }
     }
 
-    /// Writes the products of some of a tile's points, a bit each, with all weights.
+    /// Computes the products of all weights and the tile's points whose bits are set in `points`.
     #[inline(always)]
     fn project<const FUSED: bool>(
         &self,
@@ -208,8 +205,8 @@ impl EdgeConv {
         }
     }
 
-    /// Writes the features of the point of `row` from its maxima. Where its own product
-    /// leaves f32, it has no extent.
+    /// Writes the features of the point of `row` from its maxima. If its own product overflows f32,
+    /// the extent is 0.
     #[inline(always)]
     fn finish<const FUSED: bool>(&self, maxima: &[Lanes], row: &mut [f32]) {
         let (centre, out) = row.split_at_mut(3);
@@ -226,7 +223,7 @@ impl EdgeConv {
     }
 }
 
-/// Points of a cloud that are looked at together.
+/// Points of a cloud that are processed together.
 struct Tile<'a> {
     x: &'a [f32; TILE],
     y: &'a [f32; TILE],
@@ -245,8 +242,8 @@ impl Tile<'_> {
     }
 }
 
-/// The products of a point with some channels' weights. `FUSED` where the processor rounds
-/// a product and a sum at once: what it must imitate takes it long.
+/// The products of a point and the weights of `N` channels. `FUSED` is for processors with a fused
+/// multiply-add; without it, `mul_add` would be a slow library call.
 #[inline(always)]
 fn product<const FUSED: bool, const N: usize>(
     [wx, wy, wz]: [&[f32; N]; 3],
@@ -263,7 +260,7 @@ fn product<const FUSED: bool, const N: usize>(
     out
 }
 
-/// The points of a tile within a radius, a bit each.
+/// The points of a tile within a radius, one bit each.
 #[inline(always)]
 fn within(squared: &[f32; TILE], squared_radius: f32) -> u64 {
     /// Moves the lowest bit of byte i to bit 56 + i: the factor has the bits 56 - 7 i.
@@ -277,7 +274,7 @@ fn within(squared: &[f32; TILE], squared_radius: f32) -> u64 {
     bits.rev().fold(0, |near, bits| near << 8 | bits)
 }
 
-/// The numbers of the bits that are set.
+/// The positions of the set bits.
 #[inline(always)]
 fn bits(mut of: u64) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
@@ -287,7 +284,7 @@ fn bits(mut of: u64) -> impl Iterator<Item = usize> {
     })
 }
 
-/// Raises maxima to the products of the points that are `near`, a bit each.
+/// Raises the maxima to the products of the points whose bits are set in `near`.
 #[inline(always)]
 fn raise(maxima: &mut Lanes, products: &[Lanes; TILE], near: u64) {
     let mut most = *maxima;
@@ -299,8 +296,8 @@ fn raise(maxima: &mut Lanes, products: &[Lanes; TILE], near: u64) {
     *maxima = most;
 }
 
-/// The greater of two numbers, one instruction of each processor. Neither is NaN but where
-/// a product leaves f32.
+/// The greater of two numbers, in one instruction on each architecture. Neither is NaN unless a
+/// product overflows f32.
 #[inline(always)]
 fn greater(most: f32, product: f32) -> f32 {
     if cfg!(target_arch = "aarch64") {
@@ -337,7 +334,7 @@ mod tests {
         (0..n).map(|i| [0, 1, 2].map(|k| key.unit((3 * i + k) as u64) as f32)).collect()
     }
 
-    /// The definition, in f64; `near` decides who is a neighbour.
+    /// The definition, in f64.
     fn twin(layers: &[(f32, Dense)], p: [f32; 3], cloud: &[[f32; 3]]) -> Vec<f64> {
         let mut features = Vec::new();
         for (radius, dense) in layers {
@@ -360,7 +357,7 @@ mod tests {
     fn features(edges: &EdgeConv, p: [f32; 3], cloud: &[[f32; 3]], n: usize) -> Vec<f32> {
         let mut neighborhood = Neighborhood::default();
         neighborhood.set(cloud);
-        // Two points, so that one does not disturb the other, with padding.
+        // Two padded rows, to show that neighbouring rows do not mix.
         let mut rows = vec![f32::NAN; 2 * (n + 5)];
         rows[..3].copy_from_slice(&cloud[0]);
         rows[n + 5..n + 8].copy_from_slice(&p);
@@ -376,10 +373,9 @@ mod tests {
             let cloud = cloud(n);
             let found = features(&edges, cloud[n / 2], &cloud, 8);
             for (found, truth) in found.iter().zip(twin(&layers, cloud[n / 2], &cloud)) {
-                // In units u = EPSILON / 2: weights are at most 1, over the radius at
-                // most 5 and off by 5u, coordinates at most 1. A product of three with
-                // its sums is off by 4 * 15u, the difference of two by 120u and its own
-                // rounding, 15u; the bias adds 15u.
+                // In units u = EPSILON / 2: weights are at most 1, over the radius at most 5 and
+                // off by 5u, coordinates at most 1. A product of three with its sums is off by 4 *
+                // 15u, the difference of two by 120u and its own rounding, 15u; the bias adds 15u.
                 let bound = 150.0 * f64::from(f32::EPSILON) / 2.0;
                 assert!((f64::from(*found) - truth).abs() <= bound, "{found}, {truth}, n {n}");
             }

@@ -1,4 +1,4 @@
-//! What can go wrong between a model file, a cloud and a class.
+//! Errors of loading a model and classifying a cloud.
 
 use formats::FormatError;
 
@@ -9,39 +9,35 @@ use crate::options::{MOST_POINTS, MOST_THREADS};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A file that cannot be read, or is not what it should be.
+    /// A file cannot be read, or has the wrong format.
     #[error(transparent)]
     Format(#[from] FormatError),
-    /// A cloud without points has no class.
+    /// The cloud has no points.
     #[error("the cloud has no points")]
     NoPoints,
     /// A coordinate is NaN or infinite.
-    #[error("point {index}: expected finite coordinates, found ({x}, {y}, {z})")]
+    #[error("point {index}: expected finite coordinates, found ({}, {}, {})", .point[0], .point[1], .point[2])]
     NotFinite {
-        /// The point's place in the cloud, from 0.
+        /// The point's index in the cloud.
         index: usize,
         /// Its coordinates.
-        x: f64,
-        /// Its coordinates.
-        y: f64,
-        /// Its coordinates.
-        z: f64,
+        point: [f64; 3],
     },
-    /// A label of an evaluation that the model has no class for.
+    /// An evaluation has a label without a class in the model.
     #[error("expected labels below {n_classes}, the model's number of classes, found {label}")]
     UnknownLabel {
         /// The label.
         label: usize,
-        /// How many classes the model has.
+        /// The number of classes of the model.
         n_classes: usize,
     },
-    /// More points than their indices can count.
+    /// More points than a 32-bit index can count.
     #[error("expected at most 4,294,967,295 points, found {0}")]
     TooManyPoints(usize),
-    /// The kernel that was asked for does not run here.
+    /// This machine cannot run the requested kernel.
     #[error("this machine cannot run the kernel {0}; it runs {here}", here = names_here())]
     KernelMissing(KernelName),
-    /// The kernel that was asked for has no such precision.
+    /// The requested kernel does not support the precision.
     #[error("the kernel {kernel} does not compute in {precision}")]
     KernelPrecision {
         /// The kernel.
@@ -49,40 +45,40 @@ pub enum Error {
         /// The precision.
         precision: crate::Precision,
     },
-    /// Outliers are sought in clouds of the unit sphere alone.
+    /// The outlier filter needs clouds in the unit sphere.
     #[error("expected clouds normalised to unit-sphere for the outlier filter, found {0}")]
     OutlierFilter(formats::model_card::Normalization),
     /// Arithmetic left the range of f32.
     #[error("the network overflows on this cloud: its logits are not finite")]
     Overflow,
-    /// Points cannot be chosen as asked.
+    /// The sampler is invalid, or cannot sample this cloud.
     #[error(transparent)]
     Sampler(#[from] crate::sampler::SamplerError),
-    /// The model lacks the front end that a Critical Points Layer was to pool.
+    /// The model lacks the front end for a Critical Points Layer.
     #[error("the sampler cpl cannot use the front end `{choice}`: the model has {what}")]
     FrontMissing {
-        /// What was asked for.
+        /// The requested front end.
         choice: crate::sampler::FrontChoice,
-        /// What the model has or lacks.
+        /// What the model has instead.
         what: &'static str,
     },
-    /// TestTimeAugmentation draw random subsets; another sampler has one opinion only.
+    /// Several votes without random draws or rotations would all be the same.
     #[error(
         "expected the sampler random or rotations for several votes, found the sampler {0}, whose votes would all be the same"
     )]
     VotesWithoutDraws(crate::sampler::SamplerKind),
-    /// Room for more points than memory could hold.
+    /// The capacity exceeds 2^28 points.
     #[error("expected a capacity of at most {MOST_POINTS} points, found {0}")]
     TooMuchRoom(usize),
-    /// More threads than any machine has cores.
+    /// The number of threads exceeds 1024.
     #[error("expected at most {MOST_THREADS} threads, found {0}")]
     TooManyThreads(usize),
-    /// Workers could not be started.
+    /// A thread could not be started.
     #[error("cannot start {threads} threads: {source}")]
     Threads {
-        /// How many were asked for.
+        /// The requested number of threads.
         threads: usize,
-        /// What the system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
 }

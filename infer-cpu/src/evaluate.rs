@@ -6,16 +6,14 @@ use formats::labelled::LabelledSet;
 use crate::classifier::Classifier;
 use crate::error::Error;
 
-/// How a classifier's answers compare with the labels.
+/// The confusion matrix of a classifier on a labelled set.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Evaluation {
-    /// Clouds by their label and the answer: `[label][answer]`, a square of the
-    /// model's classes.
+    /// The number of clouds for each label and predicted class: `[label][prediction]`.
     pub confusion: Vec<Vec<usize>>,
 }
 
-/// Classifies every cloud of `set`, whose labels are indices into
-/// [`Classifier::classes`].
+/// Classifies every cloud of `set`, whose labels are indices into [`Classifier::classes`].
 ///
 /// ```no_run
 /// use std::path::Path;
@@ -30,13 +28,13 @@ pub struct Evaluation {
 /// ```
 ///
 /// # Errors
-/// A label that the model has no class for; a cloud that cannot be classified.
+/// A label without a class in the model; a cloud that cannot be classified.
 pub fn evaluate(classifier: &mut Classifier, set: &LabelledSet) -> Result<Evaluation, Error> {
     evaluate_some(classifier, set, 0..set.len())
 }
 
-/// The same for the clouds of `set` that `indices` name, so that several
-/// classifiers can share a set; [`Evaluation::merge`] puts their parts together.
+/// Classifies the clouds of `set` at `indices`, so that several classifiers can share a set;
+/// [`Evaluation::merge`] adds up their parts.
 ///
 /// # Errors
 /// As [`evaluate`].
@@ -73,30 +71,29 @@ impl Evaluation {
         counts.zip(part.confusion.iter().flatten()).for_each(|(sum, n)| *sum += n);
     }
 
-    /// How many clouds were classified.
+    /// The number of clouds.
     #[must_use]
     pub fn total(&self) -> usize {
         self.confusion.iter().flatten().sum()
     }
 
-    /// How many were classified as labelled.
+    /// The number of correct predictions.
     #[must_use]
     pub fn correct(&self) -> usize {
         self.confusion.iter().enumerate().map(|(class, answers)| answers[class]).sum()
     }
 
-    /// The share of clouds that were classified as labelled; 0 without clouds.
+    /// The share of correct predictions; 0 without clouds.
     #[must_use]
     pub fn instance_accuracy(&self) -> f64 {
         self.correct() as f64 / self.total().max(1) as f64
     }
 
-    /// The mean over classes that have clouds of the share classified as
-    /// labelled, and the half width of its 95 % interval.
+    /// The mean over classes of the share of correct predictions, and the half width of its 95 %
+    /// interval. Classes without clouds do not count.
     ///
-    /// Each class's share is one of independent trials, with Agresti and
-    /// Coull's (1998) two of each outcome added, so that a class without errors
-    /// is not taken for one that never errs.
+    /// The interval treats each class as independent trials and adds two of each outcome (Agresti
+    /// and Coull 1998), so that a class without errors does not count as certain.
     #[must_use]
     pub fn class_accuracy(&self) -> (f64, f64) {
         let classes = self.confusion.iter().enumerate().filter_map(|(class, answers)| {

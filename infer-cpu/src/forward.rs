@@ -1,4 +1,4 @@
-//! A network of whichever precision, loaded and ready to run.
+//! Loads a network in any precision.
 
 use std::sync::Arc;
 
@@ -16,18 +16,17 @@ use crate::precision::{F16, F32, F32Fc16, Format, I8, Precision};
 use crate::source::ModelSource;
 use crate::team::Team;
 
-/// A model, packed and ready.
+/// A loaded model.
 pub struct Loaded {
-    /// What it says about itself.
+    /// Its metadata.
     pub card: ModelCard,
     /// Its network.
     pub network: Box<dyn Forward>,
-    /// What the network consists of.
+    /// The optional parts that it has.
     pub parts: Parts,
 }
 
-/// Loads `model` and packs it for `kernels`, which have products in `precision`;
-/// all else is as `options` ask.
+/// Loads `model` with `options` and packs it for `kernels`, which must support `precision`.
 ///
 /// # Errors
 /// A source that is not a model; threads that cannot be started.

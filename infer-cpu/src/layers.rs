@@ -17,12 +17,12 @@ pub type Layers<T> = Network<Conv<T>, Vector<T>>;
 
 /// A point-wise layer.
 pub enum Conv<T: Format> {
-    /// It takes coordinates, in fp32 whatever the format.
+    /// Its inputs are coordinates; it computes in fp32 in every format.
     First(First),
-    /// It takes features.
+    /// Its inputs are features.
     Inner(Packed<T>),
-    /// It takes features that the feature transform turned: by themselves, or
-    /// in one product with these weights in plain fp32.
+    /// Its inputs are features after the feature transform, as a layer of its own or multiplied
+    /// into these weights, which are in plain fp32.
     Turned(Packed<T>, Panels<f32>),
 }
 
@@ -30,11 +30,11 @@ pub enum Conv<T: Format> {
 pub struct First {
     /// Its weights.
     pub panels: Panels<f32>,
-    /// Its weights before packing, to be multiplied by an input transform.
+    /// Its weights before packing, which are multiplied by the input transform.
     pub dense: Dense,
-    /// Its largest output, where calibrated.
+    /// The calibrated largest output.
     pub range: f32,
-    /// Its largest output of those observed.
+    /// The largest observed output.
     pub seen: Largest,
 }
 
@@ -44,25 +44,25 @@ pub struct Packed<T: Format> {
     pub name: String,
     /// Its weights.
     pub panels: Panels<T::Weight>,
-    /// What prefilters its pooling, where that pays.
+    /// The prefilter of its pooling, if that is faster.
     pub prefilter: Option<Int8Prefilter>,
     /// See [`Dense::gain`].
     pub gain: f32,
-    /// Its largest output, where calibrated.
+    /// The calibrated largest output.
     pub range: f32,
-    /// Its largest output of those observed.
+    /// The largest observed output.
     pub seen: Largest,
 }
 
-/// The largest of some numbers that several threads see.
+/// A maximum that several threads update.
 #[derive(Default)]
 pub struct Largest(AtomicU32);
 
 impl Largest {
-    /// Counts in `values`; those below 0, and NaN, change nothing.
+    /// Raises the maximum to `values`; NaN and numbers below 0 do not count.
     pub fn observe(&self, values: &[f32]) {
         let largest = values.iter().copied().fold(0.0, f32::max);
-        // Of numbers that are not negative, bits are in the numbers' order.
+        // The bits of nonnegative numbers have the order of the numbers.
         self.0.fetch_max(largest.to_bits(), Ordering::Relaxed);
     }
 
@@ -80,10 +80,10 @@ pub struct Vector<T: Format> {
     pub relu: bool,
 }
 
-/// The largest activation by calibration, of a layer that was not calibrated.
+/// The assumed largest activation of a layer without calibration.
 const UNKNOWN_RANGE: f32 = 1.0;
 
-/// Reads and packs the network of `file`. Calibrated ranges come from `card`.
+/// Reads and packs the network of `file`, with the calibrated ranges of `card`.
 ///
 /// # Errors
 /// As [`read_network`].
@@ -119,9 +119,9 @@ impl Packer<'_> {
             Role::AfterTransform => {
                 let mut plain = empty::<F32>(self.kernels, &dense);
                 plain.fill(|input, output| dense.at(input, output));
-                // Bias and ReLU are for after the product.
+                // Bias and ReLU apply after the product with the transform.
                 plain.biases_mut().fill(0.0);
-                plain.set_relu(false);
+                plain.relu = false;
                 Conv::Turned(self.packed(&dense), plain)
             }
         }
@@ -167,22 +167,22 @@ impl Packer<'_> {
 fn empty<T: Format>(kernels: &Kernels, dense: &Dense) -> Panels<T::Weight> {
     let mut panels = panels::<T>(kernels, dense.inputs, dense.outputs);
     panels.biases_mut()[..dense.outputs].copy_from_slice(&dense.bias);
-    panels.set_relu(dense.relu);
+    panels.relu = dense.relu;
     panels
 }
 
 /// Panels of zeros of a size.
 ///
 /// # Panics
-/// If `kernels` have no products in this format; whoever chose them checked.
+/// If `kernels` do not support this format; `Precision::runs_on` checks it when kernels are chosen.
 pub fn panels<T: Format>(kernels: &Kernels, inputs: usize, outputs: usize) -> Panels<T::Weight> {
     let gemm = T::gemm(kernels).expect("invariant: kernels are chosen for the format");
     Panels::zeros(inputs, outputs, (gemm.nr, gemm.k_step, T::GROUP))
 }
 
 impl First {
-    /// Packs the layer behind an input transform `t` `[3, 3]`: a point p, a
-    /// row, comes to it as p t. The weights of EdgeConv features stay.
+    /// Packs the product of the input transform `t` `[3, 3]` and this layer: the layer's input for
+    /// a point p (a row) is p t. The weights of EdgeConv features stay the same.
     pub fn turn(&self, t: &[f32], panels: &mut Panels<f32>) {
         panels.fill(|input, output| match input {
             0..3 => (0..3).map(|j| t[input * 3 + j] * self.dense.at(j, output)).sum(),
@@ -192,10 +192,10 @@ impl First {
 }
 
 impl<T: Format> Packed<T> {
-    /// A layer of zeros, to be set by [`Packed::set`].
+    /// A layer of zeros, which [`Packed::set`] fills later.
     pub fn zeros(kernels: &Kernels, inputs: usize, outputs: usize) -> Self {
         let mut panels = panels::<T>(kernels, inputs, outputs);
-        // Scales too, where the format has them, so that setting allocates nothing.
+        // This also allocates the scales, if the format has them, so that `set` allocates nothing.
         T::Weight::fill(&mut panels, UNKNOWN_RANGE, |_, _| 0.0);
         Self {
             name: String::new(),
@@ -207,8 +207,7 @@ impl<T: Format> Packed<T> {
         }
     }
 
-    /// Packs `matrix`, of as many inputs and outputs as this layer has, for
-    /// inputs of at most `range`.
+    /// Packs `matrix`, which has this layer's size, for inputs of at most `range`.
     pub fn set(&mut self, matrix: &Matrix<'_>, range: f32) {
         let at = |input: usize, output: usize| matrix.data[input * matrix.stride + output];
         T::Weight::fill(&mut self.panels, range, at);
@@ -224,10 +223,10 @@ impl<T: Format> Packed<T> {
 }
 
 impl<T: Format> Conv<T> {
-    /// The layer as one that takes coordinates.
+    /// The layer, if its inputs are coordinates.
     ///
     /// # Panics
-    /// If it is none; [`read_network`] gives the roles.
+    /// If they are features; [`read_network`] assigns the roles.
     pub fn first(&self) -> &First {
         match self {
             Self::First(first) => first,
@@ -235,10 +234,10 @@ impl<T: Format> Conv<T> {
         }
     }
 
-    /// The layer as one that takes features.
+    /// The layer, if its inputs are features.
     ///
     /// # Panics
-    /// If it takes coordinates.
+    /// If they are coordinates.
     pub fn packed(&self) -> &Packed<T> {
         match self {
             Self::Inner(packed) | Self::Turned(packed, _) => packed,

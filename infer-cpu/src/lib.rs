@@ -1,38 +1,38 @@
-//! Classifies point clouds on a CPU by PointNet, behind a Critical Points Layer
-//! or another sampler.
+//! Classifies point clouds on a CPU by PointNet, behind a Critical Points Layer or another sampler.
 //!
-//! A [`Classifier`] takes a cloud to a class. It is loaded once, from a file or
-//! from a program's memory, and then allocates nothing:
+//! From a cloud to its class:
 //!
 //! ```
-//! use infer_cpu::sampler::{SamplerKind, SamplerSpec};
-//! use infer_cpu::{Classifier, Options};
+//! use std::path::Path;
 //!
-//! # let weights = concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/weights");
-//! # let model = std::fs::read(format!("{weights}/edge-64.safetensors")).unwrap();
-//! // A model file's bytes; `Classifier::load` takes a path.
-//! let sampler = SamplerSpec { kind: SamplerKind::Fps, points: 64, ..SamplerSpec::default() };
-//! let options = Options { threads: 2, sampler: Some(sampler), ..Options::default() };
-//! let mut classifier = Classifier::from_bytes(&model, &options)?;
+//! use infer_cpu::{Classifier, Options, read_cloud};
 //!
-//! let cloud: Vec<[f32; 3]> = (0..500u16)
-//!     .map(|i| [f32::from(i).cos(), f32::from(i).sin(), f32::from(i) * 0.01])
-//!     .collect();
-//! let prediction = classifier.classify(&cloud)?;
+//! # let model = concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/weights/edge-64.safetensors");
+//! # let folder = tempfile::tempdir().unwrap();
+//! # let cloud = folder.path().join("chair.xyz");
+//! # std::fs::write(&cloud, "0 0 0\n1 0 0\n0 2 0\n0 0 3\n").unwrap();
+//! // `model` and `cloud` are paths; the checkout has models in assets/weights.
+//! let mut classifier = Classifier::load(Path::new(model), &Options::default())?;
+//! let cloud = read_cloud(&cloud)?;
+//! let prediction = classifier.classify_f64(&cloud)?;
 //! println!("{} ({:.1} %)", prediction.answer(), 100.0 * prediction.confidence());
-//! assert_eq!(prediction.n_used, 64);
 //! # Ok::<(), infer_cpu::Error>(())
 //! ```
 //!
-//! [`choose`] thins a cloud without a network, `evaluate` (feature `evaluate`)
-//! measures accuracy on a labelled set, and [`inspect`] tells what a model file
-//! holds. [`sampler`] chooses points; [`kernel`] lists the instruction sets.
+//! A [`Classifier`] is loaded once, from a file or from a program's memory
+//! ([`Classifier::from_bytes`]). It then allocates no memory for clouds of up to
+//! [`Options::capacity`] points, as arrays of f32 ([`Classifier::classify`]) or f64. [`Options`]
+//! choose the precision, the threads and the [`sampler`]. A [`ClassifierTeam`] classifies many clouds
+//! at a time.
+//!
+//! [`choose`] thins a cloud without a network, `evaluate` measures accuracy on a labelled set, `live`
+//! tracks objects in the packets of a sensor, [`inspect`] summarises a model file, and [`kernel`]
+//! lists instruction sets.
 //!
 //! # Features
-//! `npz`, `ply`, `pcd` and `las` read clouds of these formats by
-//! `formats::cloud_file`. `evaluate` adds the evaluation. `cli` builds the
-//! program `infer-cpu`; a library's user can leave it out:
-//! `infer-cpu = { version = "0.1", default-features = false }`.
+//! `npz`, `ply`, `pcd` and `las` read clouds of these formats. `evaluate` and `live` add what their
+//! names say, and `mcap` recordings. `cli` builds the program `infer-cpu`; a library's user can leave
+//! it out: `infer-cpu = { version = "0.1", default-features = false }`.
 
 #![deny(unsafe_code)]
 
@@ -64,7 +64,8 @@ mod summary;
 mod team;
 mod test_time_augmentation;
 
-/// How a team of threads shares out a cloud, for models of its speed.
+/// How a team of threads divides a cloud, for models of its speed.
+#[doc(hidden)]
 pub mod sharing {
     pub use crate::engine::{
         BLOCK, GROUP, RUN_BLOCKS, SMALL_VECTOR, VECTOR_BLOCK, VECTOR_CHUNK, block_points,
@@ -73,25 +74,31 @@ pub mod sharing {
     pub use crate::prefilter::prefilter_pays;
 }
 
-/// What a model file holds, layer by layer, for programs that write it in
-/// another form.
+/// The layers of a model file, for programs that convert it.
+#[doc(hidden)]
 pub mod model_file {
     pub use crate::dense::Dense;
     pub use crate::network::{Network, TNet, read, read_bytes};
 }
 
+pub use calibrate::on_clouds as activation_ranges;
 #[cfg(feature = "npz")]
 pub use calibrate::on_set as activation_ranges_of_set;
-pub use calibrate::{on_clouds as activation_ranges, on_shapes as activation_ranges_by_rule};
+#[doc(hidden)]
+pub use calibrate::on_shapes as activation_ranges_by_rule;
 pub use choose::choose;
 pub use classifier::Classifier;
 pub use classifier_team::ClassifierTeam;
 pub use error::Error;
 #[cfg(feature = "evaluate")]
 pub use evaluate::{Evaluation, evaluate, evaluate_some};
+pub use formats::cloud_file::read_cloud;
 pub use formats::model_card::{ModelCard, Normalization};
+#[doc(hidden)]
 pub use normalize::{normalize, to_unit_sphere};
 pub use options::{Options, TNets, UpAxis};
 pub use precision::Precision;
-pub use prediction::{Prediction, UNKNOWN, energy};
+#[doc(hidden)]
+pub use prediction::energy;
+pub use prediction::{Prediction, UNKNOWN};
 pub use summary::{LayerShape, NetShape, Summary, inspect};

@@ -1,12 +1,11 @@
-//! The network that a model file holds: PointNet of whatever widths, with
-//! either T-Net or without, and the front end of a Critical Points Layer.
+//! The network in a model file: a PointNet of any widths, with or without each T-Net, and
+//! optionally a front end for a Critical Points Layer.
 //!
-//! Names are those of yanx27/Pointnet_Pointnet2_pytorch, for any number of
-//! layers: `feat.conv1…`, `feat.bn1…` the trunk, `feat.stn.*` and `feat.fstn.*`
-//! the T-Nets (`conv`, `fc`, and `bn` counted through both), `fc1…`, `bn1…` the
-//! head. A front end of its own is `cpl.conv1…`, `cpl.bn1…`. The features of a
-//! point's neighborhood come from `edge.conv1…`, one layer for each of the card's
-//! `edge_radii`. Where no layer has a batch norm, all are taken as folded already.
+//! Names are those of yanx27/Pointnet_Pointnet2_pytorch, for any number of layers: `feat.conv1…`
+//! and `feat.bn1…` are the trunk, `feat.stn.*` and `feat.fstn.*` the T-Nets (with `conv`, `fc`, and
+//! `bn` numbered through both), `fc1…` and `bn1…` the head. The front end is `cpl.conv1…` and
+//! `cpl.bn1…`. `edge.conv1…` computes features of a point's neighborhood, one layer for each of the
+//! card's `edge_radii`. If no layer has a batch norm, all are folded in already.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -25,20 +24,19 @@ pub struct Network<C, F> {
     pub stn: Option<TNet<C, F>>,
     /// The EdgeConv layers, each with its radius.
     pub edges: Vec<(f32, Dense)>,
-    /// The layers from coordinates, and EdgeConv features, to the
-    /// features that are pooled.
+    /// The layers from coordinates and EdgeConv features to the pooled features.
     pub trunk: Vec<C>,
     /// The T-Net of the features.
     pub fstn: Option<TNet<C, F>>,
-    /// Layers of the trunk before the feature transform.
+    /// The number of layers of the trunk before the feature transform.
     pub transform_after: usize,
     /// The layers from the pooled vector to the logits.
     pub head: Vec<F>,
-    /// What a Critical Points Layer pools, if the file brings its own.
+    /// The layers that a Critical Points Layer pools, if the file has them.
     pub front: Option<Vec<C>>,
 }
 
-/// What a network consists of, as far as a Critical Points Layer can pool it.
+/// The optional parts of a network that decide what a Critical Points Layer can pool.
 #[derive(Clone, Copy, Debug)]
 pub struct Parts {
     /// Whether it has a T-Net of coordinates.
@@ -50,17 +48,16 @@ pub struct Parts {
 }
 
 impl<C, F> Network<C, F> {
-    /// What it consists of.
+    /// The optional parts that it has.
     pub(crate) fn parts(&self) -> Parts {
         let Self { stn, fstn, front, .. } = self;
         Parts { stn: stn.is_some(), fstn: fstn.is_some(), front: front.is_some() }
     }
 }
 
-/// A network that predicts a `k` x `k` matrix, row by row; the identity is in
-/// its last biases.
+/// A network that predicts a `k` x `k` matrix, row by row. Its last biases include the identity.
 pub struct TNet<C, F> {
-    /// Rows of the matrix.
+    /// The number of rows of the matrix.
     pub k: usize,
     /// Layers before the pooling.
     pub convs: Vec<C>,
@@ -68,35 +65,34 @@ pub struct TNet<C, F> {
     pub fcs: Vec<F>,
 }
 
-/// Where a point-wise layer stands.
+/// The position of a point-wise layer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// It takes coordinates.
+    /// Its inputs are coordinates.
     First,
-    /// It takes and gives features.
+    /// Its inputs and outputs are features.
     Inner,
-    /// It takes what the feature transform turned.
+    /// Its inputs are features after the feature transform.
     AfterTransform,
     /// Its outputs are pooled.
     Last,
 }
 
-/// The widest layer: a sum of int8 products of as many inputs fits 32 bits.
+/// The widest layer: a sum of int8 products over that many inputs fits into 32 bits.
 const WIDEST: usize = 1 << 16;
 
-/// Reads the card and the network of the model file at `path`, in f32, batch
-/// norms folded in.
+/// Reads the card and the network of the model file at `path`, in f32, with batch norms folded in.
 ///
 /// # Errors
-/// A file that is not a model: what [`crate::Classifier::load`] refuses.
+/// A file that is not a model, as for [`crate::Classifier::load`].
 pub fn read(path: &Path) -> Result<(ModelCard, Network<Dense, Dense>), FormatError> {
     read_source(&ModelSource::File(path.to_path_buf()))
 }
 
-/// As [`read`], from the `bytes` of a model file that errors call `name`.
+/// Does the same for the `bytes` of a model file, which errors call `name`.
 ///
 /// # Errors
-/// Bytes that are not a model file: what [`crate::Classifier::from_bytes`] refuses.
+/// Bytes that are not a model file, as for [`crate::Classifier::from_bytes`].
 pub fn read_bytes(
     name: &Path,
     bytes: Arc<[u8]>,
@@ -110,12 +106,11 @@ fn read_source(model: &ModelSource) -> Result<(ModelCard, Network<Dense, Dense>)
     Ok((card, network))
 }
 
-/// Reads the network of `file`. Each layer goes through `conv` or `fc` as soon
-/// as it is read, so that no more than one is in memory twice.
+/// Reads the network of `file`. `conv` or `fc` converts each layer as soon as it is read, so that
+/// at most one is in memory twice.
 ///
 /// # Errors
-/// Tensors that are missing, left over, of another shape than the network
-/// needs, or not finite.
+/// Tensors that are missing, unknown, of a wrong shape, or not finite.
 pub fn read_network<C, F>(
     file: &mut WeightsFile,
     card: &ModelCard,
@@ -182,7 +177,7 @@ impl<C, F> Reader<'_, C, F> {
         Ok(())
     }
 
-    /// The T-Net that predicts a matrix of as many rows as it has inputs.
+    /// The T-Net that predicts a square matrix with `inputs` rows.
     fn t_net(
         &mut self,
         prefix: &str,
@@ -214,8 +209,8 @@ impl<C, F> Reader<'_, C, F> {
             .collect()
     }
 
-    /// Point-wise layers, and the widths before, between and after them. Layer
-    /// `turned` takes what a transform turned; the last has a ReLU if `pooled_relu`.
+    /// Point-wise layers, and the widths before, between and after them. A transform precedes layer
+    /// `turned`; the last layer has a ReLU if `pooled_relu`.
     fn point_layers(
         &mut self,
         prefix: &str,
@@ -247,8 +242,8 @@ impl<C, F> Reader<'_, C, F> {
         Ok((layers, widths))
     }
 
-    /// The layers after a pooling; `matrix` is the size of the matrix that a
-    /// T-Net ends in. `norms_before` counts the batch norms of point layers.
+    /// The layers after a pooling; `matrix` is the number of rows of a T-Net's matrix.
+    /// `norms_before` is the number of batch norms of the point-wise layers.
     fn vector_layers(
         &mut self,
         prefix: &str,
@@ -357,14 +352,14 @@ impl<C, F> Reader<'_, C, F> {
         self.file.read(name)
     }
 
-    /// The highest number of a layer whose name begins with `stem`; those
-    /// below it that are missing are found when they are read.
+    /// The highest number of a layer whose name begins with `stem`. Reading a missing layer below
+    /// it fails.
     fn count(&self, stem: &str) -> usize {
         let numbers = self.names.iter().filter_map(|name| {
             let (number, _) = name.strip_prefix(stem)?.split_once('.')?;
             number.parse::<usize>().ok()
         });
-        // No network has that many layers: such a name is left over.
+        // No network has more layers; a higher number is reported as an unknown tensor.
         numbers.filter(|&number| number <= 64).max().unwrap_or(0)
     }
 

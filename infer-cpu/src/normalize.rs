@@ -1,12 +1,12 @@
-//! Clouds moved and scaled as in training.
+//! Normalisation of clouds, as in training.
 
 use formats::model_card::Normalization;
 
-/// Bits of a coordinate that enter the mean.
+/// The bits of a coordinate that count for the mean.
 const FRACTION_BITS: i32 = 62;
 
-/// Leaves `points` in `out` as `normalization` has it; the ground counts for clouds in metres
-/// alone. All coordinates must be finite.
+/// Writes the normalised `points` to `out`. The ground counts only for clouds in metres. All
+/// coordinates must be finite.
 pub fn normalize(
     normalization: Normalization,
     points: &[[f64; 3]],
@@ -21,16 +21,15 @@ pub fn normalize(
     }
 }
 
-/// Moves the mean of `points` to 0, scales the largest radius to 1 and leaves
-/// the result in `out`. Points that all coincide go to 0.
+/// Moves the mean of `points` to 0, scales the largest radius to 1 and writes the result to `out`.
+/// If all points coincide, they become 0.
 ///
-/// The mean is summed in integers, 62 bits a coordinate, so that it does not
-/// depend on the order of the points by a single bit; everything else is f64.
-/// All coordinates must be finite.
+/// The mean is summed in integers of 62 bits a coordinate, so that it is bit-identical for any
+/// order of the points. All other arithmetic is f64. All coordinates must be finite.
 ///
-/// Shape alone is promised to count for clouds whose largest coordinate is a normal
-/// number, 2.3e-308 or more. Smaller ones keep what bits they have, unless the
-/// caller's thread flushes subnormal numbers to 0: then they are points at 0.
+/// The result depends only on shape if the largest coordinate is a normal number, 2.3e-308 or more.
+/// Smaller clouds keep their remaining bits, or become points at 0 if the caller's thread flushes
+/// subnormal numbers.
 pub fn to_unit_sphere(points: &[[f64; 3]], out: &mut Vec<[f32; 3]>) {
     out.clear();
     let Some(first) = points.first() else { return };
@@ -53,22 +52,20 @@ pub fn to_unit_sphere(points: &[[f64; 3]], out: &mut Vec<[f32; 3]>) {
     out.extend(points.iter().map(|point| from_mean(point).map(|x| (x * scale) as f32)));
 }
 
-/// Moves the mean of x and of y to 0 and the ground to z = 0, without a scale, and
-/// leaves the result in `out`. The ground is at `ground_z`, or at the lowest point
-/// where that is `None` or not finite. A cluster in metres stays one in metres, wherever its
-/// sensor was. The network then sees how large an object is, and how high its parts
-/// are above the ground.
+/// Moves the means of x and y to 0 and the ground to z = 0, without scaling, and writes the result
+/// to `out`. The ground is at `ground_z`, or at the lowest point if that is `None` or not finite.
+/// The result is in metres and does not depend on the position of the sensor. The network therefore
+/// sees the size of an object and the heights of its parts above the ground.
 ///
-/// The mean is that of [`to_unit_sphere`], and depends on the order of the points
-/// as little. All coordinates must be finite; none is further from 0 than f32
-/// reaches.
+/// The mean is computed as in [`to_unit_sphere`]. All input must be finite; the output is limited
+/// to the range of f32.
 pub fn to_metric(points: &[[f64; 3]], ground_z: Option<f64>, out: &mut Vec<[f32; 3]>) {
     turned_metric(points, ground_z, |_| [1.0, 0.0], out);
 }
 
-/// As [`to_metric`], turned about z so that the mean lies in the direction of x from the
-/// sensor, which is at the origin of `points`. A cluster with its mean on the sensor is not
-/// turned.
+/// Does the same as [`to_metric`], then rotates about z so that the line of sight from the sensor
+/// (the origin of `points`) to the mean becomes x. A cluster with its mean at the sensor is not
+/// rotated.
 pub fn to_metric_sight(points: &[[f64; 3]], ground_z: Option<f64>, out: &mut Vec<[f32; 3]>) {
     let direction = |[x, y]: [f64; 2]| {
         let angle = y.atan2(x);
@@ -77,7 +74,8 @@ pub fn to_metric_sight(points: &[[f64; 3]], ground_z: Option<f64>, out: &mut Vec
     turned_metric(points, ground_z, direction, out);
 }
 
-/// Metres; `turned` gives the direction, of length 1, that becomes x for a mean of x and y.
+/// Normalises in metres; `turned` returns the unit vector that becomes x, given the means of x and
+/// y.
 fn turned_metric(
     points: &[[f64; 3]],
     ground_z: Option<f64>,
@@ -96,20 +94,19 @@ fn turned_metric(
     out.extend(points.iter().map(moved));
 }
 
-/// Leaves `points` in `out` as they are, rounded to f32 and no further from 0
-/// than f32 reaches.
+/// Writes `points` to `out` unchanged, rounded to f32 and limited to its range.
 pub fn not_at_all(points: &[[f64; 3]], out: &mut Vec<[f32; 3]>) {
     out.clear();
     out.extend(points.iter().map(|point| point.map(in_f32)));
 }
 
-/// `x` rounded to f32, and no further from 0 than f32 reaches.
+/// `x` rounded to f32 and limited to its range.
 fn in_f32(x: f64) -> f32 {
     let largest = f64::from(f32::MAX);
     x.clamp(-largest, largest) as f32
 }
 
-/// The mean of `values`, all finite: the same for any order.
+/// The mean of `values`, which must be finite: bit-identical for any order.
 fn exact_mean(values: impl Iterator<Item = f64> + Clone) -> f64 {
     let largest = values.clone().fold(0.0f64, |most, x| most.max(x.abs()));
     let unit = power_of_two_above(largest);
@@ -121,13 +118,12 @@ fn exact_mean(values: impl Iterator<Item = f64> + Clone) -> f64 {
     sum as f64 / n as f64 / one * unit
 }
 
-/// Moves `points` by whole voxels of edge `size`, so that they lie about 0, and
-/// scales the largest coordinate to at most 1; leaves the result in `out` and
-/// returns the edge in its units. Cells that begin at coordinate 0 hold the
-/// same points before and after, whatever the offset of the cloud, but for
+/// Moves `points` by whole voxels of edge `size` so that they lie around 0, scales the largest
+/// coordinate to at most 1, writes the result to `out`, and returns the scaled edge. For any offset
+/// of the cloud, cells that begin at coordinate 0 hold the same points before and after, except for
 /// points within f32's rounding of a cell's face.
 ///
-/// All coordinates must be finite, and `size` a positive length.
+/// All coordinates must be finite, and `size` must be positive.
 pub fn to_voxels_about_zero(points: &[[f64; 3]], size: f64, out: &mut Vec<[f32; 3]>) -> f64 {
     let magnitude = |points: &mut dyn Iterator<Item = [f64; 3]>| {
         points.flatten().fold(0.0f64, |most, x| most.max(x.abs()))
@@ -140,7 +136,7 @@ pub fn to_voxels_about_zero(points: &[[f64; 3]], size: f64, out: &mut Vec<[f32; 
         let (low, high) = along
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
         let whole = (low.midpoint(high) / edge).floor() * edge;
-        // An edge that is nothing beside the coordinates leaves no cell whole.
+        // The offset is not finite if the edge is negligible relative to the coordinates.
         if whole.is_finite() { whole } else { 0.0 }
     });
     let moved = |point: &[f64; 3]| [0, 1, 2].map(|axis| point[axis] / unit - origin[axis]);
@@ -150,7 +146,7 @@ pub fn to_voxels_about_zero(points: &[[f64; 3]], size: f64, out: &mut Vec<[f32; 
     (edge / scale).clamp(f64::MIN_POSITIVE, f64::MAX)
 }
 
-/// A power of two not below `x`, at least the least normal number.
+/// A power of two of at least `x`, and at least the least normal number.
 fn power_of_two_above(x: f64) -> f64 {
     let bits = x.max(f64::MIN_POSITIVE).to_bits();
     let exponent = bits >> 52;

@@ -1,4 +1,4 @@
-//! How a classifier computes.
+//! The options of a classifier.
 
 use std::collections::BTreeMap;
 
@@ -9,19 +9,18 @@ use crate::precision::Precision;
 use crate::sampler::SamplerSpec;
 
 formats::named! {
-    /// Which of a model's T-Nets are run; one that is left out counts as the
-    /// identity.
+    /// The T-Nets that are run; an omitted one counts as the identity.
     #[derive(Default)]
     #[non_exhaustive]
     pub enum TNets: "choice of T-Nets" {
         /// All that the model has.
         #[default]
         Both = "both",
-        /// That of the coordinates alone.
+        /// Only the T-Net of the coordinates.
         Input = "input",
-        /// That of the features alone.
+        /// Only the T-Net of the features.
         Feature = "feature",
-        /// None.
+        /// No T-Net.
         Neither = "none",
     }
 }
@@ -36,20 +35,22 @@ impl TNets {
     }
 }
 
-/// The axis of a cloud that points up.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum UpAxis {
-    /// x.
-    X,
-    /// y, as in ModelNet40's files.
-    Y,
-    /// z, as in scans.
-    #[default]
-    Z,
+formats::named! {
+    /// The axis of a cloud that points up.
+    #[derive(Default)]
+    pub enum UpAxis: "up axis" {
+        /// x.
+        X = "x",
+        /// y, as in ModelNet40's files.
+        Y = "y",
+        /// z, as in scans.
+        #[default]
+        Z = "z",
+    }
 }
 
 impl UpAxis {
-    /// The two axes that a rotation about this one turns, the first towards
+    /// The two axes of the plane of rotation about this axis; a rotation turns the first towards
     /// the second.
     pub(crate) fn others(self) -> [usize; 2] {
         match self {
@@ -60,7 +61,7 @@ impl UpAxis {
     }
 }
 
-/// How a [`crate::Classifier`] computes.
+/// The options of a [`crate::Classifier`].
 ///
 /// ```
 /// use infer_cpu::sampler::{SamplerKind, SamplerSpec};
@@ -77,40 +78,41 @@ impl UpAxis {
 /// ```
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// What to compute in.
+    /// The number format of the network.
     pub precision: Precision,
-    /// The kernels to use; the fastest that this machine runs if `None`.
+    /// The kernels; the fastest ones of this machine if `None`.
     pub kernel: Option<KernelName>,
-    /// Threads, the caller's among them.
+    /// The number of threads, including the caller's.
     pub threads: usize,
-    /// Which T-Nets to run.
+    /// The T-Nets to run.
     pub t_nets: TNets,
-    /// Which points the network sees; as in training if `None`.
+    /// The sampler that chooses the points for the network; as in training if `None`.
     pub sampler: Option<SamplerSpec>,
-    /// The largest activation of each layer, for int8; the model's own
-    /// calibration if `None`, and shapes made by rule if it has none.
+    /// The largest activation of each layer, for int8. If `None`, the model's own calibration, or
+    /// that of generated shapes if the model has none.
     pub activation_ranges: Option<BTreeMap<String, f32>>,
-    /// How clouds are normalised; as in training if `None`.
+    /// The normalisation of clouds; as in training if `None`.
     pub normalization: Option<Normalization>,
-    /// Whether outliers are dropped before the sampler, of clouds in the unit sphere; as
-    /// in training if `None`.
+    /// Whether outliers are dropped before sampling, for clouds in the unit sphere; as in training
+    /// if `None`.
     pub outlier_filter: Option<bool>,
-    /// Drop points that are not finite instead of refusing the cloud.
+    /// Whether points that are not finite are dropped; otherwise they are an error.
     pub drop_invalid: bool,
-    /// Draws of a random subset whose log-probabilities are averaged.
+    /// The number of classifications, with different random draws or rotations, whose
+    /// log-probabilities are averaged.
     pub votes: u32,
-    /// Turn the cloud about its up axis between votes, evenly spread.
+    /// Whether the cloud is rotated about its up axis between votes, in equal steps.
     pub vote_rotations: bool,
     /// The axis that points up.
     pub up: UpAxis,
-    /// Points to make room for at once; larger clouds allocate when they come.
+    /// The number of points for which memory is allocated at loading; larger clouds allocate later.
     pub capacity: usize,
 }
 
-/// Most points that room is made for at once.
+/// The largest capacity.
 pub const MOST_POINTS: usize = 1 << 28;
 
-/// Most threads of a team.
+/// The largest number of threads.
 pub const MOST_THREADS: usize = 1024;
 
 impl Default for Options {

@@ -1,46 +1,37 @@
-//! Number formats of a forward pass: how weights are packed and activations
-//! rounded in each.
+//! The number formats of a forward pass: how each packs weights and rounds activations.
 
 use std::marker::PhantomData;
 
 use half::f16;
 
 use crate::dense::Dense;
-use crate::kernel::{Gemm, Gemv, I8_LARGEST, Kernels, Panels};
+use crate::kernel::{Gemm, Gemv, I8_LARGEST, Kernels, Panels, Sum};
 
 /// The largest finite number of fp16.
 pub const F16_LARGEST: f32 = 65504.0;
 
 formats::named! {
-    /// What a network computes in.
-    ///
-    /// ```
-    /// use infer_cpu::{Precision, kernel};
-    ///
-    /// let precision: Precision = "f32-fc16".parse()?;
-    /// assert!(kernel::available().any(|kernels| precision.runs_on(kernels)));
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
+    /// The number format of a network.
     #[derive(Default)]
     pub enum Precision: "precision" {
         /// fp32 throughout.
         #[default]
         F32 = "f32",
-        /// fp32 arithmetic throughout; the weights of the layers after a pooling,
-        /// whose cost is their traffic, are stored in fp16.
+        /// fp32 arithmetic throughout; the weights of the layers after a pooling, whose cost is
+        /// memory traffic, are stored in fp16.
         F32Fc16 = "f32-fc16",
-        /// fp16 weights and activations, fp16 sums of short chunks; vector layers
-        /// as in [`Precision::F32Fc16`].
+        /// fp16 weights and activations, and fp16 sums over short chunks; vector layers as in
+        /// [`Precision::F32Fc16`].
         F16 = "f16",
-        /// int8 weights (a scale per channel) and seven-bit activations (a
-        /// calibrated scale per layer); the first layer, of coordinates, in fp32;
-        /// vector layers with int8 weights and fp32 arithmetic.
+        /// int8 weights (one scale per channel) and seven-bit activations (one calibrated scale per
+        /// layer). The first layer, whose inputs are coordinates, is in fp32; vector layers have
+        /// int8 weights and fp32 arithmetic.
         I8 = "i8",
     }
 }
 
 impl Precision {
-    /// Whether `kernels` have its matrix products.
+    /// Whether `kernels` support it.
     #[must_use]
     pub fn runs_on(self, kernels: &Kernels) -> bool {
         let has_products = match self {
@@ -52,30 +43,29 @@ impl Precision {
     }
 }
 
-/// What rounding a layer's outputs met.
+/// The range events of rounding a layer's outputs.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Rounded {
-    /// The largest magnitude before rounding, where the format can overflow.
+    /// The largest magnitude before rounding, or 0 if the format cannot overflow.
     pub largest: f32,
-    /// Values that were above what the format was calibrated for.
+    /// The number of values above the calibrated range.
     pub clipped: u64,
 }
 
-/// A matrix `[inputs, outputs]` in C order, to be packed while a cloud is
-/// being classified.
+/// A matrix `[inputs, outputs]` in C order, which is packed during a classification.
 pub struct Matrix<'a> {
-    /// Elements, rows `stride` apart.
+    /// The elements; rows are `stride` apart.
     pub data: &'a [f32],
-    /// From one row to the next.
+    /// The distance from one row to the next.
     pub stride: usize,
 }
 
-/// What weights are stored as.
+/// A number type of stored weights.
 pub trait Weight: Copy + Default + Send + Sync + 'static {
     /// The matrix-vector products of `kernels` with such weights.
     fn gemv(kernels: &Kernels) -> Gemv<Self>;
-    /// Packs the weights `weight(input, output)` of a layer whose inputs are at
-    /// most `range` into `panels`, and sets its scales.
+    /// Packs the weights `weight(input, output)` of a layer whose inputs are at most `range` into
+    /// `panels`, and sets the scales.
     fn fill(panels: &mut Panels<Self>, range: f32, weight: impl Fn(usize, usize) -> f32);
 }
 
@@ -109,7 +99,8 @@ impl Weight for i8 {
         for output in 0..panels.outputs() {
             let weights = (0..panels.inputs()).map(|input| weight(input, output));
             let largest = weights.fold(0.0f32, |largest, weight| largest.max(weight.abs()));
-            // Takes the largest to ±127. Of zeros, or of denormals, any step does.
+            // The step maps the largest weight to ±127. If all weights are zero or denormal, any
+            // step will do.
             let step = (largest / 127.0).max(f32::MIN_POSITIVE);
             for input in 0..panels.inputs() {
                 let level = (weight(input, output) / step).round_ties_even() as i8;
@@ -126,22 +117,20 @@ pub trait Format: Send + Sync + 'static {
     type Activation: Copy + Default + Send + Sync;
     /// A weight of a point-wise layer.
     type Weight: Weight;
-    /// A sum of their products.
-    type Sum: Copy + PartialOrd + Send + Sync;
+    /// A sum of products.
+    type Sum: Sum;
     /// A stored weight of a vector layer.
     type Stored: Weight;
 
     /// Below every sum.
     const LOWEST: Self::Sum;
-    /// Inputs that lie side by side in a panel.
+    /// The number of adjacent inputs in a panel.
     const GROUP: usize = 1;
     /// Whether activations may be negative.
     const SIGNED: bool = true;
 
-    /// The matrix products of `kernels` in this format.
+    /// The matrix products of `kernels` in this format, if they support it.
     fn gemm(kernels: &Kernels) -> Option<&Gemm<Self::Activation, Self::Weight, Self::Sum>>;
-    /// A sum as f32, before scale and bias.
-    fn widen(sum: Self::Sum) -> f32;
     /// Rounds outputs of a layer whose largest activation is `range`.
     fn narrow(
         kernels: &Kernels,
@@ -154,15 +143,15 @@ pub trait Format: Send + Sync + 'static {
     fn columns(dense: &Dense) -> Panels<Self::Stored> {
         let mut columns = Panels::columns(dense.inputs, dense.outputs);
         columns.biases_mut()[..dense.outputs].copy_from_slice(&dense.bias);
-        // Inputs are fp32: a range of as many units as there are levels leaves the
-        // scales those of the weights.
+        // Inputs are fp32: with a range equal to the number of levels, the scales are those of the
+        // weights.
         let range = f32::from(I8_LARGEST);
         Self::Stored::fill(&mut columns, range, |input, output| dense.at(input, output));
         columns
     }
 
-    /// Activations and maxima as fp32 where they are, so that a
-    /// [`Int8Prefilter`](crate::prefilter::Int8Prefilter) can tell the latter from the former.
+    /// Activations and maxima as fp32 slices, if the format is fp32, for the
+    /// [`Int8Prefilter`](crate::prefilter::Int8Prefilter).
     fn as_f32<'a>(
         _: &'a [Self::Activation],
         _: &'a mut [Self::Sum],
@@ -171,7 +160,7 @@ pub trait Format: Send + Sync + 'static {
     }
 }
 
-/// fp32, with the weights of vector layers stored as `S`.
+/// fp32, with weights of vector layers stored as `S`.
 pub struct Single<S>(PhantomData<S>);
 /// [`Precision::F32`].
 pub type F32 = Single<f32>;
@@ -191,10 +180,6 @@ impl<S: Weight> Format for Single<S> {
 
     fn gemm(kernels: &Kernels) -> Option<&Gemm<f32, f32, f32>> {
         kernels.f32.as_ref()
-    }
-
-    fn widen(sum: f32) -> f32 {
-        sum
     }
 
     fn narrow(_: &Kernels, values: &[f32], _: f32, out: &mut [f32]) -> Rounded {
@@ -221,10 +206,6 @@ impl Format for F16 {
         kernels.f16.as_ref()
     }
 
-    fn widen(sum: f32) -> f32 {
-        sum
-    }
-
     fn narrow(kernels: &Kernels, values: &[f32], _: f32, out: &mut [f16]) -> Rounded {
         Rounded { largest: (kernels.narrow_f16)(values, out), clipped: 0 }
     }
@@ -241,10 +222,6 @@ impl Format for I8 {
 
     fn gemm(kernels: &Kernels) -> Option<&Gemm<u8, i8, i32>> {
         kernels.i8.as_ref()
-    }
-
-    fn widen(sum: i32) -> f32 {
-        sum as f32
     }
 
     fn narrow(kernels: &Kernels, values: &[f32], range: f32, out: &mut [u8]) -> Rounded {

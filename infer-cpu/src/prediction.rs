@@ -1,4 +1,4 @@
-//! What a network says about a cloud.
+//! The result of a classification.
 
 use std::sync::Arc;
 
@@ -6,42 +6,39 @@ use formats::model_card::ModelCard;
 
 use crate::Precision;
 
-/// What [`Prediction::answer`] says of an object that the model does not know.
+/// The [`Prediction::answer`] for an unknown object.
 pub const UNKNOWN: &str = "unknown";
 
-/// The class of a cloud, and how it was found.
+/// The class of a cloud, and how it was computed.
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct Prediction {
-    /// The class: an index into [`crate::Classifier::classes`]. Of equal
-    /// logits the first wins.
+    /// The class: an index into [`crate::Classifier::classes`]. If logits are equal, the first
+    /// wins.
     pub class: usize,
-    /// The class's name, even if the object [is unknown](Prediction::is_unknown).
+    /// The name of the class, even if the object [is unknown](Prediction::is_unknown).
     pub label: Arc<str>,
-    /// Whether the object is none that the model is to tell apart: its class is one
-    /// of [`ModelCard::unknown_classes`], or its energy is above
-    /// [`ModelCard::unknown_energy`].
+    /// Whether the object belongs to no known class: its class is one of
+    /// [`ModelCard::unknown_classes`], or its energy is above [`ModelCard::unknown_energy`].
     pub is_unknown: bool,
-    /// -T ln Σ exp(logit / T) at the model's temperature T: the larger, the less
-    /// the cloud is like any that the network learnt from (Liu et al. 2020). After
-    /// votes, their mean.
+    /// The energy -T ln Σ exp(logit / T) at the model's temperature T: the larger it is, the less
+    /// the cloud resembles the training data (Liu et al. 2020). After votes, their mean.
     pub energy: f64,
-    /// The network's outputs, one a class. After votes, mean log-probabilities.
+    /// The outputs of the network, one per class. After votes, mean log-probabilities.
     pub logits: Vec<f32>,
-    /// Points of the cloud, without those that were dropped.
+    /// The number of points of the cloud that are finite.
     pub n_points: usize,
-    /// Points that were dropped because a coordinate was not finite.
+    /// The number of points that were dropped because a coordinate was not finite.
     pub n_dropped: usize,
-    /// Points, of [`Prediction::n_points`], that were dropped as outliers.
+    /// The number of these points that were dropped as outliers.
     pub n_outliers: usize,
-    /// Points that the network saw: those that the sampler kept, each once.
+    /// The number of points that the network processed: those that the sampler kept, each once.
     pub n_used: usize,
-    /// What the network computed in: fp32 if the precision asked for
-    /// overflowed on this cloud.
+    /// The precision of the computation: fp32 if the requested one overflowed on this cloud.
     pub precision: Precision,
-    /// Activations that int8's calibrated ranges clipped.
+    /// The number of activations that were clipped to the calibrated range of int8.
     pub n_clipped: u64,
-    /// What logits are divided by before the softmax.
+    /// The divisor of the logits before the softmax.
     temperature: f64,
 }
 
@@ -50,7 +47,7 @@ impl Clone for Prediction {
         Self { label: Arc::clone(&self.label), logits: self.logits.clone(), ..*self }
     }
 
-    /// Takes over `source` without allocating, if it has no more classes.
+    /// Copies `source` without an allocation, unless it has more classes.
     fn clone_from(&mut self, source: &Self) {
         let mut logits = std::mem::take(&mut self.logits);
         logits.clone_from(&source.logits);
@@ -59,7 +56,7 @@ impl Clone for Prediction {
 }
 
 impl Prediction {
-    /// None yet, with room for a logit of each of `classes`.
+    /// An empty prediction, with room for a logit of each of `classes`.
     pub(crate) fn empty(classes: &[Arc<str>], temperature: f64, precision: Precision) -> Self {
         Self {
             class: 0,
@@ -83,18 +80,17 @@ impl Prediction {
         if self.is_unknown { UNKNOWN } else { &self.label }
     }
 
-    /// The probability of the predicted class by the network's softmax, at the
-    /// model's temperature. Of an unknown object it is that of the class in
-    /// [`Prediction::label`].
+    /// The probability of the predicted class: the softmax of the logits at the model's
+    /// temperature. For an unknown object, it is that of the class in [`Prediction::label`].
     #[must_use]
     pub fn confidence(&self) -> f64 {
         self.log_probability(self.class).exp()
     }
 
-    /// The natural logarithm of class `class`'s probability.
+    /// The natural logarithm of the probability of `class`.
     ///
-    /// Logits are shifted by their largest before they are raised, in f64: no
-    /// finite logits overflow.
+    /// The largest logit is subtracted before the exponential, in f64, so that no finite logits
+    /// overflow.
     #[must_use]
     pub fn log_probability(&self, class: usize) -> f64 {
         let largest = f64::from(self.logits[self.class]);
@@ -104,29 +100,29 @@ impl Prediction {
     }
 }
 
-/// When an object is unknown.
+/// The rule by which an object is unknown.
 pub struct UnknownRule {
-    /// Of each class, whether it is one of those that are unknown.
+    /// For each class, whether it is an unknown one.
     classes: Vec<bool>,
     energy: Option<f64>,
 }
 
 impl UnknownRule {
-    /// That of `card`, for `classes`.
+    /// The rule of `card` for `classes`.
     pub fn new(card: &ModelCard, classes: &[Arc<str>]) -> Self {
         let is_unknown =
             |class: &Arc<str>| card.unknown_classes.iter().any(|name| **name == **class);
         Self { classes: classes.iter().map(is_unknown).collect(), energy: card.unknown_energy }
     }
 
-    /// Whether it holds for an object of `class` and of this energy.
+    /// Whether an object of `class` with this energy is unknown.
     pub fn holds(&self, class: usize, energy: f64) -> bool {
         self.classes[class] || self.energy.is_some_and(|most| energy > most)
     }
 }
 
-/// The energy of `logits`, finite ones and one at least, at `temperature` above 0:
-/// see [`Prediction::energy`].
+/// The energy of `logits` at `temperature`: see [`Prediction::energy`]. There must be at least one
+/// logit, all must be finite, and the temperature must be above 0.
 #[must_use]
 pub fn energy(logits: &[f32], temperature: f64) -> f64 {
     let largest = f64::from(logits[argmax(logits)]);
@@ -134,7 +130,7 @@ pub fn energy(logits: &[f32], temperature: f64) -> f64 {
     -largest - temperature * logits.iter().map(shifted).sum::<f64>().ln()
 }
 
-/// The first of the largest.
+/// The index of the largest logit, the first one if several are equal.
 pub fn argmax(logits: &[f32]) -> usize {
     let mut best = 0;
     for (class, &logit) in logits.iter().enumerate() {
@@ -149,7 +145,7 @@ pub fn argmax(logits: &[f32]) -> usize {
 mod tests {
     use super::*;
 
-    fn of(card: &ModelCard, logits: &[f32]) -> Prediction {
+    fn from_logits(card: &ModelCard, logits: &[f32]) -> Prediction {
         let classes: Vec<Arc<str>> = card.classes.iter().map(|name| name.as_str().into()).collect();
         let mut found = Prediction::empty(&classes, card.temperature, Precision::F32);
         found.logits = logits.to_vec();
@@ -167,24 +163,24 @@ mod tests {
             unknown_classes: vec!["tree".to_owned()],
             ..ModelCard::default()
         };
-        let car = of(&card, &[3.0, 1.0]);
+        let car = from_logits(&card, &[3.0, 1.0]);
         assert_eq!((car.answer(), car.is_unknown), ("car", false));
-        let tree = of(&card, &[1.0, 3.0]);
+        let tree = from_logits(&card, &[1.0, 3.0]);
         assert_eq!((tree.answer(), &*tree.label, tree.is_unknown), ("unknown", "tree", true));
         assert_eq!(tree.confidence(), car.confidence());
         // -ln(e^3 + e^1)
         assert!((car.energy + 3.126_928).abs() < 1e-6, "{}", car.energy);
         let strict = ModelCard { unknown_energy: Some(-3.2), ..card.clone() };
-        assert_eq!(of(&strict, &[3.0, 1.0]).answer(), "unknown");
+        assert_eq!(from_logits(&strict, &[3.0, 1.0]).answer(), "unknown");
         let lax = ModelCard { unknown_energy: Some(-3.1), ..card };
-        assert_eq!(of(&lax, &[3.0, 1.0]).answer(), "car");
+        assert_eq!(from_logits(&lax, &[3.0, 1.0]).answer(), "car");
     }
 
     #[test]
     fn temperature_makes_the_network_less_sure_and_changes_no_class() {
         let classes = vec!["a".to_owned(), "b".to_owned()];
         let card = ModelCard { classes, temperature: 2.0, ..ModelCard::default() };
-        let found = of(&card, &[6.0, 2.0]);
+        let found = from_logits(&card, &[6.0, 2.0]);
         assert_eq!(found.class, 0);
         // 1 / (1 + e^-2); -2 ln(e^3 + e^1)
         assert!((found.confidence() - 0.880_797).abs() < 1e-6, "{}", found.confidence());

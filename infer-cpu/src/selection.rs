@@ -1,4 +1,4 @@
-//! The points that a network gets to see: what a sampler keeps, each once.
+//! The points for the network: those that the sampler keeps, each once.
 
 use crate::engine::{Forward, Input, Pass, Scratch};
 use crate::error::Error;
@@ -8,7 +8,7 @@ use crate::sampler::{
     CanonicalOrder, CriticalPoints, FrontChoice, Sampler, SamplerKind, SamplerSpec,
 };
 
-/// A sampler and its memory.
+/// A sampler with its working memory.
 pub struct Selection {
     spec: SamplerSpec,
     sampler: Sampler,
@@ -17,22 +17,22 @@ pub struct Selection {
     /// All points, sorted by geometry, each once.
     cloud: CanonicalOrder,
     critical: CriticalPoints,
-    /// Rows of the cloud that a secondary pass pools.
+    /// The points of the cloud that a secondary pass pools.
     left: Vec<[f32; 3]>,
     rows: Vec<u32>,
     kept: Vec<[f32; 3]>,
-    /// What the network sees: the kept points, sorted by geometry, each once.
+    /// The points for the network: the kept ones, sorted by geometry, each once.
     distinct: CanonicalOrder,
-    /// Whether the kept points' T-Net pooling is that of the whole cloud and
-    /// is already known.
+    /// Whether the T-Net pooling of the kept points is known, because it equals that of the whole
+    /// cloud.
     pooled_stn: bool,
 }
 
 impl Selection {
-    /// A selection by `spec`; `front` for one that needs features.
+    /// A selection by `spec`; `front` is the pass that a Critical Points Layer pools.
     ///
     /// # Errors
-    /// A specification that cannot be met.
+    /// An invalid specification.
     pub fn new(spec: &SamplerSpec, front: Option<Pass>) -> Result<Self, Error> {
         let coordinates_alone = match spec.kind {
             SamplerKind::Cpl => SamplerSpec { kind: SamplerKind::All, ..spec.clone() },
@@ -53,7 +53,7 @@ impl Selection {
         })
     }
 
-    /// The same selection with memory of its own.
+    /// The same selection with its own working memory.
     ///
     /// # Errors
     /// As [`Selection::new`].
@@ -61,7 +61,7 @@ impl Selection {
         Self::new(&self.spec, self.front)
     }
 
-    /// What is selected by.
+    /// The specification of the sampler.
     pub fn spec(&self) -> &SamplerSpec {
         &self.spec
     }
@@ -71,23 +71,23 @@ impl Selection {
         &self.distinct.points
     }
 
-    /// Whether the last selection left the pooled vector of the coordinates'
-    /// T-Net in memory.
+    /// Whether the last selection left the pooled vector of the coordinates' T-Net in the scratch
+    /// memory.
     pub fn pooled_stn(&self) -> bool {
         self.pooled_stn
     }
 
-    /// Draws other points from now on, where the sampler draws.
+    /// Changes the seed of random draws.
     pub fn set_seed(&mut self, seed: u64) {
         self.spec.seed = seed;
         self.sampler.set_seed(seed);
     }
 
-    /// Chooses among `points` and returns the indices chosen: M of them, or as
-    /// many as the sampler can make, repetitions included.
+    /// Chooses from `points` and returns the chosen indices: M of them, or as many as the sampler
+    /// yields, repetitions included.
     ///
     /// # Errors
-    /// Of the sampler.
+    /// Errors of the sampler.
     pub fn select(
         &mut self,
         points: &[[f32; 3]],
@@ -100,7 +100,7 @@ impl Selection {
         if self.spec.kind == SamplerKind::Cpl {
             self.cloud.sort(points);
             self.select_critical(network, scratch);
-            // Rows of the sorted cloud, from here on places in the given one.
+            // Turns rows of the sorted cloud into indices of the given one.
             for row in &mut self.rows {
                 *row = self.cloud.index[*row as usize];
             }
@@ -124,7 +124,7 @@ impl Selection {
         pool(cloud, scratch);
         self.pooled_stn = front == Pass::Stn;
         self.critical.rank(&scratch.values, &scratch.winners);
-        // The T-Net wants the whole cloud's pooling, which a second one ends.
+        // The T-Net needs the pooling of the whole cloud, which a second pooling overwrites.
         while let Some(rows) = self.critical.next_pass(self.cloud.points.len(), &self.spec) {
             self.pooled_stn = false;
             self.left.clear();
@@ -136,10 +136,10 @@ impl Selection {
         self.spec.resize.apply(rows, scores, self.spec.points, &mut self.rows);
     }
 
-    /// Grows all memory to clouds of `n` points.
+    /// Allocates memory for clouds of `n` points.
     ///
     /// # Errors
-    /// Of the sampler.
+    /// Errors of the sampler.
     pub fn reserve(
         &mut self,
         n: usize,
@@ -147,11 +147,11 @@ impl Selection {
         network: &dyn Forward,
         scratch: &mut Scratch,
     ) -> Result<(), Error> {
-        // A cloud that no rule finds easier than another: all points differ.
+        // A worst case for every sampler: all points differ.
         let cloud: Vec<[f32; 3]> = (0..n).map(|i| [i as f32, (i % 7) as f32, 0.0]).collect();
         self.cloud.sort(&cloud);
         self.distinct.sort(&cloud);
-        // Only critical points are ever repeated.
+        // Only a Critical Points Layer repeats points.
         let most = if self.spec.kind == SamplerKind::Cpl { n.max(self.spec.points) } else { n };
         self.kept.reserve(most);
         self.left.reserve(n);
@@ -166,7 +166,7 @@ impl Selection {
     }
 }
 
-/// The pass that front end `choice` names, in a network that has these parts.
+/// The pass of front end `choice` in a network with these parts.
 ///
 /// # Errors
 /// The network lacks it.

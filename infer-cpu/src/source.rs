@@ -1,4 +1,4 @@
-//! Where a model comes from.
+//! Sources of models.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,29 +13,29 @@ use formats::weights::WeightsFile;
 pub enum ModelSource {
     /// A file, which is read when the model is loaded.
     File(PathBuf),
-    /// The bytes of a file, and the name that errors give them.
+    /// The bytes of a model file.
     Memory {
-        /// What errors call it.
+        /// Its name in errors.
         name: PathBuf,
-        /// What a model file holds.
+        /// The bytes.
         bytes: Arc<[u8]>,
     },
 }
 
 impl ModelSource {
-    /// The bytes of a model file, such as a program embeds.
+    /// A model in memory.
     pub fn from_bytes(bytes: &[u8]) -> Self {
         Self::Memory { name: PathBuf::from("model in memory"), bytes: bytes.into() }
     }
 
-    /// The same source with a file's bytes in memory.
+    /// Reads a file into memory.
     ///
     /// # Errors
     /// A file that cannot be read or is not safetensors.
     pub fn into_memory(self) -> Result<Self, FormatError> {
         match self {
             Self::File(name) => {
-                // A huge file that is not a model is refused by its header.
+                // This rejects a huge file that is not a model by its header.
                 WeightsFile::open(&name)?;
                 let bytes = fs::read(&name).map_err(|source| FormatError::io(&name, source))?;
                 Ok(Self::Memory { name, bytes: bytes.into() })
@@ -44,18 +44,17 @@ impl ModelSource {
         }
     }
 
-    /// What errors call the model.
+    /// The model's name in errors.
     pub fn name(&self) -> &Path {
         match self {
             Self::File(name) | Self::Memory { name, .. } => name,
         }
     }
 
-    /// The tensors, and what the model says about itself.
+    /// Opens the tensors and reads the card.
     ///
     /// # Errors
-    /// A file that cannot be read, is not safetensors, or has metadata that
-    /// does not describe a model.
+    /// A file that cannot be read, is not safetensors, or has invalid metadata.
     pub fn open(&self) -> Result<(WeightsFile, ModelCard), FormatError> {
         let file = match self {
             Self::File(path) => WeightsFile::open(path)?,

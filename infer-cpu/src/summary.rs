@@ -1,4 +1,4 @@
-//! What a model file holds, and what it costs to run.
+//! A summary of a model file and of its cost.
 
 use std::path::Path;
 
@@ -10,11 +10,11 @@ use crate::network::{Network, TNet, read_network};
 use crate::precision::Precision;
 use crate::source::ModelSource;
 
-/// A model file's network, layer by layer.
+/// The network of a model file, layer by layer.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Summary {
-    /// What the file says about itself.
+    /// The metadata of the file.
     pub card: ModelCard,
     /// The T-Net of the coordinates, if there is one.
     pub stn: Option<NetShape>,
@@ -24,22 +24,22 @@ pub struct Summary {
     pub edges: Vec<(f32, LayerShape)>,
     /// The trunk, and the layers from the pooled vector to the logits.
     pub trunk: NetShape,
-    /// The front end of a critical points layer, if the file brings its own.
+    /// The front end for a Critical Points Layer, if the file has one.
     pub front: Option<Vec<LayerShape>>,
-    /// Elements of all tensors in the file.
+    /// The number of elements of all tensors in the file.
     pub n_stored: usize,
 }
 
 /// Layers before and after a pooling.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NetShape {
-    /// Layers that each point goes through.
+    /// The layers before the pooling, for each point.
     pub convs: Vec<LayerShape>,
-    /// Layers that the pooled vector goes through.
+    /// The layers after the pooling.
     pub fcs: Vec<LayerShape>,
 }
 
-/// A linear layer, its batch norm folded in.
+/// A linear layer, with its batch norm folded in.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LayerShape {
     /// Its name in the file.
@@ -50,10 +50,10 @@ pub struct LayerShape {
     pub outputs: usize,
 }
 
-/// Reads the model file at `path`, every tensor of it.
+/// Reads the model file at `path` with all tensors.
 ///
 /// # Errors
-/// A file that is not a model: what [`crate::Classifier::load`] refuses.
+/// A file that is not a model, as for [`crate::Classifier::load`].
 pub fn inspect(path: &Path) -> Result<Summary, Error> {
     let (mut file, card) = ModelSource::File(path.to_path_buf()).open()?;
     let n_stored = file.shapes().values().map(|shape| shape.iter().product::<usize>()).sum();
@@ -76,13 +76,13 @@ fn shape_of(dense: Dense) -> LayerShape {
 }
 
 impl LayerShape {
-    /// Multiplications of one pass.
+    /// The number of multiplications for one input.
     #[must_use]
     pub fn macs(&self) -> usize {
         self.inputs * self.outputs
     }
 
-    /// Weights and biases.
+    /// The number of weights and biases.
     #[must_use]
     pub fn parameters(&self) -> usize {
         self.macs() + self.outputs
@@ -90,36 +90,35 @@ impl LayerShape {
 }
 
 impl Summary {
-    /// How many classes the network tells apart.
+    /// The number of classes.
     #[must_use]
     pub fn n_classes(&self) -> usize {
         self.trunk.fcs.last().map_or(0, |layer| layer.outputs)
     }
 
-    /// Multiplications that each point costs, those by the transforms' matrices
-    /// among them, the front end's not.
+    /// The number of multiplications for each point, including the transforms, without the front
+    /// end.
     #[must_use]
     pub fn macs_per_point(&self) -> usize {
-        // Row by row, a T-Net's last outputs are the matrix.
+        // The last outputs of a T-Net are the elements of its matrix.
         let transform = |net: &NetShape| net.fcs.last().map_or(0, |layer| layer.outputs);
         let transforms: usize = self.t_nets().map(transform).sum();
         self.nets().flat_map(|net| &net.convs).map(LayerShape::macs).sum::<usize>() + transforms
     }
 
-    /// Multiplications that each cloud costs besides.
+    /// The number of further multiplications for each cloud.
     #[must_use]
     pub fn macs_per_cloud(&self) -> usize {
         self.nets().flat_map(|net| &net.fcs).map(LayerShape::macs).sum()
     }
 
-    /// Multiplications that a front end of the model's own costs each point
-    /// that it chooses from.
+    /// The number of multiplications of the front end for each point of the cloud.
     #[must_use]
     pub fn front_macs_per_point(&self) -> Option<usize> {
         Some(self.front.as_ref()?.iter().map(LayerShape::macs).sum())
     }
 
-    /// Weights and biases once batch norms are folded in.
+    /// The number of weights and biases, with batch norms folded in.
     #[must_use]
     pub fn parameters(&self) -> usize {
         let layers = self.nets().flat_map(|net| net.convs.iter().chain(&net.fcs));
@@ -128,8 +127,8 @@ impl Summary {
         layers.chain(edges).chain(front).map(LayerShape::parameters).sum()
     }
 
-    /// Bytes of the weights in `precision`, their biases (fp32) and scales
-    /// (fp32, of int8) among them, without what fills up tiles.
+    /// The bytes of weights, biases (fp32) and scales (fp32, for int8) in `precision`, without
+    /// padding.
     #[must_use]
     pub fn bytes(&self, precision: Precision) -> usize {
         let (point_bytes, vector_bytes, scale_bytes) = match precision {
@@ -144,7 +143,7 @@ impl Summary {
         let inner = |convs: &[LayerShape]| -> usize {
             convs.iter().map(|conv| layer(conv, point_bytes)).sum()
         };
-        // What takes coordinates is fp32 in any precision.
+        // The layer of coordinates is fp32 in any precision.
         let outer = |convs: &[LayerShape]| match convs.split_first() {
             Some((first, rest)) => 4 * first.parameters() + inner(rest),
             None => 0,

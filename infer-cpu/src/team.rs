@@ -1,37 +1,34 @@
-//! A small team of threads that share out the chunks of one task at a time.
+//! A team of threads that divides one task at a time into chunks.
 //!
-//! Chunks are claimed one by one, by whichever thread is free, the caller
-//! among them: where another process holds a core, the others do its share,
-//! and the caller never waits for a thread that has claimed nothing. Where the
-//! caller had to wait long for a chunk that was claimed, its worker was driven
-//! off its core: the caller then works alone for a while ([`Backoff`]), so that a
-//! busy neighbour costs no more than the team gains. Idle threads spin for a
-//! moment, since the next task of a frame is microseconds away, and then park,
-//! since the next frame is not.
+//! Free threads, including the caller, claim chunks one by one. If another process holds a core,
+//! the other threads do its share, and the caller never waits for a thread that has claimed
+//! nothing. A long wait for a claimed chunk means that its worker has lost its core: the caller
+//! then works alone for a while ([`Backoff`]), so that a busy neighbour costs no more than the team
+//! gains. Idle threads spin briefly, because the next task of a frame is microseconds away, and
+//! then park, because the next frame is not.
 
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-/// How long an idle worker spins: some tasks' length, and no more than a
-/// wake-up costs.
+/// How long an idle worker spins: the length of a few tasks, and at most the cost of a wake-up.
 const SPIN: Duration = Duration::from_micros(40);
 
-/// A wait for a worker of this many times a chunk's own time, and
-/// [`LONG_WAIT`] more, is too long to be for its work.
+/// A wait for a worker is long if it exceeds this many times the duration of a chunk, plus
+/// [`LONG_WAIT`].
 const LONG_WAIT_CHUNKS: u32 = 3;
-/// A wake-up's time, with room to spare.
+/// More than the duration of a wake-up.
 const LONG_WAIT: Duration = Duration::from_micros(200);
 
-/// What the chunks of a task are, and how they are done.
+/// A kind of task that consists of chunks.
 pub trait Work: Send + Sync + 'static {
-    /// Does chunk number `chunk` of the current task. `thread` numbers the
-    /// threads of the team, the caller being 0.
+    /// Does chunk number `chunk` of the current task. `thread` numbers the threads of the team, the
+    /// caller being 0.
     fn chunk(&self, thread: usize, chunk: usize);
 }
 
-/// Threads that do chunks of `W`.
+/// Threads that process the chunks of `W`.
 pub struct Team<W: Work> {
     work: Arc<W>,
     queue: Arc<TaskQueue>,
@@ -39,8 +36,8 @@ pub struct Team<W: Work> {
     backoff: Mutex<Backoff>,
 }
 
-/// When the caller works alone: for a while after a long wait, twice as long
-/// after each that follows, and half as long after many tasks without.
+/// When the caller works alone: for a while after a long wait, twice as long after each further
+/// one, and half as long after many tasks without one.
 struct Backoff {
     until: Option<Instant>,
     length: Duration,
@@ -50,7 +47,7 @@ struct Backoff {
 impl Backoff {
     const SHORTEST: Duration = Duration::from_millis(20);
     const LONGEST: Duration = Duration::from_secs(1);
-    /// About ten frames' worth.
+    /// About ten frames.
     const GOOD_TASKS: u32 = 200;
 
     fn new() -> Self {
@@ -80,28 +77,28 @@ impl Backoff {
     }
 }
 
-/// Where tasks are announced.
+/// The state that the threads share.
 struct TaskQueue {
-    /// Number of the task (32 bits), its chunks (16), the next to claim (16).
-    /// All in one word, so that a claim cannot mix two tasks.
+    /// The number of the task (32 bits), of its chunks (16) and of the next chunk to claim (16).
+    /// They are one word, so that a claim cannot mix two tasks.
     ticket: AtomicU64,
-    /// Chunks of the current task that are done.
+    /// The number of finished chunks of the current task.
     done: AtomicU32,
-    /// Workers that have started.
+    /// The number of workers that have started.
     started: AtomicU32,
     /// Which workers sleep.
     parked: Vec<AtomicBool>,
     stop: AtomicBool,
 }
 
-/// The most chunks of one task.
+/// The largest number of chunks of a task.
 pub const MOST_CHUNKS: usize = u16::MAX as usize;
 
 impl<W: Work> Team<W> {
-    /// A team of `n_threads`, one of which is whoever calls [`Team::run`].
+    /// A team of `n_threads`, one of which is the caller of [`Team::run`].
     ///
     /// # Errors
-    /// What the system reports when a thread cannot be started.
+    /// A thread cannot be started.
     pub fn new(work: W, n_threads: usize) -> std::io::Result<Self> {
         let n_workers = n_threads.max(1) - 1;
         let work = Arc::new(work);
@@ -112,7 +109,8 @@ impl<W: Work> Team<W> {
             parked: (0..n_workers).map(|_| AtomicBool::new(false)).collect(),
             stop: AtomicBool::new(false),
         });
-        // Built first, so that those that did start are stopped if one cannot.
+        // The team exists before its workers, so that dropping it stops the started ones if one
+        // cannot start.
         let mut team =
             Self { work, queue, workers: Vec::new(), backoff: Mutex::new(Backoff::new()) };
         for worker in 0..n_workers {
@@ -122,21 +120,22 @@ impl<W: Work> Team<W> {
                 .spawn(move || queue.serve(&*work, worker))?;
             team.workers.push(handle);
         }
-        // A thread that starts allocates; none does so once the team is there.
+        // A starting thread allocates memory; waiting for all of them ensures that none does so
+        // later.
         while (team.queue.started.load(Ordering::Acquire) as usize) < n_workers {
             thread::yield_now();
         }
         Ok(team)
     }
 
-    /// The work that is shared out.
+    /// The work of the team.
     #[must_use]
     pub fn work(&self) -> &W {
         &self.work
     }
 
-    /// Does all `n_chunks` (at most [`MOST_CHUNKS`]) of the current task and
-    /// returns when they are done.
+    /// Processes all `n_chunks` (at most [`MOST_CHUNKS`]) of the current task, and returns when
+    /// they are finished.
     pub fn run(&self, n_chunks: usize) {
         assert!(n_chunks <= MOST_CHUNKS, "a task of {n_chunks} chunks");
         let start = Instant::now();
@@ -171,22 +170,22 @@ impl<W: Work> Drop for Team<W> {
         self.queue.stop.store(true, Ordering::SeqCst);
         self.workers.iter().for_each(|worker| worker.thread().unpark());
         for worker in self.workers.drain(..) {
-            // A worker that panicked has said so on standard error.
+            // The panic of a worker has been printed already.
             let _ = worker.join();
         }
     }
 }
 
 impl TaskQueue {
-    /// Puts up the next task. All chunks of the one before are done.
+    /// Starts the next task. All chunks of the previous one must be finished.
     fn announce(&self, n_chunks: usize) {
         let number = (self.ticket.load(Ordering::Relaxed) >> 32).wrapping_add(1);
         self.done.store(0, Ordering::Relaxed);
-        // SeqCst: against `serve`, which says that it sleeps and looks again.
+        // SeqCst pairs with `serve`, which sets `parked` and then checks the ticket again.
         self.ticket.store(number << 32 | (n_chunks as u64) << 16, Ordering::SeqCst);
     }
 
-    /// A chunk of the current task that nobody has claimed yet.
+    /// Claims a chunk of the current task, if any is left.
     fn claim(&self) -> Option<usize> {
         let claim = self.ticket.fetch_update(Ordering::SeqCst, Ordering::SeqCst, |ticket| {
             let (n_chunks, next) = (ticket >> 16 & 0xffff, ticket & 0xffff);
@@ -199,12 +198,12 @@ impl TaskQueue {
         let mut spins = 0u32;
         while self.done.load(Ordering::Acquire) < n_chunks as u32 {
             spins += 1;
-            // Whoever holds a chunk may be waiting for this very core.
+            // The thread that holds the chunk may be waiting for this core.
             if spins > 1000 { thread::yield_now() } else { std::hint::spin_loop() }
         }
     }
 
-    /// A worker's life.
+    /// The loop of a worker.
     fn serve(&self, work: &impl Work, worker: usize) {
         self.started.fetch_add(1, Ordering::Release);
         loop {
@@ -222,8 +221,8 @@ impl TaskQueue {
         }
     }
 
-    /// Does a chunk and counts it as done, even if it panics: the caller must
-    /// not wait for it for ever, and meets the lock that the panic poisoned.
+    /// Processes a chunk and counts it as finished, even if it panics: the caller must not wait
+    /// forever, and will find the lock that the panic poisoned.
     fn perform(&self, work: &impl Work, thread: usize, chunk: usize) {
         struct Count<'a>(&'a AtomicU32);
         impl Drop for Count<'_> {
@@ -235,7 +234,7 @@ impl TaskQueue {
         work.chunk(thread, chunk);
     }
 
-    /// Spins for a chunk, for [`SPIN`] at most.
+    /// Spins for at most [`SPIN`] to claim a chunk.
     fn claim_soon(&self) -> Option<usize> {
         let mut idle_since = None;
         loop {
@@ -289,7 +288,7 @@ mod tests {
         }
     }
 
-    /// Its worker is held up in its first chunk, as by another process.
+    /// Delays the worker in its first chunk, as another process would.
     struct HeldUp {
         began: AtomicBool,
         by_workers: AtomicU32,
@@ -315,7 +314,8 @@ mod tests {
         let team = Team::new(work, 2).unwrap();
         team.run(2);
         let before = team.work().by_workers.load(Ordering::SeqCst);
-        // Well within the shortest backoff, unless this thread is held up itself.
+        // This takes much less time than the shortest backoff, unless this thread is delayed
+        // itself.
         let start = Instant::now();
         team.run(1000);
         let after = team.work().by_workers.load(Ordering::SeqCst);

@@ -1,4 +1,4 @@
-//! Several opinions on one cloud: random subsets, perhaps turned, whose
+//! Test-time augmentation: several random subsets or rotations of one cloud, whose
 //! log-probabilities are averaged.
 
 use formats::rng::StreamKey;
@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::options::{Options, UpAxis};
 use crate::sampler::{SamplerKind, SamplerSpec};
 
-/// Collects votes; keeps its memory from cloud to cloud.
+/// Collects votes, and reuses its memory for each cloud.
 pub struct TestTimeAugmentation {
     n: u32,
     rotations: bool,
@@ -18,10 +18,11 @@ pub struct TestTimeAugmentation {
 }
 
 impl TestTimeAugmentation {
-    /// As `options` ask, of a network of `n_classes` behind sampler `spec`.
+    /// The augmentation that `options` request, for a network of `n_classes` with the sampler
+    /// `spec`.
     ///
     /// # Errors
-    /// Several votes of a sampler that does not draw, without rotations.
+    /// Several votes without rotations, and a sampler without random draws.
     pub fn new(options: &Options, spec: &SamplerSpec, n_classes: usize) -> Result<Self, Error> {
         let n = options.votes.max(1);
         if n > 1 && spec.kind != SamplerKind::Random && !options.vote_rotations {
@@ -37,19 +38,19 @@ impl TestTimeAugmentation {
         })
     }
 
-    /// How many votes there are.
+    /// The number of votes.
     pub fn n(&self) -> u32 {
         self.n
     }
 
-    /// Makes room for clouds of `n_points`.
+    /// Allocates memory for clouds of `n_points`.
     pub fn reserve(&mut self, n_points: usize) {
         if self.n > 1 {
             self.cloud.reserve(n_points);
         }
     }
 
-    /// Begins with `cloud`.
+    /// Begins a new `cloud`.
     pub fn begin(&mut self, cloud: &[[f32; 3]]) {
         self.cloud.clear();
         self.cloud.extend(cloud);
@@ -65,8 +66,8 @@ impl TestTimeAugmentation {
         u64::from(high) << 32 | u64::from(low)
     }
 
-    /// Leaves the cloud of vote `vote` in `out`: turned by `vote` of `n` parts
-    /// of a full turn about the up axis, if that was asked for.
+    /// Writes the cloud of vote `vote` to `out`: with rotations, it is turned by `vote / n` of a
+    /// full turn about the up axis.
     pub fn turn(&self, vote: u32, out: &mut [[f32; 3]]) {
         let angle = match self.rotations {
             true => f64::from(vote) / f64::from(self.n) * std::f64::consts::TAU,
@@ -94,7 +95,7 @@ impl TestTimeAugmentation {
         }
     }
 
-    /// Leaves the mean log-probabilities in `out`.
+    /// Writes the mean log-probabilities to `out`.
     pub fn result(&self, out: &mut Vec<f32>) {
         out.clear();
         out.extend(self.sums.iter().map(|sum| (sum / f64::from(self.n)) as f32));

@@ -1,5 +1,4 @@
-//! A classifier as a library's user has it: from a file or from memory, without
-//! a file while it works, and for clouds of any size.
+//! The classifier as a library: loaded from a file or from memory, for clouds of any size.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -12,14 +11,17 @@ use infer_cpu::sampler::{SamplerKind, SamplerSpec};
 use infer_cpu::{Classifier, ClassifierTeam, Error, Options, Precision};
 use test_support::IS_EMULATED;
 
+fn model(folder: &std::path::Path, card: &ModelCard) -> std::path::PathBuf {
+    tiny_model::write(&folder.join("m.safetensors"), &tiny_model::tensors(4), card)
+}
+
 #[test]
 fn ten_million_points_are_classified() {
-    // A tenth of them where each instruction takes many.
+    // An emulator gets a tenth of the points.
     const N: usize = if IS_EMULATED { 1_000_000 } else { 10_000_000 };
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("m.safetensors");
-    let model = tiny_model::write(&path, &tiny_model::tensors(4), &ModelCard::default());
-    // Weyl sequences of three irrational steps: spread evenly, and distinct.
+    let model = model(folder.path(), &ModelCard::default());
+    // Weyl sequences of three irrational steps are evenly spread and distinct.
     let at = |i: usize, step: f64| (i as f64 * step).fract() as f32;
     let cloud: Vec<[f32; 3]> =
         (0..N).map(|i| [at(i, 0.819_172_5), at(i, 0.671_043_6), at(i, 0.549_700_4)]).collect();
@@ -49,8 +51,7 @@ fn overflowing_model(folder: &std::path::Path) -> std::path::PathBuf {
 #[test]
 fn bytes_are_as_good_as_a_file() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("m.safetensors");
-    let model = tiny_model::write(&path, &tiny_model::tensors(4), &ModelCard::default());
+    let model = model(folder.path(), &ModelCard::default());
     let bytes = std::fs::read(&model).unwrap();
     for precision in Precision::ALL {
         let options = Options { precision, ..Options::default() };
@@ -114,7 +115,7 @@ fn a_team_answers_as_a_classifier_does_for_each_cloud() {
     }
 }
 
-/// A model whose card asks for the outlier filter.
+/// A model whose card enables the outlier filter.
 fn filtering_model(folder: &std::path::Path) -> std::path::PathBuf {
     let card = ModelCard {
         outlier_filter: true,
@@ -122,7 +123,7 @@ fn filtering_model(folder: &std::path::Path) -> std::path::PathBuf {
         points: Some(20),
         ..ModelCard::default()
     };
-    tiny_model::write(&folder.join("m.safetensors"), &tiny_model::tensors(4), &card)
+    model(folder, &card)
 }
 
 /// [`cloud`] after a stray.
@@ -143,7 +144,7 @@ fn a_stray_changes_no_bit_of_a_model_that_filters_outliers() {
             let found = classifier.classify(&cloud_with_stray()).unwrap();
             assert_eq!((found.n_points, found.n_outliers), (61, 1));
             assert_eq!(found.logits, alone.logits, "{} and {threads} threads", kernels.name);
-            // The filter is an option, and the card's wish a default.
+            // The option overrides the card.
             let off = Options { outlier_filter: Some(false), ..options };
             let mut plain = Classifier::load(&model, &off).unwrap();
             assert_eq!(plain.classify(&cloud()).unwrap().logits, alone.logits);

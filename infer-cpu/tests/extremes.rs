@@ -1,6 +1,4 @@
-//! The cases of `tests/extremes` that are about samplers, once more: here they
-//! also run with a Raspberry Pi's instructions, where the crates that cast rays
-//! do not.
+//! The sampler cases of `tests/extremes`, which run here with a Raspberry Pi's instructions, too.
 
 #[path = "../../tests/extremes/sample.rs"]
 mod sample;
@@ -9,7 +7,7 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-/// A case; `derivation` is for people, and checked where all cases run.
+/// A case; `tests/extremes` checks that it has a derivation.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {

@@ -1,7 +1,6 @@
-//! Once loaded, a classifier allocates nothing, whatever the cloud up to its
-//! capacity: a million classifications grow memory by nothing.
+//! A loaded classifier allocates no memory for clouds of up to its capacity.
 //!
-//! One test alone: the count is the whole process's, its threads' included.
+//! There is only one test, since the count is that of the whole process with all threads.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -26,7 +25,7 @@ static COUNTING: Counting = Counting;
 
 const CAPACITY: usize = 300;
 
-/// Clouds of all sizes, distinct, repeated and lying in one point.
+/// Clouds of several sizes, with distinct, repeated and equal points.
 fn clouds() -> Vec<Vec<[f32; 3]>> {
     let key = StreamKey::new(0, "no allocation", 0);
     let point = |i: usize| [0, 1, 2].map(|axis| key.unit((3 * i + axis) as u64) as f32);
@@ -40,7 +39,7 @@ fn clouds() -> Vec<Vec<[f32; 3]>> {
     distinct.chain(repeated).chain(equal).chain([stray]).collect()
 }
 
-/// How often `n` classifications allocate.
+/// The number of allocations of `n` classifications.
 fn allocations(model: &Path, options: &Options, clouds: &[Vec<[f32; 3]>], n: usize) -> usize {
     let mut classifier = Classifier::load(model, options).unwrap();
     let mut total = 0.0;
@@ -53,14 +52,13 @@ fn allocations(model: &Path, options: &Options, clouds: &[Vec<[f32; 3]>], n: usi
     n_allocations
 }
 
-/// Classifications that show a growth that one does not.
+/// Enough classifications to reveal slow growth.
 const MANY: usize = if IS_EMULATED { 300 } else { 20_000 };
 
-/// How often each cloud is classified.
+/// The number of classifications of each cloud.
 const ROUNDS: usize = if IS_EMULATED { 1 } else { 2 };
 
-/// A loaded classifier allocates nothing. The standard harness would, on the
-/// side: it reports tests that take long.
+/// The standard test harness is off, because it allocates memory when it reports slow tests.
 fn main() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("m.safetensors");
@@ -72,12 +70,12 @@ fn main() {
     specs.extend(Resize::ALL.map(|resize| SamplerSpec {
         resize,
         passes: 2,
-        // More than there are points, at times.
+        // Some clouds have fewer points.
         points: 64,
         ..spec(SamplerKind::Cpl)
     }));
     let mut found = Vec::new();
-    // A team does all that one thread does.
+    // A team includes the code of one thread.
     let teams: &[usize] = if IS_EMULATED { &[3] } else { &[1, 3] };
     for precision in Precision::ALL {
         for &threads in teams {
@@ -113,7 +111,7 @@ fn main() {
         found.push(format!("votes: {n}"));
     }
     assert!(found.is_empty(), "{}", found.join("\n"));
-    // What grows by something a cloud shows in many.
+    // Many classifications reveal growth of less than one allocation per cloud.
     let many = Options { capacity: CAPACITY, ..Options::default() };
     assert_eq!(allocations(&model, &many, &clouds, MANY), 0);
     team_allocates_nothing(&model, &clouds);
@@ -121,7 +119,7 @@ fn main() {
     live_allocates_nothing(&model);
 }
 
-/// Many clouds at once, in more threads than there are cores and in one.
+/// A team classifies many clouds, in one thread and in more threads than cores.
 fn team_allocates_nothing(model: &Path, clouds: &[Vec<[f32; 3]>]) {
     for threads in [1, 3] {
         let options = Options { threads, capacity: CAPACITY, ..Options::default() };
@@ -138,7 +136,7 @@ fn team_allocates_nothing(model: &Path, clouds: &[Vec<[f32; 3]>]) {
     }
 }
 
-/// From packets to objects, after the first turns have taken the room for all others.
+/// The pipeline allocates no memory after its first turns.
 #[cfg(feature = "live")]
 fn live_allocates_nothing(model: &Path) {
     use infer_cpu::live::{Arrival, LiveOptions, Pipeline};

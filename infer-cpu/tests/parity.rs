@@ -1,5 +1,7 @@
-//! The same logits as PyTorch, to 1e-5, at every number of points, threads and
-//! kernel. The reference data is `../shared/data/parity`, where it is present.
+//! Compares logits with PyTorch's: they agree to 1e-5 for all numbers of points and threads and all
+//! kernels. The reference data is `../shared/data/parity`, if present.
+
+#![expect(clippy::unwrap_used, reason = "tests")]
 
 use std::path::Path;
 
@@ -15,37 +17,40 @@ fn channels_first(tensor: &Tensor) -> Vec<[f32; 3]> {
     (0..n).map(|i| [0, 1, 2].map(|axis| tensor.values[axis * n + i])).collect()
 }
 
-/// Points of the golden clouds.
+/// The numbers of points of the golden clouds.
 const SIZES: [usize; 4] = [16, 64, 128, 1024];
+
+/// The largest errors of log-probabilities against PyTorch's, for golden clouds of up to `largest`
+/// points; an error where there are none.
+fn errors(options: Options, largest: usize) -> Result<Vec<(usize, f64)>, String> {
+    let folder = shared_data("parity")?;
+    let mut golden = WeightsFile::open(&folder.join("golden.safetensors")).unwrap();
+    let options = Options { normalization: Some(Normalization::None), ..options };
+    let mut classifier = Classifier::load(&folder.join("pointnet.safetensors"), &options).unwrap();
+    let error = |n: usize| {
+        let cloud = channels_first(&golden.read(&format!("x{n}")).unwrap());
+        let expected = golden.read(&format!("logp{n}")).unwrap().values;
+        let prediction = classifier.classify(&cloud).unwrap();
+        let errors = expected.iter().enumerate().map(|(class, &expected)| {
+            (prediction.log_probability(class) - f64::from(expected)).abs()
+        });
+        (n, errors.fold(0.0, f64::max))
+    };
+    Ok(SIZES.into_iter().filter(|&n| n <= largest).map(error).collect())
+}
 
 #[test]
 fn the_baseline_gives_pytorch_s_log_probabilities() {
-    let folder = need!(shared_data("parity"));
-    let mut golden = WeightsFile::open(&folder.join("golden.safetensors")).unwrap();
     for kernel in kernel::available().map(|kernels| kernels.name) {
         if IS_EMULATED && kernel == KernelName::Scalar {
             continue;
         }
         for threads in [1, 3] {
-            let options = Options {
-                kernel: Some(kernel),
-                threads,
-                normalization: Some(Normalization::None),
-                ..Options::default()
-            };
-            let model = folder.join("pointnet.safetensors");
-            let mut classifier = Classifier::load(&model, &options).unwrap();
-            // Emulated, the largest cloud comes once for each kernel.
+            let options = Options { kernel: Some(kernel), threads, ..Options::default() };
+            // An emulator gets the largest cloud once for each kernel.
             let largest = if IS_EMULATED && threads == 1 { 128 } else { 1024 };
-            for n in SIZES.into_iter().filter(|&n| n <= largest) {
-                let cloud = channels_first(&golden.read(&format!("x{n}")).unwrap());
-                let expected = golden.read(&format!("logp{n}")).unwrap().values;
-                let prediction = classifier.classify(&cloud).unwrap();
-                for (class, expected) in expected.iter().enumerate() {
-                    let found = prediction.log_probability(class);
-                    let error = (found - f64::from(*expected)).abs();
-                    assert!(error < 1e-5, "{kernel} {threads} {n}: {found} for {expected}");
-                }
+            for (n, error) in need!(errors(options, largest)) {
+                assert!(error < 1e-5, "{kernel} {threads} {n}: {error}");
             }
         }
     }
@@ -53,37 +58,23 @@ fn the_baseline_gives_pytorch_s_log_probabilities() {
 
 #[test]
 fn cheaper_precisions_stay_near() {
-    let folder = need!(shared_data("parity"));
-    let mut golden = WeightsFile::open(&folder.join("golden.safetensors")).unwrap();
     for precision in [Precision::F32Fc16, Precision::F16, Precision::I8] {
-        let options =
-            Options { precision, normalization: Some(Normalization::None), ..Options::default() };
-        let model = folder.join("pointnet.safetensors");
-        let mut classifier = Classifier::load(&model, &options).unwrap();
-        // Emulated, the largest cloud comes once.
+        // An emulator gets the largest cloud once.
         let largest = if IS_EMULATED && precision != Precision::F16 { 128 } else { 1024 };
-        for n in SIZES.into_iter().filter(|&n| n <= largest) {
-            let cloud = channels_first(&golden.read(&format!("x{n}")).unwrap());
-            let expected = golden.read(&format!("logp{n}")).unwrap().values;
-            let prediction = classifier.classify(&cloud).unwrap();
-            let error = expected.iter().enumerate().map(|(class, &expected)| {
-                (prediction.log_probability(class) - f64::from(expected)).abs()
-            });
-            let error = error.fold(0.0, f64::max);
-            eprintln!("{precision} {n}: {error:.2e}, clipped {}", prediction.n_clipped);
+        for (n, error) in need!(errors(Options { precision, ..Options::default() }, largest)) {
             assert!(error < 0.1, "{precision} {n}: {error}");
         }
     }
 }
 
-/// Point `i` of the golden clouds: coordinates by rule, exact in f32.
+/// Point `i` of the golden clouds, exact in f32.
 fn golden_point(i: usize) -> [f32; 3] {
     let axis = |a: usize, b: usize, m: usize| ((i * a + b) % m) as f32 / (m as f32 / 2.0) - 1.0;
     [axis(73, 11, 1024), axis(149, 5, 2048), axis(331, 77, 512)]
 }
 
-/// Golden files: `golden/make.py`, by PyTorch. Logits are near 1, and an error
-/// of 1e-5 is some 80 roundings of f32 there.
+/// `golden/make.py` creates the golden files with PyTorch. Logits are near 1, where an error of
+/// 1e-5 is about 80 roundings of f32.
 #[test]
 fn narrow_networks_give_pytorch_s_logits_with_and_without_t_nets() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden");
@@ -115,11 +106,11 @@ fn narrow_networks_give_pytorch_s_logits_with_and_without_t_nets() {
     }
 }
 
-/// Whatever the number of threads, to the bit.
+/// Logits are equal to the bit for any number of threads.
 #[test]
 fn threads_change_nothing() {
     let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/tiny.safetensors");
-    // Threads share work alike on all processors; kernels get other rows of it.
+    // The division of work does not depend on the processor, so that an emulator tests fewer teams.
     let teams: &[usize] = if IS_EMULATED { &[1, 3] } else { &[1, 2, 3, 8] };
     for precision in Precision::ALL {
         for n in [1, 49, 1057, 3000] {

@@ -1,5 +1,5 @@
-//! The bundled model of random weights is the one that this rule makes.
-//! `UPDATE_GOLDEN=1` writes it anew.
+//! Checks that the bundled model with random weights is the generated one. `UPDATE_GOLDEN=1`
+//! rewrites it.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 

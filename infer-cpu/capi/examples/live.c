@@ -85,7 +85,7 @@ int main(int argc, char **argv)
     }
     failed = replay(live, file, argv[2]);
     if (edgepuck_live_counts(live, &counts) == EDGEPUCK_STATUS_OK) {
-        fprintf(stderr, "%llu packets, %llu lost, %llu of something else\n",
+        fprintf(stderr, "%llu packets, %llu lost, %llu foreign\n",
                 (unsigned long long)counts.packets, (unsigned long long)counts.lost,
                 (unsigned long long)counts.foreign);
     }

@@ -29,20 +29,19 @@
 #include <stdint.h>
 
 /**
- * How a call went. edgepuck_last_error says more.
+ * The status of a call. edgepuck_last_error returns a message.
  */
 typedef enum EdgepuckStatus {
   /**
-   * It did what was asked.
+   * The call succeeded.
    */
   EDGEPUCK_STATUS_OK = 0,
   /**
-   * A pointer is null, or not aligned as its type needs.
+   * A pointer is null, or not aligned for its type.
    */
   EDGEPUCK_STATUS_BAD_POINTER = 1,
   /**
-   * An option has a value that nothing can be done with, or that the model
-   * cannot meet.
+   * An option has an invalid value, or one that the model does not support.
    */
   EDGEPUCK_STATUS_BAD_OPTION = 2,
   /**
@@ -54,7 +53,7 @@ typedef enum EdgepuckStatus {
    */
   EDGEPUCK_STATUS_BAD_CLOUD = 4,
   /**
-   * This machine cannot do it: it lacks instructions, or threads.
+   * This machine lacks instructions or cannot start threads.
    */
   EDGEPUCK_STATUS_UNSUPPORTED = 5,
   /**
@@ -66,105 +65,101 @@ typedef enum EdgepuckStatus {
    */
   EDGEPUCK_STATUS_BUFFER_TOO_SMALL = 7,
   /**
-   * No cloud has been classified yet, or the last could not be.
+   * No cloud has been classified yet, or the last one could not be classified.
    */
   EDGEPUCK_STATUS_NO_PREDICTION = 8,
   /**
-   * A defect of this library. The classifier is only good for being freed.
+   * A defect of this library. The classifier can only be freed.
    */
   EDGEPUCK_STATUS_INTERNAL = 9,
 } EdgepuckStatus;
 
 /**
- * A network ready to classify clouds: made by edgepuck_load, unmade by
- * edgepuck_free.
+ * A loaded network that classifies clouds. edgepuck_load creates it, and edgepuck_free frees it.
  */
 typedef struct EdgepuckClassifier EdgepuckClassifier;
 
 /**
- * From the packets of a LiDAR to named, tracked objects: made by
- * edgepuck_live_open, unmade by edgepuck_live_close.
+ * A pipeline from the packets of a LiDAR to classified, tracked objects. edgepuck_live_open
+ * creates it, and edgepuck_live_close frees it.
  */
 typedef struct EdgepuckLive EdgepuckLive;
 
 /**
- * How a classifier computes. Begin with edgepuck_options_default, then change
- * what you like. Choices are words, the same as on infer-cpu's command line;
- * a word that names nothing gives an error that lists those that do.
+ * The options of a classifier. Begin with edgepuck_options_default, then change fields. Choices
+ * are words, as on infer-cpu's command line; an unknown word gives an error that lists the valid
+ * ones.
  */
 typedef struct EdgepuckOptions {
   /**
-   * What to compute in: "f32", "f32-fc16" (fp32 arithmetic, the weights of
-   * vector layers stored in fp16), "f16" or "i8". Null: "f32".
+   * The precision: "f32", "f32-fc16" (fp32 arithmetic, with weights of vector layers stored in
+   * fp16), "f16" or "i8". Null: "f32".
    */
   const char *precision;
   /**
-   * The kernels to use, such as "scalar" or "neon". Null: the fastest that
-   * this machine runs.
+   * The kernels, such as "scalar" or "neon". Null: the fastest ones of this machine.
    */
   const char *kernel;
   /**
-   * Threads, the caller's among them; 0 counts as 1.
+   * The number of threads, including the caller's; 0 counts as 1.
    */
   size_t threads;
   /**
-   * Which T-Nets are run: "both", "input", "feature" or "none"; one that is
-   * left out counts as the identity. Null: all that the model has.
+   * The T-Nets that are run: "both", "input", "feature" or "none"; an omitted one counts as the
+   * identity. Null: all T-Nets of the model.
    */
   const char *t_nets;
   /**
-   * Which points the network sees: "all", "first", "random", "fps", "voxel"
-   * or "cpl". Null: as in training; the next seven fields are then left at
-   * their defaults.
+   * The sampler that chooses points for the network: "all", "first", "random", "fps", "voxel" or
+   * "cpl". Null: as in training; the next seven fields must then have their defaults.
    */
   const char *sampler;
   /**
-   * How many points the sampler keeps. 0: 1024.
+   * The number of points that the sampler keeps. 0: 1024.
    */
   size_t points;
   /**
-   * What random draws depend on.
+   * The seed of random draws.
    */
   uint64_t seed;
   /**
-   * Where "fps" begins: "farthest" (from the centroid) or "first". Null:
-   * "farthest".
+   * The first point of "fps": "farthest" (from the centroid) or "first". Null: "farthest".
    */
   const char *fps_start;
   /**
-   * Edge of a voxel for "voxel", in the units of a normalised cloud. 0: as
-   * fine as points allows.
+   * The edge of a voxel for "voxel", in the units of a normalised cloud. 0: as fine as points
+   * allows.
    */
   double voxel_size;
   /**
-   * How "cpl" comes to its number of points: "truncate", "cyclic", "nearest"
-   * or "weighted". Null: "cyclic".
+   * How "cpl" resizes its points to the requested number: "truncate", "cyclic", "nearest" or
+   * "weighted". Null: "cyclic".
    */
   const char *resize;
   /**
-   * How often "cpl" may pool again while it has fewer points than asked for.
+   * How often "cpl" may pool again while it has fewer points than requested.
    */
   size_t passes;
   /**
-   * What "cpl" pools: "auto", "own", "stn" or "trunk". Null: "auto".
+   * The layers whose features "cpl" pools: "auto", "own", "stn" or "trunk". Null: "auto".
    */
   const char *front;
   /**
-   * How clouds are normalised: "unit-sphere" or "none". Null: as in
+   * The normalisation of clouds: "unit-sphere", "metric", "metric-sight" or "none". Null: as in
    * training.
    */
   const char *normalization;
   /**
-   * Drop points that are not finite instead of refusing the cloud.
+   * Whether points that are not finite are dropped; otherwise they are an error.
    */
   bool drop_invalid;
   /**
-   * Draws of a random subset whose log-probabilities are averaged; more than
-   * 1 needs the sampler "random", or vote_rotations.
+   * The number of classifications whose log-probabilities are averaged; more than 1 requires the
+   * sampler "random" or vote_rotations.
    */
   uint32_t votes;
   /**
-   * Turn the cloud about its up axis between votes, evenly spread.
+   * Whether the cloud is rotated about its up axis between votes, in equal steps.
    */
   bool vote_rotations;
   /**
@@ -172,53 +167,53 @@ typedef struct EdgepuckOptions {
    */
   size_t up;
   /**
-   * Points to make room for at once; larger clouds allocate when they come.
+   * The number of points for which memory is allocated at loading; larger clouds allocate later.
    */
   size_t capacity;
 } EdgepuckOptions;
 
 /**
- * The class of a cloud, and how it was found.
+ * The class of a cloud, and how it was computed.
  */
 typedef struct EdgepuckPrediction {
   /**
-   * The class: see edgepuck_class_name. Of equal logits the first wins.
+   * The class: see edgepuck_class_name. If logits are equal, the first wins.
    */
   size_t class_index;
   /**
-   * Its probability by the network's softmax, 0 to 1.
+   * Its probability by the softmax of the network, 0 to 1.
    */
   double confidence;
   /**
-   * Points of the cloud, without those that were dropped.
+   * The number of points of the cloud that are finite.
    */
   size_t n_points;
   /**
-   * Points that were dropped because a coordinate was not finite.
+   * The number of points that were dropped because a coordinate was not finite.
    */
   size_t n_dropped;
   /**
-   * Points that the network saw: those that the sampler kept, each once.
+   * The number of points that the network processed: those that the sampler kept, each once.
    */
   size_t n_used;
   /**
-   * Activations that the calibrated ranges of "i8" clipped.
+   * The number of activations that were clipped to the calibrated ranges of "i8".
    */
   uint64_t n_clipped;
   /**
-   * Whether the precision asked for overflowed on this cloud, so that it was
-   * classified in "f32".
+   * Whether the requested precision overflowed on this cloud, which was then classified in
+   * "f32".
    */
   bool fell_back;
   /**
-   * Whether the answer is "unknown", because the model is not meant to
-   * recognise such an object; class_index then states what it resembles most.
+   * Whether the object belongs to no known class; class_index is then the class that it
+   * resembles most.
    */
   bool is_unknown;
 } EdgepuckPrediction;
 
 /**
- * An object, as edgepuck_live_next tells it.
+ * An object from edgepuck_live_next.
  */
 typedef struct EdgepuckObject {
   /**
@@ -230,13 +225,13 @@ typedef struct EdgepuckObject {
    */
   uint64_t turn;
   /**
-   * The class by all that was seen of the object, or "unknown"; UTF-8, for as
-   * long as the pipeline lives. Null while it has had too few points.
+   * The class from all clusters of the object, or "unknown"; UTF-8, valid as long as the
+   * pipeline. Null while the object has had too few points.
    */
   const char *class_name;
   /**
-   * The probability of the class that the object is most like, by all that
-   * was seen of it, 0 to 1; NaN while there is none.
+   * The probability of the class that the object resembles most, from all of its clusters, 0 to
+   * 1; NaN while class_name is null.
    */
   double probability;
   /**
@@ -252,7 +247,7 @@ typedef struct EdgepuckObject {
    */
   double yaw_deg;
   /**
-   * Metres a second, relative to the sensor; NaN of what was seen once.
+   * The velocity, metres per second, relative to the sensor; NaN in the first turn of an object.
    */
   double velocity_m_s[3];
   /**
@@ -260,18 +255,17 @@ typedef struct EdgepuckObject {
    */
   size_t n_points;
   /**
-   * When the first point was measured, seconds of Unix time by the sensor's
-   * clock.
+   * When the first point was measured: Unix time in seconds by the sensor's clock.
    */
   double first_s;
   /**
-   * When the last point was.
+   * When the last point was measured.
    */
   double last_s;
 } EdgepuckObject;
 
 /**
- * Packets since the start.
+ * The numbers of packets since the start.
  */
 typedef struct EdgepuckLiveCounts {
   /**
@@ -279,7 +273,7 @@ typedef struct EdgepuckLiveCounts {
    */
   uint64_t packets;
   /**
-   * Packets that are missing by the time stamps of those that came.
+   * Packets that are missing according to the time stamps of the others.
    */
   uint64_t lost;
   /**
@@ -291,7 +285,7 @@ typedef struct EdgepuckLiveCounts {
    */
   uint64_t foreign;
   /**
-   * How often the sensor or its clock began anew.
+   * The number of restarts of the sensor or its clock.
    */
   uint64_t restarts;
 } EdgepuckLiveCounts;
@@ -306,30 +300,27 @@ extern "C" {
 const char *edgepuck_version(void);
 
 /**
- * Loads the model file at path (UTF-8 on Windows) and packs it as options ask;
- * null options are the defaults. Writes the classifier to out, or null when it
- * fails. Pass it to edgepuck_free in the end.
+ * Loads the model file at path (UTF-8 on Windows) with options; null stands for the defaults.
+ * Writes the classifier to out, or null if it fails. Pass it to edgepuck_free in the end.
  *
  * # Safety
  *
- * path is null or a NUL-terminated string, as is every word of options;
- * options is null or valid; out is null or may be written to.
+ * path is null or a NUL-terminated string, as is every word of options; options is null or valid;
+ * out is null or may be written to.
  */
 enum EdgepuckStatus edgepuck_load(const char *path,
                                   const struct EdgepuckOptions *options,
                                   struct EdgepuckClassifier **out);
 
 /**
- * Classifies a cloud of n_points points, x y z after x y z, in metres or
- * whatever the unit: only shape counts where clouds are normalised. Writes to
- * out if it succeeds. Allocates nothing for clouds of up to capacity points
- * (see EdgepuckOptions).
+ * Classifies a cloud of n_points points, x y z after x y z, in metres; any unit will do for a
+ * model that normalises clouds. Writes to out if it succeeds. Clouds of up to capacity points (see
+ * EdgepuckOptions) cause no allocation.
  *
  * # Safety
  *
- * classifier is null or comes from edgepuck_load, is not freed, and no other
- * thread uses it now; xyz is null or 3 * n_points floats can be read there;
- * out is null or may be written to.
+ * classifier is null or comes from edgepuck_load, is not freed, and no other thread uses it now;
+ * xyz is null or 3 * n_points floats can be read there; out is null or may be written to.
  */
 enum EdgepuckStatus edgepuck_classify(struct EdgepuckClassifier *classifier,
                                       const float *xyz,
@@ -337,21 +328,20 @@ enum EdgepuckStatus edgepuck_classify(struct EdgepuckClassifier *classifier,
                                       struct EdgepuckPrediction *out);
 
 /**
- * Copies the logits of the last cloud, one a class, to a buffer of length
- * floats. After votes they are mean log-probabilities.
+ * Copies the logits of the last cloud, one per class, to a buffer of length floats. After votes
+ * they are mean log-probabilities.
  *
  * # Safety
  *
- * classifier is null or comes from edgepuck_load, is not freed, and no other
- * thread classifies with it now; out is null or length floats may be written
- * there.
+ * classifier is null or comes from edgepuck_load, is not freed, and no other thread classifies
+ * with it now; out is null or length floats may be written there.
  */
 enum EdgepuckStatus edgepuck_logits(const struct EdgepuckClassifier *classifier,
                                     float *out,
                                     size_t length);
 
 /**
- * How many classes the network tells apart; 0 for a null classifier.
+ * The number of classes; 0 for a null classifier.
  *
  * # Safety
  *
@@ -360,8 +350,8 @@ enum EdgepuckStatus edgepuck_logits(const struct EdgepuckClassifier *classifier,
 size_t edgepuck_n_classes(const struct EdgepuckClassifier *classifier);
 
 /**
- * The name of class index, UTF-8, for as long as the classifier lives; null
- * for a null classifier or a class that it does not have.
+ * The name of class index, UTF-8, valid as long as the classifier; null for a null classifier or a
+ * class that does not exist.
  *
  * # Safety
  *
@@ -371,35 +361,34 @@ const char *edgepuck_class_name(const struct EdgepuckClassifier *classifier,
                                 size_t index);
 
 /**
- * Frees a classifier; null is none.
+ * Frees a classifier; null has no effect.
  *
  * # Safety
  *
- * classifier is null or comes from edgepuck_load; nobody uses it, or a name
- * that it gave, now or later.
+ * classifier is null or comes from edgepuck_load; no thread uses it or its class names now or
+ * later.
  */
 void edgepuck_free(struct EdgepuckClassifier *classifier);
 
 /**
- * What went wrong in the last call of this thread that failed; empty if none
- * did. A call that succeeds leaves it as it is.
+ * The error message of the last failed call of this thread; empty if no call has failed. A
+ * successful call does not change it.
  *
- * The text is UTF-8 and this thread's: it is gone when another call fails.
+ * The text is UTF-8, and valid until another call of this thread fails.
  */
 const char *edgepuck_last_error(void);
 
 /**
- * Opens a pipeline whose clusters are classified by the model file at path, as
- * options ask (null: the defaults) and by as many threads; those of fewer than
- * min_points points are not classified. The sensor is a Velodyne VLP-16 or
- * VLP-32C, or, if metadata is not null, the Ouster whose metadata file (JSON)
- * that names. Writes the pipeline to out, or null when it fails. Pass it to
- * edgepuck_live_close in the end.
+ * Opens a pipeline that classifies clusters with the model file at path and with options (null
+ * stands for the defaults), one cluster per thread; clusters of fewer than min_points points are
+ * not classified. The sensor is a Velodyne VLP-16 or VLP-32C, or an Ouster if metadata is the path
+ * of its metadata file (JSON) instead of null. Writes the pipeline to out, or null if it fails.
+ * Pass it to edgepuck_live_close in the end.
  *
  * # Safety
  *
- * path is null or a NUL-terminated string, as are metadata and every word of
- * options; options is null or valid; out is null or may be written to.
+ * path is null or a NUL-terminated string, as are metadata and every word of options; options is
+ * null or valid; out is null or may be written to.
  */
 enum EdgepuckStatus edgepuck_live_open(const char *path,
                                        const struct EdgepuckOptions *options,
@@ -408,14 +397,14 @@ enum EdgepuckStatus edgepuck_live_open(const char *path,
                                        struct EdgepuckLive **out);
 
 /**
- * Takes what one UDP packet of the sensor carries, n_bytes at packet, which
- * came at time_s of Unix time in seconds. Whatever it holds, it is decoded or
- * counted: see edgepuck_live_counts. Then ask edgepuck_live_next.
+ * Processes the payload of one UDP packet of the sensor, n_bytes at packet, which arrived at the
+ * Unix time time_s in seconds. Any content is decoded or counted as foreign: see
+ * edgepuck_live_counts. Then call edgepuck_live_next.
  *
  * # Safety
  *
- * live is null or comes from edgepuck_live_open, is not closed, and no other
- * thread uses it now; packet is null or n_bytes bytes can be read there.
+ * live is null or comes from edgepuck_live_open, is not closed, and no other thread uses it now;
+ * packet is null or n_bytes bytes can be read there.
  */
 enum EdgepuckStatus edgepuck_live_take(struct EdgepuckLive *live,
                                        const uint8_t *packet,
@@ -423,50 +412,49 @@ enum EdgepuckStatus edgepuck_live_take(struct EdgepuckLive *live,
                                        double time_s);
 
 /**
- * Ends what is not complete, as at the end of a recording. Then ask
- * edgepuck_live_next.
+ * Completes all clusters, for example at the end of a recording. Then call edgepuck_live_next.
  *
  * # Safety
  *
- * live is null or comes from edgepuck_live_open, is not closed, and no other
- * thread uses it now.
+ * live is null or comes from edgepuck_live_open, is not closed, and no other thread uses it now.
  */
 enum EdgepuckStatus edgepuck_live_end(struct EdgepuckLive *live);
 
 /**
- * Writes the next object to out and is true; false if there is none until more
- * packets are taken, or if a pointer is null.
+ * Writes the next object to out and returns true. Returns false if there is no object until the
+ * next packet, or if a pointer is null.
  *
  * # Safety
  *
- * live is null or comes from edgepuck_live_open, is not closed, and no other
- * thread uses it now; out is null or may be written to.
+ * live is null or comes from edgepuck_live_open, is not closed, and no other thread uses it now;
+ * out is null or may be written to.
  */
-bool edgepuck_live_next(struct EdgepuckLive *live, struct EdgepuckObject *out);
+bool edgepuck_live_next(struct EdgepuckLive *live,
+                        struct EdgepuckObject *out);
 
 /**
- * Writes what came and what did not to out.
+ * Writes the numbers of packets to out.
  *
  * # Safety
  *
- * live is null or comes from edgepuck_live_open, is not closed, and no other
- * thread takes packets with it now; out is null or may be written to.
+ * live is null or comes from edgepuck_live_open, is not closed, and no other thread takes packets
+ * with it now; out is null or may be written to.
  */
 enum EdgepuckStatus edgepuck_live_counts(const struct EdgepuckLive *live,
                                          struct EdgepuckLiveCounts *out);
 
 /**
- * Closes a pipeline; null is none.
+ * Closes a pipeline; null has no effect.
  *
  * # Safety
  *
- * live is null or comes from edgepuck_live_open; nobody uses it, or a name
- * that it gave, now or later.
+ * live is null or comes from edgepuck_live_open; no thread uses it or its class names now or
+ * later.
  */
 void edgepuck_live_close(struct EdgepuckLive *live);
 
 /**
- * The options of a classifier that is loaded without any.
+ * The default options.
  */
 struct EdgepuckOptions edgepuck_options_default(void);
 

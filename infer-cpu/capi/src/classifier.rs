@@ -1,8 +1,8 @@
-//! A classifier that C holds by its address.
+//! The classifier for C.
 
 use std::ffi::{CString, c_char};
 use std::path::Path;
-use std::ptr::{null, null_mut};
+use std::ptr::null;
 
 use infer_cpu::{Classifier, Options, Precision};
 
@@ -12,13 +12,12 @@ use crate::pointers;
 use crate::prediction::EdgepuckPrediction;
 use crate::status::EdgepuckStatus;
 
-/// A network ready to classify clouds: made by edgepuck_load, unmade by
-/// edgepuck_free.
+/// A loaded network that classifies clouds. edgepuck_load creates it, and edgepuck_free frees it.
 pub struct EdgepuckClassifier {
     classifier: Classifier,
     precision: Precision,
     class_names: Vec<CString>,
-    /// Of the last cloud; empty if it could not be classified.
+    /// The logits of the last cloud; empty if it could not be classified.
     logits: Vec<f32>,
 }
 
@@ -43,7 +42,7 @@ impl EdgepuckClassifier {
     }
 }
 
-/// C may take a classifier from one thread to another.
+/// C may move a classifier to another thread.
 const _: () = {
     const fn is_send<T: Send>() {}
     is_send::<EdgepuckClassifier>();
@@ -55,48 +54,35 @@ pub extern "C" fn edgepuck_version() -> *const c_char {
     concat!(env!("CARGO_PKG_VERSION"), "\0").as_ptr().cast()
 }
 
-/// Loads the model file at path (UTF-8 on Windows) and packs it as options ask;
-/// null options are the defaults. Writes the classifier to out, or null when it
-/// fails. Pass it to edgepuck_free in the end.
+/// Loads the model file at path (UTF-8 on Windows) with options; null stands for the defaults.
+/// Writes the classifier to out, or null if it fails. Pass it to edgepuck_free in the end.
 ///
 /// # Safety
 ///
-/// path is null or a NUL-terminated string, as is every word of options;
-/// options is null or valid; out is null or may be written to.
+/// path is null or a NUL-terminated string, as is every word of options; options is null or valid;
+/// out is null or may be written to.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn edgepuck_load(
     path: *const c_char,
     options: *const EdgepuckOptions,
     out: *mut *mut EdgepuckClassifier,
 ) -> EdgepuckStatus {
-    guard_status(|| {
-        pointers::check(out, "out")?;
-        // SAFETY: not null and aligned; the rest is this function's contract.
-        unsafe { out.write(null_mut()) };
-        // SAFETY: this function's contract.
-        let path = unsafe { pointers::path(path) }?;
-        let options = match options.is_null() {
-            true => Options::default(),
-            // SAFETY: this function's contract.
-            false => unsafe { pointers::shared(options, "options")?.read() }?,
-        };
-        let classifier = Box::new(EdgepuckClassifier::load(&path, &options)?);
-        // SAFETY: as above.
-        unsafe { out.write(Box::into_raw(classifier)) };
-        Ok(())
-    })
+    // SAFETY: the pointers are as the `# Safety` section above requires.
+    unsafe {
+        pointers::make(out, || {
+            EdgepuckClassifier::load(&pointers::path(path)?, &pointers::options(options)?)
+        })
+    }
 }
 
-/// Classifies a cloud of n_points points, x y z after x y z, in metres or
-/// whatever the unit: only shape counts where clouds are normalised. Writes to
-/// out if it succeeds. Allocates nothing for clouds of up to capacity points
-/// (see EdgepuckOptions).
+/// Classifies a cloud of n_points points, x y z after x y z, in metres; any unit will do for a
+/// model that normalises clouds. Writes to out if it succeeds. Clouds of up to capacity points (see
+/// EdgepuckOptions) cause no allocation.
 ///
 /// # Safety
 ///
-/// classifier is null or comes from edgepuck_load, is not freed, and no other
-/// thread uses it now; xyz is null or 3 * n_points floats can be read there;
-/// out is null or may be written to.
+/// classifier is null or comes from edgepuck_load, is not freed, and no other thread uses it now;
+/// xyz is null or 3 * n_points floats can be read there; out is null or may be written to.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn edgepuck_classify(
     classifier: *mut EdgepuckClassifier,
@@ -105,26 +91,23 @@ pub unsafe extern "C" fn edgepuck_classify(
     out: *mut EdgepuckPrediction,
 ) -> EdgepuckStatus {
     guard_status(|| {
-        pointers::check(out, "out")?;
-        // SAFETY: this function's contract.
-        let classifier = unsafe { pointers::exclusive(classifier, "classifier") }?;
-        // SAFETY: this function's contract.
-        let cloud = unsafe { pointers::cloud(xyz, n_points) }?;
-        let prediction = classifier.classify(cloud)?;
-        // SAFETY: not null and aligned; the rest is this function's contract.
-        unsafe { out.write(prediction) };
+        // SAFETY: the pointers are as the `# Safety` section above requires.
+        let (out, classifier, cloud) = unsafe {
+            let out = pointers::out(out)?;
+            (out, pointers::exclusive(classifier, "classifier")?, pointers::cloud(xyz, n_points)?)
+        };
+        out.write(classifier.classify(cloud)?);
         Ok(())
     })
 }
 
-/// Copies the logits of the last cloud, one a class, to a buffer of length
-/// floats. After votes they are mean log-probabilities.
+/// Copies the logits of the last cloud, one per class, to a buffer of length floats. After votes
+/// they are mean log-probabilities.
 ///
 /// # Safety
 ///
-/// classifier is null or comes from edgepuck_load, is not freed, and no other
-/// thread classifies with it now; out is null or length floats may be written
-/// there.
+/// classifier is null or comes from edgepuck_load, is not freed, and no other thread classifies
+/// with it now; out is null or length floats may be written there.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn edgepuck_logits(
     classifier: *const EdgepuckClassifier,
@@ -133,7 +116,7 @@ pub unsafe extern "C" fn edgepuck_logits(
 ) -> EdgepuckStatus {
     guard_status(|| {
         pointers::check(out, "out")?;
-        // SAFETY: this function's contract.
+        // SAFETY: null or from edgepuck_load, and not freed, as required above.
         let classifier = unsafe { pointers::shared(classifier, "classifier") }?;
         let (logits, n_classes) = (&classifier.logits, classifier.class_names.len());
         if logits.is_empty() {
@@ -145,14 +128,14 @@ pub unsafe extern "C" fn edgepuck_logits(
                 format!("expected a buffer for {n_classes} logits, found one of {length}");
             return Err(Failure::new(EdgepuckStatus::BufferTooSmall, message));
         }
-        // SAFETY: out is not null, aligned, and as long as is checked above; it
-        // is the caller's, so that it does not overlap with ours.
+        // SAFETY: not null, aligned, and long enough, as checked above; the buffer of C does not
+        // overlap with the `Vec` of logits.
         unsafe { out.copy_from_nonoverlapping(logits.as_ptr(), logits.len()) };
         Ok(())
     })
 }
 
-/// How many classes the network tells apart; 0 for a null classifier.
+/// The number of classes; 0 for a null classifier.
 ///
 /// # Safety
 ///
@@ -160,15 +143,15 @@ pub unsafe extern "C" fn edgepuck_logits(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn edgepuck_n_classes(classifier: *const EdgepuckClassifier) -> usize {
     let n_classes = guard(|| {
-        // SAFETY: this function's contract.
+        // SAFETY: null or from edgepuck_load, and not freed, as required above.
         let classifier = unsafe { pointers::shared(classifier, "classifier") }?;
         Ok(classifier.class_names.len())
     });
     n_classes.unwrap_or(0)
 }
 
-/// The name of class index, UTF-8, for as long as the classifier lives; null
-/// for a null classifier or a class that it does not have.
+/// The name of class index, UTF-8, valid as long as the classifier; null for a null classifier or a
+/// class that does not exist.
 ///
 /// # Safety
 ///
@@ -179,7 +162,7 @@ pub unsafe extern "C" fn edgepuck_class_name(
     index: usize,
 ) -> *const c_char {
     let name = guard(|| {
-        // SAFETY: this function's contract.
+        // SAFETY: null or from edgepuck_load, and not freed, as required above.
         let names = unsafe { &pointers::shared(classifier, "classifier")?.class_names };
         names.get(index).map(|name| name.as_ptr()).ok_or_else(|| {
             let message = format!("expected a class below {}, found {index}", names.len());
@@ -189,22 +172,15 @@ pub unsafe extern "C" fn edgepuck_class_name(
     name.unwrap_or(null())
 }
 
-/// Frees a classifier; null is none.
+/// Frees a classifier; null has no effect.
 ///
 /// # Safety
 ///
-/// classifier is null or comes from edgepuck_load; nobody uses it, or a name
-/// that it gave, now or later.
+/// classifier is null or comes from edgepuck_load; no thread uses it or its class names now or
+/// later.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn edgepuck_free(classifier: *mut EdgepuckClassifier) {
-    if classifier.is_null() {
-        return;
-    }
-    // SAFETY: edgepuck_load made it by Box::into_raw; the caller gives it up.
-    let classifier = unsafe { Box::from_raw(classifier) };
-    // There is no status to answer by; a panic has left its message.
-    let _ = guard_status(|| {
-        drop(classifier);
-        Ok(())
-    });
+    // SAFETY: null or from edgepuck_load, which calls `make`, and not used later, as required
+    // above.
+    unsafe { pointers::free(classifier) }
 }

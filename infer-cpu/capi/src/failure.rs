@@ -1,5 +1,4 @@
-//! What went wrong, kept for the thread that asks, and the border that no
-//! panic passes.
+//! Errors, which are stored per thread, and the boundary that stops panics.
 
 use std::any::Any;
 use std::cell::RefCell;
@@ -15,7 +14,7 @@ thread_local! {
     static LAST_ERROR: RefCell<CString> = RefCell::default();
 }
 
-/// Why a call failed: its status, and what [`edgepuck_last_error`] says of it.
+/// The error of a call: its status, and the message for [`edgepuck_last_error`].
 #[derive(Debug)]
 pub struct Failure {
     status: EdgepuckStatus,
@@ -38,31 +37,28 @@ impl From<Error> for Failure {
 fn status_of(error: &Error) -> EdgepuckStatus {
     match error {
         Error::Format(_) => EdgepuckStatus::BadModel,
-        Error::NoPoints | Error::NotFinite { .. } | Error::TooManyPoints(_) => {
-            EdgepuckStatus::BadCloud
-        }
+        Error::NoPoints
+        | Error::NotFinite { .. }
+        | Error::TooManyPoints(_)
+        | Error::Sampler(SamplerError::TooManyPoints(_)) => EdgepuckStatus::BadCloud,
         Error::KernelMissing(_) | Error::KernelPrecision { .. } | Error::Threads { .. } => {
             EdgepuckStatus::Unsupported
         }
         Error::Overflow => EdgepuckStatus::Overflow,
-        Error::Sampler(SamplerError::NotFinite { .. } | SamplerError::TooManyPoints(_)) => {
-            EdgepuckStatus::BadCloud
-        }
         Error::Sampler(_)
         | Error::FrontMissing { .. }
         | Error::VotesWithoutDraws(_)
         | Error::TooManyThreads(_)
         | Error::TooMuchRoom(_) => EdgepuckStatus::BadOption,
-        // Of functions that this interface does not offer.
+        // Errors of functions that this interface does not have.
         _ => EdgepuckStatus::Internal,
     }
 }
 
-/// What `call` gives, or a status; what went wrong is kept for
-/// [`edgepuck_last_error`]. A panic goes no further.
+/// Returns the result of `call`, or a status and stores the message for [`edgepuck_last_error`].
+/// Catches panics.
 ///
-/// Safe Rust may leave values half-changed when it panics, but never unsound:
-/// a classifier that met a panic can still be freed.
+/// After a panic, values may be half-changed but remain sound: a classifier can still be freed.
 pub fn guard<T>(call: impl FnOnce() -> Result<T, Failure>) -> Result<T, EdgepuckStatus> {
     let failure = match catch_unwind(AssertUnwindSafe(call)) {
         Ok(Ok(value)) => return Ok(value),
@@ -73,23 +69,23 @@ pub fn guard<T>(call: impl FnOnce() -> Result<T, Failure>) -> Result<T, Edgepuck
         }
     };
     let text = CString::new(failure.message.replace('\0', "\u{fffd}")).unwrap_or_default();
-    // A thread that is ending has nobody left to ask for the message.
+    // A thread that is ending cannot store a message, and no longer needs it.
     let _ = LAST_ERROR.try_with(|last| last.replace(text));
     Err(failure.status)
 }
 
-/// The same for a call that gives nothing but its status.
+/// [`guard`] for a call that returns only a status.
 pub fn guard_status(call: impl FnOnce() -> Result<(), Failure>) -> EdgepuckStatus {
     guard(call).err().unwrap_or(EdgepuckStatus::Ok)
 }
 
-/// What went wrong in the last call of this thread that failed; empty if none
-/// did. A call that succeeds leaves it as it is.
+/// The error message of the last failed call of this thread; empty if no call has failed. A
+/// successful call does not change it.
 ///
-/// The text is UTF-8 and this thread's: it is gone when another call fails.
+/// The text is UTF-8, and valid until another call of this thread fails.
 #[unsafe(no_mangle)]
 pub extern "C" fn edgepuck_last_error() -> *const c_char {
-    // A thread that is ending has no message left.
+    // A thread that is ending no longer has a message.
     LAST_ERROR.try_with(|last| last.borrow().as_ptr()).unwrap_or(c"".as_ptr())
 }
 
@@ -106,7 +102,7 @@ mod tests {
     use super::*;
 
     fn last_error() -> String {
-        // SAFETY: the message is NUL-terminated and no call comes in between.
+        // SAFETY: `LAST_ERROR` is a `CString`, which no call replaces in between.
         let text = unsafe { CStr::from_ptr(edgepuck_last_error()) };
         text.to_str().unwrap().to_owned()
     }

@@ -1,8 +1,7 @@
-//! The C interface of `infer-cpu`, `include/edgepuck.h`: functions that take
-//! raw pointers, check them, and answer by a status.
+//! The C interface of `infer-cpu`, `include/edgepuck.h`: functions that take raw pointers, check
+//! them, and return a status.
 //!
-//! Doc comments here speak to the readers of that header, which is made of
-//! them.
+//! Doc comments here are for readers of that header, which is generated from them.
 
 mod classifier;
 mod failure;

@@ -1,28 +1,28 @@
-//! The pipeline from packets to objects, which C holds by its address.
+//! The pipeline from packets to objects for C.
 
 use std::collections::VecDeque;
 use std::ffi::{CString, c_char};
-use std::ptr::{null, null_mut};
+use std::ptr::null;
 
 use formats::ouster::Metadata;
 use infer_cpu::live::{Arrival, LiveError, LiveOptions, Object, Pipeline};
-use infer_cpu::{Classifier, Options, UNKNOWN};
+use infer_cpu::{Classifier, UNKNOWN};
 
 use crate::failure::{Failure, guard_status};
 use crate::options::EdgepuckOptions;
 use crate::pointers;
 use crate::status::EdgepuckStatus;
 
-/// From the packets of a LiDAR to named, tracked objects: made by
-/// edgepuck_live_open, unmade by edgepuck_live_close.
+/// A pipeline from the packets of a LiDAR to classified, tracked objects. edgepuck_live_open
+/// creates it, and edgepuck_live_close frees it.
 pub struct EdgepuckLive {
     pipeline: Pipeline,
-    /// Names of classes, and of none.
+    /// The names of classes, and of unknown objects.
     names: Vec<CString>,
     answered: VecDeque<EdgepuckObject>,
 }
 
-/// An object, as edgepuck_live_next tells it.
+/// An object from edgepuck_live_next.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EdgepuckObject {
@@ -30,11 +30,11 @@ pub struct EdgepuckObject {
     pub track: u64,
     /// The number of the turn, from 0.
     pub turn: u64,
-    /// The class by all that was seen of the object, or "unknown"; UTF-8, for as
-    /// long as the pipeline lives. Null while it has had too few points.
+    /// The class from all clusters of the object, or "unknown"; UTF-8, valid as long as the
+    /// pipeline. Null while the object has had too few points.
     pub class_name: *const c_char,
-    /// The probability of the class that the object is most like, by all that
-    /// was seen of it, 0 to 1; NaN while there is none.
+    /// The probability of the class that the object resembles most, from all of its clusters, 0 to
+    /// 1; NaN while class_name is null.
     pub probability: f64,
     /// The middle of the box around the points, metres, in the sensor's frame.
     pub position_m: [f64; 3],
@@ -42,30 +42,29 @@ pub struct EdgepuckObject {
     pub size_m: [f64; 3],
     /// The direction of the length, degrees counterclockwise from x, -90 to 90.
     pub yaw_deg: f64,
-    /// Metres a second, relative to the sensor; NaN of what was seen once.
+    /// The velocity, metres per second, relative to the sensor; NaN in the first turn of an object.
     pub velocity_m_s: [f64; 3],
     /// The number of points.
     pub n_points: usize,
-    /// When the first point was measured, seconds of Unix time by the sensor's
-    /// clock.
+    /// When the first point was measured: Unix time in seconds by the sensor's clock.
     pub first_s: f64,
-    /// When the last point was.
+    /// When the last point was measured.
     pub last_s: f64,
 }
 
-/// Packets since the start.
+/// The numbers of packets since the start.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EdgepuckLiveCounts {
     /// Packets that were decoded.
     pub packets: u64,
-    /// Packets that are missing by the time stamps of those that came.
+    /// Packets that are missing according to the time stamps of the others.
     pub lost: u64,
     /// Packets that came late or twice.
     pub late: u64,
     /// Packets that are not the sensor's data.
     pub foreign: u64,
-    /// How often the sensor or its clock began anew.
+    /// The number of restarts of the sensor or its clock.
     pub restarts: u64,
 }
 
@@ -115,17 +114,16 @@ impl From<LiveError> for Failure {
     }
 }
 
-/// Opens a pipeline whose clusters are classified by the model file at path, as
-/// options ask (null: the defaults) and by as many threads; those of fewer than
-/// min_points points are not classified. The sensor is a Velodyne VLP-16 or
-/// VLP-32C, or, if metadata is not null, the Ouster whose metadata file (JSON)
-/// that names. Writes the pipeline to out, or null when it fails. Pass it to
-/// edgepuck_live_close in the end.
+/// Opens a pipeline that classifies clusters with the model file at path and with options (null
+/// stands for the defaults), one cluster per thread; clusters of fewer than min_points points are
+/// not classified. The sensor is a Velodyne VLP-16 or VLP-32C, or an Ouster if metadata is the path
+/// of its metadata file (JSON) instead of null. Writes the pipeline to out, or null if it fails.
+/// Pass it to edgepuck_live_close in the end.
 ///
 /// # Safety
 ///
-/// path is null or a NUL-terminated string, as are metadata and every word of
-/// options; options is null or valid; out is null or may be written to.
+/// path is null or a NUL-terminated string, as are metadata and every word of options; options is
+/// null or valid; out is null or may be written to.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn edgepuck_live_open(
     path: *const c_char,
@@ -134,41 +132,31 @@ pub unsafe extern "C" fn edgepuck_live_open(
     min_points: usize,
     out: *mut *mut EdgepuckLive,
 ) -> EdgepuckStatus {
-    guard_status(|| {
-        pointers::check(out, "out")?;
-        // SAFETY: not null and aligned; the rest is this function's contract.
-        unsafe { out.write(null_mut()) };
-        // SAFETY: this function's contract.
-        let path = unsafe { pointers::path(path) }?;
-        let options = match options.is_null() {
-            true => Options::default(),
-            // SAFETY: this function's contract.
-            false => unsafe { pointers::shared(options, "options")?.read() }?,
-        };
+    let open = || {
+        // SAFETY: the pointers are as the `# Safety` section above requires.
+        let (path, options) = unsafe { (pointers::path(path)?, pointers::options(options)?) };
         let mut live = LiveOptions::default();
         live.min_points = min_points;
         if !metadata.is_null() {
-            // SAFETY: this function's contract.
-            let metadata = unsafe { pointers::path(metadata) }?;
-            let read = Metadata::read(&metadata);
+            // SAFETY: null or NUL-terminated, as required above.
+            let read = Metadata::read(&unsafe { pointers::path(metadata) }?);
             let read = read.map_err(|e| Failure::new(EdgepuckStatus::BadOption, e.to_string()))?;
             live.ouster = Some(read);
         }
-        let made = Box::new(EdgepuckLive::new(Classifier::load(&path, &options)?, &live)?);
-        // SAFETY: as above.
-        unsafe { out.write(Box::into_raw(made)) };
-        Ok(())
-    })
+        EdgepuckLive::new(Classifier::load(&path, &options)?, &live)
+    };
+    // SAFETY: null or writable, as required above.
+    unsafe { pointers::make(out, open) }
 }
 
-/// Takes what one UDP packet of the sensor carries, n_bytes at packet, which
-/// came at time_s of Unix time in seconds. Whatever it holds, it is decoded or
-/// counted: see edgepuck_live_counts. Then ask edgepuck_live_next.
+/// Processes the payload of one UDP packet of the sensor, n_bytes at packet, which arrived at the
+/// Unix time time_s in seconds. Any content is decoded or counted as foreign: see
+/// edgepuck_live_counts. Then call edgepuck_live_next.
 ///
 /// # Safety
 ///
-/// live is null or comes from edgepuck_live_open, is not closed, and no other
-/// thread uses it now; packet is null or n_bytes bytes can be read there.
+/// live is null or comes from edgepuck_live_open, is not closed, and no other thread uses it now;
+/// packet is null or n_bytes bytes can be read there.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn edgepuck_live_take(
     live: *mut EdgepuckLive,
@@ -177,27 +165,24 @@ pub unsafe extern "C" fn edgepuck_live_take(
     time_s: f64,
 ) -> EdgepuckStatus {
     guard_status(|| {
-        // SAFETY: this function's contract.
-        let live = unsafe { pointers::exclusive(live, "live") }?;
-        // SAFETY: this function's contract.
-        let packet = unsafe { pointers::bytes(packet, n_bytes) }?;
+        // SAFETY: the pointers are as the `# Safety` section above requires.
+        let (live, packet) =
+            unsafe { (pointers::exclusive(live, "live")?, pointers::bytes(packet, n_bytes)?) };
         live.pipeline.take(packet, Arrival { time_s, moment: None });
         live.answer();
         Ok(())
     })
 }
 
-/// Ends what is not complete, as at the end of a recording. Then ask
-/// edgepuck_live_next.
+/// Completes all clusters, for example at the end of a recording. Then call edgepuck_live_next.
 ///
 /// # Safety
 ///
-/// live is null or comes from edgepuck_live_open, is not closed, and no other
-/// thread uses it now.
+/// live is null or comes from edgepuck_live_open, is not closed, and no other thread uses it now.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn edgepuck_live_end(live: *mut EdgepuckLive) -> EdgepuckStatus {
     guard_status(|| {
-        // SAFETY: this function's contract.
+        // SAFETY: null or from edgepuck_live_open, and not closed, as required above.
         let live = unsafe { pointers::exclusive(live, "live") }?;
         live.pipeline.end();
         live.answer();
@@ -205,13 +190,13 @@ pub unsafe extern "C" fn edgepuck_live_end(live: *mut EdgepuckLive) -> EdgepuckS
     })
 }
 
-/// Writes the next object to out and is true; false if there is none until more
-/// packets are taken, or if a pointer is null.
+/// Writes the next object to out and returns true. Returns false if there is no object until the
+/// next packet, or if a pointer is null.
 ///
 /// # Safety
 ///
-/// live is null or comes from edgepuck_live_open, is not closed, and no other
-/// thread uses it now; out is null or may be written to.
+/// live is null or comes from edgepuck_live_open, is not closed, and no other thread uses it now;
+/// out is null or may be written to.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn edgepuck_live_next(
     live: *mut EdgepuckLive,
@@ -219,12 +204,10 @@ pub unsafe extern "C" fn edgepuck_live_next(
 ) -> bool {
     let mut is_there = false;
     guard_status(|| {
-        pointers::check(out, "out")?;
-        // SAFETY: this function's contract.
-        let live = unsafe { pointers::exclusive(live, "live") }?;
+        // SAFETY: the pointers are as the `# Safety` section above requires.
+        let (out, live) = unsafe { (pointers::out(out)?, pointers::exclusive(live, "live")?) };
         if let Some(object) = live.answered.pop_front() {
-            // SAFETY: not null and aligned; the rest is this function's contract.
-            unsafe { out.write(object) };
+            out.write(object);
             is_there = true;
         }
         Ok(())
@@ -232,50 +215,41 @@ pub unsafe extern "C" fn edgepuck_live_next(
     is_there
 }
 
-/// Writes what came and what did not to out.
+/// Writes the numbers of packets to out.
 ///
 /// # Safety
 ///
-/// live is null or comes from edgepuck_live_open, is not closed, and no other
-/// thread takes packets with it now; out is null or may be written to.
+/// live is null or comes from edgepuck_live_open, is not closed, and no other thread takes packets
+/// with it now; out is null or may be written to.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn edgepuck_live_counts(
     live: *const EdgepuckLive,
     out: *mut EdgepuckLiveCounts,
 ) -> EdgepuckStatus {
     guard_status(|| {
-        pointers::check(out, "out")?;
-        // SAFETY: this function's contract.
-        let counts = unsafe { pointers::shared(live, "live") }?.pipeline.counts();
-        let counts = EdgepuckLiveCounts {
+        // SAFETY: the pointers are as the `# Safety` section above requires.
+        let (out, live) = unsafe { (pointers::out(out)?, pointers::shared(live, "live")?) };
+        let counts = live.pipeline.counts();
+        out.write(EdgepuckLiveCounts {
             packets: counts.packets,
             lost: counts.lost,
             late: counts.late + counts.duplicated,
             foreign: counts.foreign,
             restarts: counts.restarts,
-        };
-        // SAFETY: not null and aligned; the rest is this function's contract.
-        unsafe { out.write(counts) };
+        });
         Ok(())
     })
 }
 
-/// Closes a pipeline; null is none.
+/// Closes a pipeline; null has no effect.
 ///
 /// # Safety
 ///
-/// live is null or comes from edgepuck_live_open; nobody uses it, or a name
-/// that it gave, now or later.
+/// live is null or comes from edgepuck_live_open; no thread uses it or its class names now or
+/// later.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn edgepuck_live_close(live: *mut EdgepuckLive) {
-    if live.is_null() {
-        return;
-    }
-    // SAFETY: edgepuck_live_open made it by Box::into_raw; the caller gives it up.
-    let live = unsafe { Box::from_raw(live) };
-    // There is no status to answer by; a panic has left its message.
-    let _ = guard_status(|| {
-        drop(live);
-        Ok(())
-    });
+    // SAFETY: null or from edgepuck_live_open, which calls `make`, and not used later, as required
+    // above.
+    unsafe { pointers::free(live) }
 }

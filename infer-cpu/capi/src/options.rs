@@ -1,4 +1,4 @@
-//! How a classifier computes, in C's types.
+//! The options of a classifier for C.
 
 use std::ffi::{CStr, c_char};
 use std::fmt::Display;
@@ -11,61 +11,58 @@ use infer_cpu::{Options, UpAxis};
 use crate::failure::Failure;
 use crate::status::EdgepuckStatus;
 
-/// How a classifier computes. Begin with edgepuck_options_default, then change
-/// what you like. Choices are words, the same as on infer-cpu's command line;
-/// a word that names nothing gives an error that lists those that do.
+/// The options of a classifier. Begin with edgepuck_options_default, then change fields. Choices
+/// are words, as on infer-cpu's command line; an unknown word gives an error that lists the valid
+/// ones.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct EdgepuckOptions {
-    /// What to compute in: "f32", "f32-fc16" (fp32 arithmetic, the weights of
-    /// vector layers stored in fp16), "f16" or "i8". Null: "f32".
+    /// The precision: "f32", "f32-fc16" (fp32 arithmetic, with weights of vector layers stored in
+    /// fp16), "f16" or "i8". Null: "f32".
     pub precision: *const c_char,
-    /// The kernels to use, such as "scalar" or "neon". Null: the fastest that
-    /// this machine runs.
+    /// The kernels, such as "scalar" or "neon". Null: the fastest ones of this machine.
     pub kernel: *const c_char,
-    /// Threads, the caller's among them; 0 counts as 1.
+    /// The number of threads, including the caller's; 0 counts as 1.
     pub threads: usize,
-    /// Which T-Nets are run: "both", "input", "feature" or "none"; one that is
-    /// left out counts as the identity. Null: all that the model has.
+    /// The T-Nets that are run: "both", "input", "feature" or "none"; an omitted one counts as the
+    /// identity. Null: all T-Nets of the model.
     pub t_nets: *const c_char,
-    /// Which points the network sees: "all", "first", "random", "fps", "voxel"
-    /// or "cpl". Null: as in training; the next seven fields are then left at
-    /// their defaults.
+    /// The sampler that chooses points for the network: "all", "first", "random", "fps", "voxel" or
+    /// "cpl". Null: as in training; the next seven fields must then have their defaults.
     pub sampler: *const c_char,
-    /// How many points the sampler keeps. 0: 1024.
+    /// The number of points that the sampler keeps. 0: 1024.
     pub points: usize,
-    /// What random draws depend on.
+    /// The seed of random draws.
     pub seed: u64,
-    /// Where "fps" begins: "farthest" (from the centroid) or "first". Null:
-    /// "farthest".
+    /// The first point of "fps": "farthest" (from the centroid) or "first". Null: "farthest".
     pub fps_start: *const c_char,
-    /// Edge of a voxel for "voxel", in the units of a normalised cloud. 0: as
-    /// fine as points allows.
+    /// The edge of a voxel for "voxel", in the units of a normalised cloud. 0: as fine as points
+    /// allows.
     pub voxel_size: f64,
-    /// How "cpl" comes to its number of points: "truncate", "cyclic", "nearest"
-    /// or "weighted". Null: "cyclic".
+    /// How "cpl" resizes its points to the requested number: "truncate", "cyclic", "nearest" or
+    /// "weighted". Null: "cyclic".
     pub resize: *const c_char,
-    /// How often "cpl" may pool again while it has fewer points than asked for.
+    /// How often "cpl" may pool again while it has fewer points than requested.
     pub passes: usize,
-    /// What "cpl" pools: "auto", "own", "stn" or "trunk". Null: "auto".
+    /// The layers whose features "cpl" pools: "auto", "own", "stn" or "trunk". Null: "auto".
     pub front: *const c_char,
-    /// How clouds are normalised: "unit-sphere" or "none". Null: as in
+    /// The normalisation of clouds: "unit-sphere", "metric", "metric-sight" or "none". Null: as in
     /// training.
     pub normalization: *const c_char,
-    /// Drop points that are not finite instead of refusing the cloud.
+    /// Whether points that are not finite are dropped; otherwise they are an error.
     pub drop_invalid: bool,
-    /// Draws of a random subset whose log-probabilities are averaged; more than
-    /// 1 needs the sampler "random", or vote_rotations.
+    /// The number of classifications whose log-probabilities are averaged; more than 1 requires the
+    /// sampler "random" or vote_rotations.
     pub votes: u32,
-    /// Turn the cloud about its up axis between votes, evenly spread.
+    /// Whether the cloud is rotated about its up axis between votes, in equal steps.
     pub vote_rotations: bool,
     /// The axis that points up: 0 for x, 1 for y, 2 for z.
     pub up: usize,
-    /// Points to make room for at once; larger clouds allocate when they come.
+    /// The number of points for which memory is allocated at loading; larger clouds allocate later.
     pub capacity: usize,
 }
 
-/// The options of a classifier that is loaded without any.
+/// The default options.
 #[unsafe(no_mangle)]
 pub extern "C" fn edgepuck_options_default() -> EdgepuckOptions {
     let options = Options::default();
@@ -92,18 +89,14 @@ pub extern "C" fn edgepuck_options_default() -> EdgepuckOptions {
 }
 
 impl EdgepuckOptions {
-    /// The same for the Rust library.
+    /// The options for the Rust library.
     ///
     /// # Safety
     /// Every word is null or a NUL-terminated string.
     pub(crate) unsafe fn read(&self) -> Result<Options, Failure> {
-        let up = match self.up {
-            0 => UpAxis::X,
-            1 => UpAxis::Y,
-            2 => UpAxis::Z,
-            other => return Err(bad("up", format!("expected 0, 1 or 2, found {other}"))),
-        };
-        // SAFETY: words are this function's contract.
+        let up = UpAxis::ALL.get(self.up).copied();
+        let up = up.ok_or_else(|| bad("up", format!("expected 0, 1 or 2, found {}", self.up)))?;
+        // SAFETY: every word is null or NUL-terminated, as required above.
         unsafe {
             Ok(Options {
                 precision: word("precision", self.precision)?.unwrap_or_default(),
@@ -127,7 +120,7 @@ impl EdgepuckOptions {
     /// As [`Self::read`].
     unsafe fn sampler(&self) -> Result<Option<SamplerSpec>, Failure> {
         let default = SamplerSpec::default();
-        // SAFETY: words are this function's contract.
+        // SAFETY: every word is null or NUL-terminated, as required above.
         let (kind, spec) = unsafe {
             let spec = SamplerSpec {
                 kind: default.kind,
@@ -152,10 +145,10 @@ impl EdgepuckOptions {
     }
 }
 
-/// What the word in field `option` names, if there is one.
+/// Parses the word in field `option`, if it is not null.
 ///
 /// # Safety
-/// It is null or a NUL-terminated string.
+/// `pointer` is null or a NUL-terminated string.
 unsafe fn word<T: FromStr<Err: Display>>(
     option: &'static str,
     pointer: *const c_char,
@@ -163,7 +156,7 @@ unsafe fn word<T: FromStr<Err: Display>>(
     if pointer.is_null() {
         return Ok(None);
     }
-    // SAFETY: not null; the rest is this function's contract.
+    // SAFETY: not null, and NUL-terminated, as required above.
     let word = unsafe { CStr::from_ptr(pointer) }.to_string_lossy();
     word.parse().map(Some).map_err(|cause: T::Err| bad(option, cause.to_string()))
 }

@@ -1,33 +1,33 @@
-//! What a network says about a cloud, in C's types.
+//! The result of a classification for C.
 
 use infer_cpu::{Precision, Prediction};
 
-/// The class of a cloud, and how it was found.
+/// The class of a cloud, and how it was computed.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EdgepuckPrediction {
-    /// The class: see edgepuck_class_name. Of equal logits the first wins.
+    /// The class: see edgepuck_class_name. If logits are equal, the first wins.
     pub class_index: usize,
-    /// Its probability by the network's softmax, 0 to 1.
+    /// Its probability by the softmax of the network, 0 to 1.
     pub confidence: f64,
-    /// Points of the cloud, without those that were dropped.
+    /// The number of points of the cloud that are finite.
     pub n_points: usize,
-    /// Points that were dropped because a coordinate was not finite.
+    /// The number of points that were dropped because a coordinate was not finite.
     pub n_dropped: usize,
-    /// Points that the network saw: those that the sampler kept, each once.
+    /// The number of points that the network processed: those that the sampler kept, each once.
     pub n_used: usize,
-    /// Activations that the calibrated ranges of "i8" clipped.
+    /// The number of activations that were clipped to the calibrated ranges of "i8".
     pub n_clipped: u64,
-    /// Whether the precision asked for overflowed on this cloud, so that it was
-    /// classified in "f32".
+    /// Whether the requested precision overflowed on this cloud, which was then classified in
+    /// "f32".
     pub fell_back: bool,
-    /// Whether the answer is "unknown", because the model is not meant to
-    /// recognise such an object; class_index then states what it resembles most.
+    /// Whether the object belongs to no known class; class_index is then the class that it
+    /// resembles most.
     pub is_unknown: bool,
 }
 
 impl EdgepuckPrediction {
-    /// `found` by a classifier that was to compute in `precision`.
+    /// Converts a prediction of a classifier with the requested `precision`.
     pub(crate) fn new(found: &Prediction, precision: Precision) -> Self {
         Self {
             class_index: found.class,

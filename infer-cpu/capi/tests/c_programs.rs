@@ -1,6 +1,6 @@
-//! The library from C: the example gives the class that the Rust library
-//! gives, and `tests/c/contract.c` finds what the header promises. Skipped with
-//! a message where there is no C compiler.
+//! Tests the library from C: the examples print the results of the Rust library, and
+//! `tests/c/contract.c` checks the statements of the header. Skipped with a message if there is no
+//! C compiler.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -17,7 +17,7 @@ use infer_cpu::{Classifier, Options};
 use support::Compiler;
 use test_support::need;
 
-/// Long in y, and no longer anywhere without its last line.
+/// A cloud whose longest axis is y; the last line has the largest x.
 const CLOUD: &str = "0 0 0\n0.5 0.25 0.125\n0.1 0.75 0.2\n\n  1e-1\t0.9 .3\n";
 
 fn run(program: &Path, arguments: &[&Path]) -> Output {
@@ -87,7 +87,7 @@ fn the_example_of_packets_gives_what_the_rust_library_gives() {
     pipeline.end();
     pipeline.answer(&mut write);
     let output = run(&example, &[&model, &capture]);
-    assert_eq!(text(&output.stderr), "754 packets, 0 lost, 0 of something else\n");
+    assert_eq!(text(&output.stderr), "754 packets, 0 lost, 0 foreign\n");
     assert_eq!(text(&output.stdout), expected);
     assert!(expected.lines().count() > 20);
 

@@ -1,11 +1,11 @@
-//! The definitions of messages, from the packages common_interfaces, geometry2, rcl_interfaces
-//! and vision_msgs (4.x) of ROS 2, without comments.
+//! The definitions of messages, from the packages common_interfaces, geometry2, rcl_interfaces and
+//! vision_msgs (4.x) of ROS 2, without comments.
 
-/// What stands between definitions: 80 times `=`.
+/// The separator of definitions: 80 times `=`.
 const SEPARATOR: &str =
     "================================================================================";
 
-/// The name of each and its text.
+/// The name and the text of each definition.
 const DEFINITIONS: [(&str, &str); 24] = [
     ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n"),
     ("builtin_interfaces/Duration", "int32 sec\nuint32 nanosec\n"),
@@ -75,7 +75,7 @@ fn find(name: &str) -> Option<&'static str> {
     DEFINITIONS.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
 }
 
-/// The definition of `name`, then those of what it contains, each once.
+/// The definition of `name`, then those of the types that it contains, each once.
 pub fn with_contents(name: &str) -> String {
     let mut text = find(name).expect("invariant: each message has a definition").to_owned();
     let (mut known, mut next) = (vec![name], 0);

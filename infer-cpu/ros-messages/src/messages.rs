@@ -1,11 +1,11 @@
-//! The messages, field by field as their definitions list them. Units are those of ROS
-//! (REP 103): metres, radians and seconds.
+//! The messages, field by field as their definitions list them. Units are those of ROS (REP 103):
+//! metres, radians and seconds.
 
 use serde::{Serialize, Serializer};
 
 use crate::Message;
 
-/// Declares messages: all fields are public, and their order is that of the bytes.
+/// Declares messages: all fields are public, and are serialized in their order.
 macro_rules! messages {
     ($($(#[$about:meta])* $name:ident { $($(#[$meta:meta])* $field:ident: $kind:ty,)* })*) => {$(
         $(#[$about])*
@@ -44,9 +44,9 @@ messages! {
     Transform { translation: Vector3, rotation: Quaternion, }
     /// `geometry_msgs/TransformStamped`.
     TransformStamped { header: Header, child_frame_id: String, transform: Transform, }
-    /// `tf2_msgs/TFMessage`: where frames are in others.
+    /// `tf2_msgs/TFMessage`: transforms between frames.
     TFMessage { transforms: Vec<TransformStamped>, }
-    /// `sensor_msgs/PointField`: a number that each point has.
+    /// `sensor_msgs/PointField`: the layout of one field of a point.
     PointField { name: String, offset: u32, datatype: u8, count: u32, }
     /// `sensor_msgs/PointCloud2`.
     PointCloud2 {
@@ -150,8 +150,7 @@ impl Marker {
 }
 
 impl Time {
-    /// From seconds of Unix time, to the nanosecond; before 1970 it is 0 and after 2038 the last
-    /// that ROS has.
+    /// Converts Unix time in seconds, to the nanosecond, clamped to the range of ROS: 1970 to 2038.
     #[must_use]
     pub fn from_s(time_s: f64) -> Self {
         let sec = time_s.floor().clamp(0.0, f64::from(i32::MAX));
@@ -159,7 +158,7 @@ impl Time {
         Self { sec: sec as i32, nanosec: nanosec as u32 }
     }
 
-    /// Nanoseconds of Unix time.
+    /// The Unix time in nanoseconds.
     #[must_use]
     pub fn as_ns(&self) -> u64 {
         u64::from(self.sec.unsigned_abs()) * 1_000_000_000 + u64::from(self.nanosec)
@@ -178,7 +177,7 @@ impl Quaternion {
     }
 }
 
-/// The bytes of `uint8[]` at once: one by one, those of a turn take milliseconds.
+/// Serializes `uint8[]` at once: byte by byte, the points of a turn would take milliseconds.
 #[expect(clippy::ptr_arg, reason = "serde passes the field")]
 fn bytes<S: Serializer>(bytes: &Vec<u8>, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_bytes(bytes)

@@ -8,21 +8,20 @@ use crate::messages::{
     Vector3,
 };
 
-/// How long a marker is shown that no later one replaces, seconds: a turn and a half at 10 Hz.
+/// How long viewers show a marker that no later one replaces, seconds: 1.5 turns at 10 Hz.
 pub const MARKER_LIFETIME_S: f64 = 0.15;
 
 /// The height of letters, metres.
 const LETTER_M: f64 = 0.4;
 
-/// What messages need of an object as a line of `infer-cpu live` has it, version 1; keys that are
-/// not here are passed over.
+/// The keys of a line of `infer-cpu live` (version 1) that messages need; other keys are ignored.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 pub struct Object {
     /// The number of the turn, from 0.
     pub turn: u64,
     /// The number of its track, from 1.
     pub track: u64,
-    /// Its class, or `unknown`; `None` where it had too few points to be classified.
+    /// Its class, or `unknown`; `None` if it had too few points to be classified.
     pub class: Option<String>,
     /// The probability of its class by all clusters of the track.
     pub probability: Option<f64>,
@@ -74,7 +73,7 @@ impl Object {
         let cube = Marker {
             header: self.header(),
             ns: "boxes".to_owned(),
-            // ROS has half as many numbers as tracks could have in 2^31 turns.
+            // ROS ids are i32, so track numbers wrap around.
             id: (self.track % i32::MAX as u64) as i32,
             kind: Marker::CUBE,
             pose: self.pose(),
@@ -105,14 +104,14 @@ pub fn detections(objects: &[Object]) -> Detection3DArray {
     }
 }
 
-/// The objects of a turn for RViz and other viewers: a box and a text each, whose `id` is the
-/// track.
+/// The objects of a turn for RViz and other viewers: a box and a text for each, with the track as
+/// `id`.
 #[must_use]
 pub fn markers(objects: &[Object]) -> MarkerArray {
     MarkerArray { markers: objects.iter().flat_map(Object::markers).collect() }
 }
 
-/// A colour that a class has in every run: a hue by its name; grey where it has no class.
+/// The colour of a class: a hue that depends only on its name, or grey without a class.
 fn color(class: Option<&str>) -> ColorRGBA {
     let Some(class) = class.filter(|class| *class != "unknown") else {
         return ColorRGBA { r: 0.6, g: 0.6, b: 0.6, a: 0.5 };
@@ -170,8 +169,8 @@ mod tests {
         assert_eq!(nameless.color, color(Some("unknown")));
     }
 
-    /// By hand, from the definition and CDR's rule that a number of n bytes lies at a multiple of
-    /// n after the encapsulation.
+    /// The expected bytes follow from the definition and from CDR's alignment: a number of n bytes
+    /// begins at a multiple of n after the header.
     #[test]
     fn bytes_are_plain_cdr() {
         let bytes = detections(&[object()]).to_cdr();

@@ -1,4 +1,4 @@
-//! What comes on standard input: JSON lines or a recording.
+//! Reads standard input: JSON lines or a recording.
 
 use std::io::BufRead;
 
@@ -7,7 +7,7 @@ use edgepuck_ros_messages::{self as ros, Message};
 use mcap::io::MessageReader;
 use serde::Deserialize;
 
-/// The version of the lines that this program understands.
+/// The supported version of the lines.
 const VERSION: u32 = 1;
 
 /// A message to publish.
@@ -27,10 +27,10 @@ struct Line {
     object: ros::Object,
 }
 
-/// Gives each message of the input to `publish`, until the input ends.
+/// Passes each message of the input to `publish`, until the input ends.
 ///
 /// # Errors
-/// Input that is neither, or that breaks off; whatever `publish` reports.
+/// Input in another format, or truncated; errors of `publish`.
 pub fn read(
     mut input: impl BufRead,
     mut publish: impl FnMut(Encoded) -> anyhow::Result<()>,
@@ -104,7 +104,7 @@ mod tests {
         .replace('\n', " ")
     }
 
-    /// The topics and the lengths of what is published.
+    /// The topics and lengths of the published messages.
     fn published(input: &[u8]) -> anyhow::Result<Vec<(String, usize)>> {
         let mut all = Vec::new();
         read(input, |message| {

@@ -1,4 +1,4 @@
-//! Publishes what `infer-cpu live` answers or records, as a node of ROS 2, without ROS.
+//! Publishes the objects or the recording of `infer-cpu live` as a node of ROS 2, without ROS.
 
 mod input;
 mod publisher;

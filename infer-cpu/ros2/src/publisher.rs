@@ -1,4 +1,4 @@
-//! A node of ROS 2 that publishes messages which are encoded already.
+//! A node of ROS 2 that publishes encoded messages.
 
 use std::collections::BTreeMap;
 use std::thread;
@@ -14,26 +14,25 @@ use serde::ser::{Serialize, SerializeTuple, Serializer};
 
 use crate::input::Encoded;
 
-/// The bytes that CDR begins with: its version and options.
+/// The length of the CDR header, with version and options.
 const ENCAPSULATION: usize = 4;
-/// Messages that are kept for a subscriber that is slow, as ROS 2's own publishers keep them
-/// (`rmw_qos_profile_default`).
+/// The number of messages that are kept for a slow subscriber, as in `rmw_qos_profile_default`.
 const DEPTH: usize = 10;
-/// How long the last messages may be under way when the input ends.
+/// The time for the last messages to arrive after the input ends.
 const FAREWELL: Duration = Duration::from_millis(500);
 
-/// A node and its publishers, one a topic.
+/// A node and its publishers, one per topic.
 pub struct Publisher {
     node: Node,
     topics: BTreeMap<String, ros2_client::Publisher<Body>>,
-    /// Whether it was said that a subscriber is too slow.
+    /// Whether the warning about a slow subscriber was printed.
     is_told: bool,
 }
 
-/// A message that is encoded already, without the encapsulation.
+/// An encoded message, without its header.
 struct Body(Vec<u8>);
 
-/// As bytes without a length before them, which CDR puts nothing between.
+/// A tuple, because CDR serializes it without a length and without padding between bytes.
 impl Serialize for Body {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut tuple = serializer.serialize_tuple(self.0.len())?;
@@ -43,10 +42,10 @@ impl Serialize for Body {
 }
 
 impl Publisher {
-    /// A node of a name in a domain.
+    /// Creates a node with a name in a domain.
     ///
     /// # Errors
-    /// A name that no node can have; a network that cannot be used.
+    /// An invalid name; a network that cannot be used.
     pub fn new(domain: u16, node: &str) -> anyhow::Result<Self> {
         let name = NodeName::new("/", node).map_err(|_| {
             Usage(format!("--node: expected letters, digits and _, found {node:?}"))
@@ -59,11 +58,11 @@ impl Publisher {
         Ok(Self { node, topics: BTreeMap::new(), is_told: false })
     }
 
-    /// Publishes a message on its topic, which is there from the first message on. A subscriber
-    /// that is too slow misses messages.
+    /// Publishes a message on its topic, which the first message creates. A subscriber that is too
+    /// slow misses messages.
     ///
     /// # Errors
-    /// A topic or a type that no message can have; an encoding other than plain CDR.
+    /// An invalid topic or type; an encoding other than plain CDR.
     pub fn publish(&mut self, message: Encoded) -> anyhow::Result<()> {
         let Encoded { topic, kind, mut cdr } = message;
         if !cdr.starts_with(&[0, 1, 0, 0]) {
@@ -92,7 +91,7 @@ impl Publisher {
         let (package, kind) = kind
             .split_once("/msg/")
             .with_context(|| format!("{topic}: expected a type such as a/msg/B, found {kind:?}"))?;
-        // Frames that never move are told to whoever asks later, too (REP 105's /tf_static).
+        // Late subscribers need static frames, too (REP 105's /tf_static).
         let durability = match topic {
             "/tf_static" => Durability::TransientLocal,
             _ => Durability::Volatile,
@@ -108,7 +107,7 @@ impl Publisher {
         publisher.map_err(|cause| anyhow!("topic {topic}: {cause}"))
     }
 
-    /// Leaves, when the last messages have had the time to arrive.
+    /// Waits until the last messages have had time to arrive.
     pub fn finish(self) {
         if !self.topics.is_empty() {
             thread::sleep(FAREWELL);

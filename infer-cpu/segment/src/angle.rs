@@ -1,12 +1,11 @@
-//! Angles without a call of the mathematical library for each point.
+//! A fast arctangent, without a library call for each point.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
-/// The angle of `(x, y)` from the x axis, from -pi to pi, within 2e-5 radians; 0
-/// at the origin.
+/// The angle of `(x, y)` from the x axis, from -pi to pi, within 2e-5 radians; 0 at the origin.
 ///
-/// The polynomial is 4.4.47 of Abramowitz and Stegun, Handbook of Mathematical
-/// Functions; its own error is at most 1e-5. A column of 0.2 degrees has 3.5e-3.
+/// The polynomial is 4.4.47 of Abramowitz and Stegun, Handbook of Mathematical Functions; its own
+/// error is at most 1e-5. A column of 0.2 degrees has 3.5e-3.
 pub fn atan2(y: f32, x: f32) -> f32 {
     let (ax, ay) = (x.abs(), y.abs());
     let (least, most) = (ax.min(ay), ax.max(ay));

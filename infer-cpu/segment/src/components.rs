@@ -1,14 +1,13 @@
-//! Connected components: points in one component are linked by steps of at most a
-//! radius.
+//! Connected components: points in one component are linked by steps of at most a radius.
 
 use std::cmp::Ordering;
 use std::ops::Range;
 
+use crate::label::Label;
 use crate::link::Links;
-use crate::segmentation::Label;
 use crate::sets::Sets;
 
-/// Cells of a cube grid, and its scratch memory.
+/// The cells of a cubic grid, and scratch memory.
 #[derive(Default)]
 pub struct Components {
     points: Vec<Placed>,
@@ -28,15 +27,15 @@ struct Cell {
     points: Range<usize>,
 }
 
-/// A cell's edge as a share of the radius: its diagonal is just shorter than the
-/// radius, whatever is rounded, so that points of one cell are in one component.
+/// The edge of a cell as a share of the radius, just below 1/√3: even after rounding, the diagonal
+/// is shorter than the radius, so that all points of a cell belong to one component.
 const EDGE: f64 = 0.577_35;
 /// Points within the radius lie at most this many cells apart along each axis.
 const FARTHEST: f64 = 2.0;
 
 impl Components {
-    /// Joins the sets of all points that are at most `radius_m` apart; those with a
-    /// coordinate that is not finite are [`Label::Invalid`].
+    /// Joins the sets of all points that are at most `radius_m` apart; points with a coordinate
+    /// that is not finite become [`Label::Invalid`].
     pub fn join(
         &mut self,
         points: &[[f32; 3]],
@@ -49,7 +48,7 @@ impl Components {
             let members = &self.points[cell.points.clone()];
             members.windows(2).for_each(|pair| sets.join(pair[0].point, pair[1].point));
         }
-        // Half of the surroundings: the other half has this cell in its own.
+        // Half of the neighbourhood suffices: the cells of the other half visit this one.
         for dy in [0.0, 1.0, 2.0] {
             self.join_columns(points, radius_m, [0.0, dy], sets);
         }
@@ -81,8 +80,8 @@ impl Components {
         }
     }
 
-    /// Joins each cell with those `[dx, dy]` beside it, up to two cells higher or
-    /// lower. Both are sorted, so that one walk through the cells finds them all.
+    /// Joins each cell with those `[dx, dy]` beside it, up to two cells higher or lower. The cells
+    /// are sorted, so that one pass finds all pairs.
     fn join_columns(
         &self,
         points: &[[f32; 3]],

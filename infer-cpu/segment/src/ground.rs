@@ -5,18 +5,18 @@ use crate::image::{Columns, Return};
 use crate::plane::{Plane, STEEPEST};
 use crate::settings::Settings;
 
-/// What noise and a kerb may add to a slope.
+/// The rise that range noise and a kerb may add to a slope.
 const STEP_M: f32 = 0.12;
-/// Over shorter ways, noise makes slopes.
+/// The shortest run over which a slope is measured: below it, range noise dominates.
 const SHORTEST_RUN_M: f32 = 0.3;
-/// Over longer ways, such as the shadow of a car, what climbs is rather the roof of
-/// the next one than a street.
+/// The longest run over which the ground may climb: beyond it, as in the shadow of a car, a higher
+/// return is more likely the roof of the next car than a street.
 const LONGEST_RUN_M: f32 = 4.0;
-/// A rise over run that no ground has: half of what stands upright.
+/// A rise over run that is steeper than any ground, 27 degrees.
 const STEEP: f32 = 0.5;
-/// How far the lowest returns may be whose median is the height of the ground.
+/// The farthest of the lowest returns whose median gives the height of the ground.
 const NEAR_M: f32 = 20.0;
-/// How far the plane around the sensor reaches: farther streets may climb.
+/// The range within which the plane is fitted: farther streets may climb.
 const PLANE_M: f32 = 20.0;
 
 /// Scratch memory.
@@ -26,8 +26,8 @@ pub struct GroundFinder {
     is_seed: Vec<bool>,
 }
 
-/// A place on the ground: horizontal distance, height above the plane around the
-/// sensor, and its place in the column (the first one for the sensor's own place).
+/// A ground return: its horizontal distance, its height above the plane, and its index in the
+/// column. The default is the point below the sensor.
 #[derive(Clone, Copy, Default)]
 struct Anchor {
     range_m: f32,
@@ -39,8 +39,8 @@ impl GroundFinder {
     /// Fills `grid` with the ground of `image`.
     pub fn find(&mut self, image: &impl Columns, settings: &Settings, grid: &mut HeightGrid) {
         let slope = f64::from(settings.max_ground_slope_deg).to_radians().tan() as f32;
-        // To find the ground takes the plane that it lies near, and the other way round;
-        // a quarter of the sectors tells the plane.
+        // The plane helps to find the ground, and the ground determines the plane: a quarter of the
+        // sectors gives a first estimate of the plane.
         let level = self.level_under_sensor(image);
         self.follow_all(image, level, slope.max(STEEPEST), grid, |sector| sector % 4 == 0);
         let plane = Plane::fit(level, || grid.means(PLANE_M));
@@ -48,8 +48,7 @@ impl GroundFinder {
         grid.finish(plane, slope);
     }
 
-    /// Adds to `grid` what is probably ground in those sectors of which `is_wanted` is
-    /// true.
+    /// Adds the probable ground returns of the sectors that `is_wanted` accepts to `grid`.
     fn follow_all(
         &mut self,
         image: &impl Columns,
@@ -71,7 +70,7 @@ impl GroundFinder {
         }
     }
 
-    /// The median height of the lowest returns of the columns, the near ones if
+    /// A level plane at the median height of the columns' lowest returns: of the near ones, if
     /// there are any.
     fn level_under_sensor(&mut self, image: &impl Columns) -> Plane {
         for farthest_m in [NEAR_M, f32::INFINITY] {
@@ -87,8 +86,8 @@ impl GroundFinder {
         Plane::default()
     }
 
-    /// Marks what is probably ground in a column: what rises from the ground before
-    /// it by no more than `slope`, and has nothing steep above it.
+    /// Marks the probable ground returns of a column: those that rise from the ground return before
+    /// them by at most `slope`, with no steep surface above them.
     fn follow(&mut self, returns: &[Return], plane: Plane, slope: f32) {
         self.is_seed.clear();
         self.is_seed.resize(returns.len(), false);
@@ -103,7 +102,7 @@ impl GroundFinder {
                     last = Anchor { range_m, height_m, at };
                 }
             } else if rise > STEEP * run.abs() && self.is_seed[last.at] {
-                // What something steep stands on may be its foot, such as a bumper.
+                // The returns just below a steep surface may be its foot, such as a bumper.
                 self.is_seed[last.at..at].fill(false);
             }
         }

@@ -5,24 +5,24 @@ use std::f32::consts::{PI, TAU};
 use crate::angle::atan2;
 use crate::plane::Plane;
 
-/// Sectors all around, of two degrees: at 0.2 degrees, ten columns each.
+/// The number of sectors, of two degrees each: ten columns of 0.2 degrees.
 pub const SECTORS: usize = 180;
-/// Bins from 1 m, eight in each doubling of the range: as a sensor's rings on flat
-/// ground, they widen with the range.
+/// The number of range bins, from 1 m on, eight in each doubling of the range: like a sensor's
+/// rings on flat ground, they widen with the range.
 const BINS: usize = 64;
-/// The bits of an f32 that number its eighths of octaves.
+/// Shifts the bits of an f32 so that they count eighths of octaves.
 const SHIFT: u32 = 20;
 const FIRST: u32 = 1.0f32.to_bits() >> SHIFT;
 
-/// The fewest ground points that make a height: one may be anything.
+/// The fewest ground points that give a height: a single one may be an outlier.
 const FEWEST_POINTS: f32 = 2.0;
-/// How far a mean may lie above the slopes of its surroundings: a kerb.
+/// How far a mean may lie above the lower envelope: a kerb.
 const STEP_M: f32 = 0.15;
 /// The widest gap between heights that is filled.
 const WIDEST_GAP_M: f32 = 15.0;
 
-/// A sector's ground within one bin: a mean of ground points, or filled in.
-/// `height_m` is NaN where it is unknown.
+/// The ground in one bin of a sector: a mean of ground points, or interpolated. `height_m` is NaN
+/// where it is unknown.
 #[derive(Clone, Copy)]
 struct Cell {
     range_m: f32,
@@ -59,7 +59,7 @@ impl HeightGrid {
         self.sums.resize(SECTORS * BINS, Sum::default());
     }
 
-    /// Takes in a point of the ground.
+    /// Adds a ground point.
     pub fn add(&mut self, sector: usize, range_m: f32, position: [f32; 3]) {
         let sum = &mut self.sums[sector * BINS + bin(range_m)];
         (0..3).for_each(|axis| sum.position[axis] += position[axis]);
@@ -73,8 +73,8 @@ impl HeightGrid {
         near.filter_map(|sum| sum.mean())
     }
 
-    /// Makes heights above `plane` of the points, no steeper than `slope`, and fills
-    /// gaps.
+    /// Computes heights above `plane` from the points, drops those that are steeper than `slope`,
+    /// and fills gaps.
     pub fn finish(&mut self, plane: Plane, slope: f32) {
         self.plane = plane;
         let cells = self.sums.iter().enumerate().map(|(at, sum)| match sum.mean() {
@@ -106,8 +106,8 @@ impl HeightGrid {
         self.extend();
     }
 
-    /// The height at which no way from any cell, climbing at most by `slope`, arrives
-    /// lower.
+    /// Computes the lower envelope: at each cell, the least of all cells' heights plus `slope`
+    /// times their distance.
     fn lower_envelope(&mut self, slope: f32) {
         self.envelope.clear();
         let known =
@@ -135,8 +135,8 @@ impl HeightGrid {
         }
     }
 
-    /// Interpolates between known heights along a line of `n` cells, given the place of
-    /// each in the grid and how far along the line it lies.
+    /// Interpolates between known heights along a line of `n` cells, given the index of each in the
+    /// grid and its position along the line.
     fn fill(
         &mut self,
         n: usize,
@@ -164,8 +164,7 @@ impl HeightGrid {
         }
     }
 
-    /// Holds each sector's first height towards the sensor, and its last one for
-    /// two more bins.
+    /// Extends each sector's first height to the sensor, and its last one by two bins.
     fn extend(&mut self) {
         for cells in self.cells.chunks_exact_mut(BINS) {
             let is_known = |cell: &Cell| !cell.height_m.is_nan();
@@ -195,8 +194,8 @@ impl HeightGrid {
         }
     }
 
-    /// How high a point, in `sector` and at `range_m`, is above the ground; NaN where the
-    /// ground is unknown.
+    /// The height above the ground of a point in `sector` at `range_m`; NaN where the ground is
+    /// unknown.
     pub fn above_ground_m(&self, sector: usize, range_m: f32, position: [f32; 3]) -> f32 {
         self.plane.height_m(position) - self.height(sector, range_m)
     }
@@ -213,7 +212,7 @@ impl HeightGrid {
     }
 }
 
-/// The bin of a range: between powers of two, eight of one width each.
+/// The bin of a range: eight bins of equal width between powers of two.
 fn bin(range_m: f32) -> usize {
     let eighths = range_m.max(1.0).to_bits() >> SHIFT;
     ((eighths - FIRST) as usize).min(BINS - 1)
@@ -245,7 +244,7 @@ mod tests {
         assert_eq!([edge_m(0), edge_m(8), edge_m(9)], [1.0, 2.0, 2.25]);
     }
 
-    /// A grid of the ground at these sectors, ranges and heights above a plane.
+    /// A grid with ground points at these sectors, ranges and heights.
     fn grid(seen: &[(usize, f32, f32)]) -> HeightGrid {
         let mut grid = HeightGrid::default();
         grid.reset();

@@ -3,14 +3,11 @@
 use std::f32::consts::{FRAC_PI_2, PI};
 
 use crate::angle::atan2;
-use crate::segmentation::Label;
-use crate::segmenter::{SegmentError, Sweep};
-use crate::settings::Settings;
+use crate::label::Label;
+use crate::settings::{MOST_ROWS, Settings};
+use crate::sweep::{SegmentError, Sweep};
 
-/// The most rings: at 2,000 columns, the image's cells then take 16 MB.
-pub const MOST_ROWS: usize = 2048;
-
-/// A point in its place.
+/// A point, with its position relative to the sensor and to the ground.
 #[derive(Clone, Copy, Default)]
 pub struct Return {
     pub position: [f32; 3],
@@ -18,7 +15,7 @@ pub struct Return {
     pub range_m: f32,
     /// Height above the ground in metres, NaN while it is unknown.
     pub height_m: f32,
-    /// The point's place in the sweep.
+    /// The point's index in the sweep.
     pub point: u32,
 }
 
@@ -40,18 +37,18 @@ pub trait Cells {
     fn cell(&self, column: usize, row: usize) -> &[Return];
 }
 
-/// The returns of a sweep, sorted by column and then by row. A cell holds any
-/// number of them: rings of two sensors or beams between two columns share cells.
+/// The returns of a sweep, sorted by column and then by row. A cell holds any number of them: rings
+/// of two sensors or beams between two columns share cells.
 #[derive(Default)]
 pub struct RangeImage {
     n_columns: usize,
     /// The elevation of each row in radians, ascending.
     elevations: Vec<f32>,
-    /// Where each cell's returns begin, and behind them the end of the last.
+    /// The start of each cell's returns, then the end of the last cell's.
     starts: Vec<u32>,
     returns: Vec<Return>,
     spots: Vec<Spot>,
-    rows: Vec<Row>,
+    rows: Vec<RingSums>,
     order: Vec<u32>,
 }
 
@@ -63,20 +60,20 @@ struct Spot {
     range_m: f32,
 }
 
-/// A spot's column for points that are in no cell.
+/// The column of points that are in no cell.
 const NOWHERE: u16 = u16::MAX;
 
 /// Sums over a ring's returns: their quotient is the tangent of its elevation.
 #[derive(Clone, Copy, Default)]
-struct Row {
+struct RingSums {
     range_m: f64,
     z_m: f64,
     number: u32,
 }
 
 impl RangeImage {
-    /// Sorts `sweep` into the image. `labels` of the points that are in it become
-    /// [`Label::OBSTACLE`], of the others what they are.
+    /// Sorts `sweep` into the image. Points in the image get the label [`Label::OBSTACLE`], others
+    /// [`Label::Small`] or [`Label::Invalid`].
     pub fn fill(
         &mut self,
         sweep: &Sweep<'_>,
@@ -113,7 +110,7 @@ impl RangeImage {
                 None => ((atan2(z, spot.range_m) + FRAC_PI_2) * per_row) as u16,
             };
             if self.rows.len() <= usize::from(spot.ring) {
-                self.rows.resize(usize::from(spot.ring) + 1, Row::default());
+                self.rows.resize(usize::from(spot.ring) + 1, RingSums::default());
             }
             let row = &mut self.rows[usize::from(spot.ring)];
             row.range_m += f64::from(spot.range_m);
@@ -122,10 +119,10 @@ impl RangeImage {
         }
     }
 
-    /// Numbers the rings by their elevation, whatever the sensor's own order of its lasers:
-    /// those of `elevations_deg`, or else those that have returns.
+    /// Numbers the rings by elevation, which need not be the order of the sensor's lasers. The
+    /// rings are those of `elevations_deg`, or else those that have returns.
     fn number_rows(&mut self, elevations_deg: Option<&[f32]>) -> Result<(), SegmentError> {
-        let is_used = |row: &Row| row.range_m != 0.0 || row.z_m != 0.0;
+        let is_used = |row: &RingSums| row.range_m != 0.0 || row.z_m != 0.0;
         self.order.clear();
         match elevations_deg {
             Some(known) if known.len() < self.rows.len() => {
@@ -133,7 +130,7 @@ impl RangeImage {
                 return Err(SegmentError::UnknownRing { expected, found });
             }
             Some(known) => {
-                self.rows.resize(known.len(), Row::default());
+                self.rows.resize(known.len(), RingSums::default());
                 self.order.extend(0..known.len() as u32);
             }
             None => {
@@ -144,22 +141,21 @@ impl RangeImage {
         if self.order.len() > MOST_ROWS {
             return Err(SegmentError::TooManyRings { most: MOST_ROWS, found: self.order.len() });
         }
-        let mean = |row: &Row| atan2(row.z_m as f32, row.range_m as f32);
-        let of_ring = |ring: u32| match elevations_deg {
+        let mean = |row: &RingSums| atan2(row.z_m as f32, row.range_m as f32);
+        let elevation = |ring: u32| match elevations_deg {
             Some(known) => known[ring as usize].to_radians(),
             None => mean(&self.rows[ring as usize]),
         };
-        self.order.sort_unstable_by(|&a, &b| of_ring(a).total_cmp(&of_ring(b)).then(a.cmp(&b)));
+        self.order.sort_unstable_by(|&a, &b| elevation(a).total_cmp(&elevation(b)).then(a.cmp(&b)));
         self.elevations.clear();
-        self.elevations.extend(self.order.iter().map(|&ring| of_ring(ring)));
+        self.elevations.extend(self.order.iter().map(|&ring| elevation(ring)));
         for (number, &ring) in self.order.iter().enumerate() {
             self.rows[ring as usize].number = number as u32;
         }
         Ok(())
     }
 
-    /// Sorts the points by counting how many each cell has; those of one cell keep
-    /// their order.
+    /// Sorts the points by cell with a counting sort; points of one cell keep their order.
     fn sort(&mut self, points: &[[f32; 3]]) {
         let Self { n_columns, elevations, starts, returns, spots, rows, .. } = self;
         let n_rows = elevations.len();
@@ -194,7 +190,7 @@ impl RangeImage {
         self.elevations.len()
     }
 
-    /// Takes all returns out of the image that `is_kept`, given their column, refuses.
+    /// Removes the returns that `is_kept`, given their column, rejects.
     pub fn retain(&mut self, mut is_kept: impl FnMut(usize, &mut Return) -> bool) {
         let (mut kept, mut from) = (0, 0);
         for column in 0..self.n_columns {
@@ -249,8 +245,8 @@ pub fn n_columns(settings: &Settings) -> usize {
     (360.0 / settings.column_width_deg).round() as usize
 }
 
-/// The column, of `n_columns`, in which a return at `(x, y)` lies: counterclockwise from
-/// behind the sensor.
+/// The column, of `n_columns`, in which a return at `(x, y)` lies: counterclockwise from behind the
+/// sensor.
 pub fn column(n_columns: usize, x: f32, y: f32) -> u16 {
     let column = (atan2(y, x) + PI) * (n_columns as f32 / (2.0 * PI));
     (column as u16).min(n_columns as u16 - 1)

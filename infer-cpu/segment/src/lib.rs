@@ -1,4 +1,4 @@
-//! Cuts a sweep of a LiDAR into ground and clusters, in milliseconds on one core.
+//! Segments a LiDAR sweep into ground and clusters, in milliseconds on one core.
 //!
 //! ```
 //! use edgepuck_segment::{Label, Segmenter, Settings, Sweep};
@@ -13,18 +13,19 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! The points are sorted into a range image by ring and azimuth. In each column, the
-//! ground is followed from the lowest ring up; what is found becomes a polar grid of
-//! heights, and whatever lies little above that grid is ground. The other points are
-//! linked to their neighbours in the image, and points that are linked are a cluster.
-//! A [`Segmenter`] does this for whole sweeps, a [`Stream`] for returns as they come.
-//! Clouds without the structure of a scan are cut into connected components instead.
+//! The points are sorted into a range image by ring and azimuth. In each column, the ground is
+//! followed from the lowest ring up. The ground returns give a polar grid of heights; every point
+//! just above that grid is ground. The other points are linked to their neighbours in the image,
+//! and linked points form a cluster. A [`Segmenter`] does this for whole sweeps, a [`Stream`] for
+//! returns as they arrive. Clouds without the structure of a scan are cut into connected components
+//! instead.
 
 mod angle;
 mod components;
 mod ground;
 mod height_grid;
 mod image;
+mod label;
 mod link;
 mod open_sets;
 mod oriented_box;
@@ -34,9 +35,12 @@ mod segmenter;
 mod sets;
 mod settings;
 mod stream;
+mod sweep;
 
+pub use label::Label;
 pub use oriented_box::OrientedBox;
-pub use segmentation::{Cluster, Label, Segmentation};
-pub use segmenter::{SegmentError, Segmenter, Sweep};
+pub use segmentation::{Cluster, Segmentation};
+pub use segmenter::Segmenter;
 pub use settings::{Settings, SettingsError};
 pub use stream::{Dropped, Stream, StreamCluster};
+pub use sweep::{SegmentError, Sweep};

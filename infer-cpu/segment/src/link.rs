@@ -5,34 +5,33 @@ use std::ops::RangeInclusive;
 use crate::image::{Cells, Return};
 use crate::settings::Settings;
 
-/// On a surface at 30 degrees to the beams, rings are twice as far apart as on one
-/// across them.
+/// On a surface at 30 degrees to the beams, rings are twice as far apart as on a perpendicular one.
 const SLANT: f32 = 2.0;
-/// The least elevation between two rings of one sensor that links: a third of a
-/// degree, a VLP-32C's finest. Rows of two stacked sensors lie closer together.
+/// The least angle between two rings, in radians: a third of a degree, the finest of a VLP-32C.
+/// Rows of two stacked sensors lie closer together and are treated as this far apart.
 const LEAST_PITCH: f32 = 0.0058;
-/// Rings farther apart than this, three quarters of a degree, such as a VLP-32C's
-/// lowest, may be linked over more height, but not over more ground: that would link
-/// what stands side by side.
+/// Rings farther apart than this (three quarters of a degree), such as a VLP-32C's lowest, are
+/// linked over more height but not over more horizontal distance, which would link objects side by
+/// side.
 const MOST_PITCH: f32 = 0.0131;
-/// Windows of cars begin at such heights above the ground; roofs are higher, so that
-/// the branches over them are not linked like the other side of a window.
+/// The heights above the ground at which car windows begin. Roofs are higher, so that branches
+/// above them are not linked as the far side of a window is.
 const BELT_M: RangeInclusive<f32> = 0.6..=1.3;
 /// The most columns that are searched for a neighbour: 8 degrees.
 pub const MOST_COLUMNS: usize = 40;
-/// The most returns of one cell that are compared. Two sensors with four rings in
-/// a row's height and two returns in a column's width have as many; it bounds the
-/// time for clouds with all points in one cell.
+/// The most returns of one cell that are compared. Two sensors with four rings in a row's height
+/// and two returns in a column's width have that many. The limit bounds the time for clouds with
+/// all points in one cell.
 pub const MOST_IN_CELL: usize = 16;
 
-/// Who is linked to whom.
+/// Links between points.
 pub trait Links {
-    /// Notes that two points belong together.
+    /// Joins two points, which then belong together.
     fn join(&mut self, a: u32, b: u32);
 }
 
-/// Joins all returns of `column` with those that belong to them: in the column itself, in the
-/// next one and in the one before, and, along a row, in columns of higher numbers.
+/// Joins all returns of `column` with their neighbours: in the column itself, in the next and the
+/// previous one, and, along a row, in columns of higher numbers.
 pub fn link_column(image: &impl Cells, column: usize, settings: &Settings, links: &mut impl Links) {
     let mut linker = Linker { image, links, limits: Limits::new(settings) };
     for row in 0..image.elevations().len() {
@@ -46,7 +45,7 @@ pub fn link_column(image: &impl Cells, column: usize, settings: &Settings, links
     }
 }
 
-/// Distances that link.
+/// The distances within which returns are linked.
 #[derive(Clone, Copy)]
 pub struct Limits {
     /// The width of a column, radians.
@@ -61,8 +60,8 @@ impl Limits {
         Self { column_width, reach_m: settings.reach_m, bridge_m: settings.bridge_m }
     }
 
-    /// How far apart, at a horizontal distance from the sensor, neighbours on a row may be, and
-    /// how many columns away.
+    /// The largest distance between neighbours on a row at a horizontal distance from the sensor,
+    /// and the number of columns that it spans.
     fn aside(&self, range_m: f32) -> (f32, usize) {
         let spacing_m = range_m * self.column_width;
         let limit_m = self.reach_m + spacing_m;
@@ -72,10 +71,9 @@ impl Limits {
     /// The most columns of lower numbers from which a return at this horizontal distance can be
     /// linked.
     ///
-    /// A return at the distance r' links over d(r') = reach + r' w, w being a column's width.
-    /// The two differ in distance by no more than that, so that r' >= (r - reach) / (1 + w); and
-    /// the nearer it is, the more columns it looks at. What rounding may add is far below
-    /// a thousandth.
+    /// A return at the distance r' links over d(r') = reach + r' w, w being the width of a column.
+    /// The two distances differ by at most d(r'), so r' >= (r - reach) / (1 + w). The nearer a
+    /// return is, the more columns it searches. The factor 0.999 covers rounding.
     pub fn most_columns(&self, range_m: f32) -> usize {
         let nearest_m = 0.999 * (range_m - self.reach_m) / (1.0 + self.column_width);
         if nearest_m > 0.0 { self.aside(nearest_m).1 } else { MOST_COLUMNS }
@@ -89,8 +87,8 @@ struct Linker<'a, I, L> {
 }
 
 impl<I: Cells, L: Links> Linker<'_, I, L> {
-    /// Links `this` to the next return on its row that is near, past missing ones
-    /// and past things in front or behind.
+    /// Links `this` to the next near return on its row, past columns that are empty or whose
+    /// returns lie in front or behind.
     fn look_aside(&mut self, this: &Return, column: usize, row: usize) {
         let (limit_m, most) = self.limits.aside(this.range_m);
         let n_columns = self.image.n_columns();
@@ -103,8 +101,8 @@ impl<I: Cells, L: Links> Linker<'_, I, L> {
         }
     }
 
-    /// Links `this` to the next return above it that is near, past rows without one.
-    /// Above a car's belt line, that is as far as a window is high.
+    /// Links `this` to the next near return above it, past rows without one. From a car's belt
+    /// line, the search spans the height of a window.
     fn look_up(&mut self, this: &Return, column: usize, row: usize) {
         let elevations = self.image.elevations();
         if row + 1 == elevations.len() {
@@ -136,9 +134,8 @@ impl<I: Cells, L: Links> Linker<'_, I, L> {
         }
     }
 
-    /// Links `this` to those of `others` of which `is_near` is true, given the
-    /// square of their horizontal distance and their difference in height, and says
-    /// whether there are any.
+    /// Links `this` to the `others` that `is_near` accepts, given the squared horizontal distance
+    /// and the difference in height. Returns whether there are any.
     fn join_near(
         &mut self,
         this: &Return,
@@ -157,7 +154,7 @@ impl<I: Cells, L: Links> Linker<'_, I, L> {
     }
 }
 
-/// Whether a distance is at most `limit_m`.
+/// A test whether a distance is at most `limit_m`.
 fn within(limit_m: f32) -> impl Fn(f32, f32) -> bool {
     move |flat, dz| flat + dz * dz <= limit_m * limit_m
 }

@@ -1,22 +1,23 @@
-//! Disjoint sets of points that come and go.
+//! Disjoint sets of points that are added and removed.
 
 use crate::link::Links;
 use crate::segmentation::Extent;
 
-/// No point.
+/// Stands for no point.
 pub const NONE: u32 = u32::MAX;
 
-/// A forest over the points at hand, in a fixed number of slots. Each set is also a ring of
-/// its points, so that it can be listed and two sets can be joined without a search.
+/// A disjoint-set forest over the current points, in a fixed number of slots. Each set is also a
+/// circular list of its points, so that it can be listed, and two sets can be joined, without a
+/// search.
 pub struct OpenSets<T> {
-    /// Those that have been used so far, with room for all.
+    /// The slots used so far, with room for all.
     slots: Vec<Slot<T>>,
-    /// What is known of each set, in the slot of its root.
+    /// The state of each set, at the index of its root.
     sets: Vec<Set>,
     capacity: u32,
-    /// The first free one of them; each names the next.
+    /// The first free slot; each free slot names the next one.
     free: u32,
-    /// Points that have come.
+    /// The number of points added so far.
     n_points: u64,
 }
 
@@ -32,13 +33,13 @@ pub struct Slot<T> {
     pub place: u64,
     /// [`NONE`] of a free slot.
     parent: u32,
-    /// The next of its set, or of the free slots.
+    /// The next point of its set, or the next free slot.
     next: u32,
-    /// The next of a list of its owner's.
+    /// The next point in a list that the owner keeps.
     pub link: u32,
 }
 
-/// Points that belong together.
+/// A set of linked points.
 #[derive(Clone, Copy, Default)]
 pub struct Set {
     pub extent: Extent,
@@ -46,7 +47,7 @@ pub struct Set {
     pub first_place: u64,
     /// The last column from which a return may still be linked to it.
     pub last_place: u64,
-    /// Whether it has been cut, because it goes on around the sensor.
+    /// Whether it has been cut because it extends all around the sensor.
     pub is_cut: bool,
 }
 
@@ -71,14 +72,14 @@ impl<T: Copy + Default> OpenSets<T> {
         }
     }
 
-    /// Takes in a point as a set of its own; `None` if there is no room. What may be linked
-    /// to it is not known yet.
+    /// Adds a point as a set of its own; `None` if there is no room. [`OpenSets::wait_until`] then
+    /// says how long links to it are possible.
     pub fn insert(&mut self, position: [f32; 3], row: u16, tag: T, place: u64) -> Option<u32> {
         let n_used = self.slots.len() as u32;
         let point = if self.free == NONE { n_used } else { self.free };
         let (order, parent, next) = (self.n_points, point, point);
         let slot = Slot { position, row, tag, order, place, parent, next, link: NONE };
-        let extent = Extent::of(position);
+        let extent = Extent::at(position);
         let set = Set { extent, first_place: place, last_place: place, is_cut: false };
         if point < n_used {
             self.free = self.slots[point as usize].next;
@@ -98,7 +99,7 @@ impl<T: Copy + Default> OpenSets<T> {
         &self.slots[point as usize]
     }
 
-    /// What the owner's list names after `point`.
+    /// The point after `point` in the owner's list.
     pub fn link_mut(&mut self, point: u32) -> &mut u32 {
         &mut self.slots[point as usize].link
     }
@@ -108,7 +109,7 @@ impl<T: Copy + Default> OpenSets<T> {
         self.sets[point as usize].last_place = place;
     }
 
-    /// The root of the set that holds `point`; `None` if the point is gone.
+    /// The root of the set that holds `point`; `None` if the point was removed.
     pub fn root(&mut self, mut point: u32) -> Option<u32> {
         loop {
             let parent = self.slots[point as usize].parent;
@@ -141,14 +142,14 @@ impl<T: Copy + Default> OpenSets<T> {
         })
     }
 
-    /// Takes out a point that is a set of its own.
+    /// Removes a point that is a set of its own.
     pub fn remove(&mut self, point: u32) {
         let slot = &mut self.slots[point as usize];
         (slot.parent, slot.next) = (NONE, self.free);
         self.free = point;
     }
 
-    /// Takes out the set of this root.
+    /// Removes the set of this root.
     pub fn remove_set(&mut self, root: u32) {
         let mut here = self.slots[root as usize].next;
         while here != root {
@@ -159,7 +160,7 @@ impl<T: Copy + Default> OpenSets<T> {
         self.remove(root);
     }
 
-    /// Takes out the points of this root's set in columns before `place`, and marks it as cut.
+    /// Removes the points of this root's set in columns before `place`, and marks the set as cut.
     pub fn cut(&mut self, root: u32, place: u64) {
         let whole = self.sets[root as usize];
         let mut kept: Option<u32> = None;
@@ -170,7 +171,7 @@ impl<T: Copy + Default> OpenSets<T> {
                 self.remove(here);
             } else {
                 (self.slots[here as usize].parent, self.slots[here as usize].next) = (here, here);
-                let extent = Extent::of(position);
+                let extent = Extent::at(position);
                 self.sets[here as usize] = Set { extent, first_place: at, is_cut: true, ..whole };
                 match kept {
                     None => kept = Some(here),

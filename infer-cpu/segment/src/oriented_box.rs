@@ -1,15 +1,15 @@
-//! The box around a cluster, turned as the object stands.
+//! The oriented bounding box of a cluster.
 
 /// The direction is searched over a quarter turn in steps of three degrees, and then by single
-/// degrees beside the best of them.
+/// degrees around the best of them.
 const COARSE_DEG: i32 = 3;
 const QUARTER_DEG: i32 = 90;
 
-/// Points nearer to an edge than this count alike, metres: about the range noise
-/// of a sensor (the paper's d0).
+/// Points nearer to an edge than this, in metres, count the same: about the range noise of a sensor
+/// (the paper's d0).
 const NEAR_M: f32 = 0.05;
 
-/// The most points among which the direction is searched; of more, every second one, or third.
+/// The most points from which the direction is found; of a larger cluster, every second or third.
 const MOST_SEARCHED: usize = 300;
 
 /// A box with a level base, in the frame of its points.
@@ -19,17 +19,16 @@ pub struct OrientedBox {
     pub centre_m: [f32; 3],
     /// Length, width and height, metres; the length is the longer horizontal side.
     pub size_m: [f32; 3],
-    /// Direction of the length, radians counterclockwise from x, in -pi/2..=pi/2:
-    /// points alone do not tell front from rear.
+    /// Direction of the length, radians counterclockwise from x, in -pi/2..=pi/2: points alone do
+    /// not tell front from rear.
     pub yaw_rad: f32,
 }
 
 impl OrientedBox {
-    /// The box around `points`, along whose edges most points lie: a sensor sees an
-    /// object's near sides, an L from above (closeness criterion of Zhang, Xu, Dong
-    /// and Dolan, "Efficient L-shape fitting for vehicle detection using laser
-    /// scanners", IV 2017). Points that are not finite are left out; without others
-    /// the box is of size 0 at the origin.
+    /// The box around `points` with the most points near its edges: a sensor sees the near sides of
+    /// an object, an L from above (closeness criterion of Zhang, Xu, Dong and Dolan, "Efficient
+    /// L-shape fitting for vehicle detection using laser scanners", IV 2017). Points that are not
+    /// finite are left out; without finite points, the box has size 0 at the origin.
     #[must_use]
     pub fn around(points: &[[f32; 3]]) -> Self {
         let finite = |point: &&[f32; 3]| point.iter().all(|x| x.is_finite());

@@ -7,10 +7,10 @@ pub struct Plane {
     slope: [f32; 2],
 }
 
-/// Weights fall with the distance beyond this: range noise and kerbs.
+/// Weights fall with the distance from the plane beyond this: range noise and kerbs.
 const NOISE_M: f64 = 0.1;
 const ROUNDS: usize = 10;
-/// The steepest plane that is believed, 20 degrees: steeper ones are walls.
+/// The steepest plane that is accepted, 20 degrees: a steeper one is a wall.
 pub const STEEPEST: f32 = 0.364;
 
 impl Plane {
@@ -19,9 +19,9 @@ impl Plane {
         Self { base: z_m, slope: [0.0; 2] }
     }
 
-    /// The plane with the least sum of absolute distances from `points`, which those
-    /// that are not ground hardly disturb, found from `level` by least squares with
-    /// weights. It is `level` if the points tell no slope.
+    /// The plane with the least sum of absolute distances from `points`, found from `level` by
+    /// iteratively reweighted least squares. Points that are not ground hardly affect it. Returns
+    /// `level` if the points determine no slope.
     pub fn fit<P: Iterator<Item = [f32; 3]>>(level: Self, points: impl Fn() -> P) -> Self {
         let mut plane = [f64::from(level.base), 0.0, 0.0];
         for _ in 0..ROUNDS {
@@ -60,8 +60,8 @@ impl Plane {
     }
 }
 
-/// Solves `a x = b` for a positive definite `a` by elimination; `None` if it is
-/// not, as for points on one line.
+/// Solves `a x = b` for a positive definite `a` by elimination; `None` if `a` is singular, as for
+/// points on one line.
 fn solve(mut a: [[f64; 3]; 3], mut b: [f64; 3]) -> Option<[f64; 3]> {
     let scale = a[0][0] + a[1][1] + a[2][2];
     for i in 0..3 {

@@ -1,38 +1,21 @@
-//! What a sweep was cut into.
+//! The result of a segmentation.
 
 use crate::height_grid::HeightGrid;
+use crate::label::Label;
 use crate::sets::Sets;
 use crate::settings::Settings;
-
-/// What a point is part of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Label {
-    /// The ground.
-    Ground,
-    /// The cluster of this number, its place among [`Segmentation::clusters`].
-    Cluster(u32),
-    /// No cluster: out of range, or among too few or too many points, or in something too large.
-    Small,
-    /// Nothing: a coordinate is NaN or infinite, or the point lies at the sensor's origin.
-    Invalid,
-}
-
-impl Label {
-    /// Not ground and not in a cluster yet.
-    pub(crate) const OBSTACLE: Self = Self::Cluster(u32::MAX);
-}
 
 /// Points of a sweep that belong together.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cluster<'a> {
-    /// Places of the points in the sweep, ascending.
+    /// Indices of the points in the sweep, ascending.
     pub points: &'a [u32],
-    /// Height of the ground under the middle of the points' bounding box, in metres in the
-    /// sensor's frame; `None` where it is unknown.
+    /// Height of the ground under the middle of the points' bounding box, in metres in the sensor's
+    /// frame; `None` where it is unknown.
     pub ground_z_m: Option<f32>,
 }
 
-/// A sweep, cut into ground and clusters.
+/// A sweep, segmented into ground and clusters.
 #[derive(Default)]
 pub struct Segmentation {
     pub(crate) labels: Vec<Label>,
@@ -41,9 +24,9 @@ pub struct Segmentation {
     members: Vec<u32>,
     /// For each cluster, the end of its members and the height of its ground.
     ends: Vec<(u32, Option<f32>)>,
-    /// The component that each first point of a set begins.
+    /// For each point that is the first of its set, the index of the set in `extents`.
     components: Vec<u32>,
-    /// Of each set, its extent and the cluster that it is.
+    /// The extent of each set, and its cluster if it is one.
     extents: Vec<(Extent, Option<u32>)>,
 }
 
@@ -70,7 +53,7 @@ impl Segmentation {
         self.ground.z_m(x, y)
     }
 
-    /// Makes clusters of those sets of obstacles that are neither too small nor too large.
+    /// Turns the sets of obstacles that are neither too small nor too large into clusters.
     pub(crate) fn collect(&mut self, points: &[[f32; 3]], sets: &mut Sets, settings: &Settings) {
         self.measure(points, sets);
         self.ends.clear();
@@ -79,7 +62,7 @@ impl Segmentation {
             let is_cluster = extent.is_cluster(settings);
             *number = is_cluster.then_some(self.ends.len() as u32);
             if is_cluster {
-                // The end grows to its place while the members are filled in.
+                // The end begins at the cluster's start and advances with each member below.
                 let [x, y] = extent.middle();
                 self.ends.push((n_members, self.ground.z_m(x, y)));
                 n_members += extent.count as u32;
@@ -116,15 +99,15 @@ impl Segmentation {
             let first = sets.first(point as u32) as usize;
             if first == point {
                 self.components[first] = self.extents.len() as u32;
-                self.extents.push((Extent::of(points[point]), None));
+                self.extents.push((Extent::at(points[point]), None));
             } else {
-                self.extents[self.components[first] as usize].0.add(&Extent::of(points[point]));
+                self.extents[self.components[first] as usize].0.add(&Extent::at(points[point]));
             }
         }
     }
 }
 
-/// How many points a set has and the rectangle around them.
+/// The number of points of a set and their bounding rectangle.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Extent {
     pub count: usize,
@@ -133,7 +116,7 @@ pub(crate) struct Extent {
 }
 
 impl Extent {
-    pub fn of([x, y, _]: [f32; 3]) -> Self {
+    pub fn at([x, y, _]: [f32; 3]) -> Self {
         Self { count: 1, low: [x, y], high: [x, y] }
     }
 

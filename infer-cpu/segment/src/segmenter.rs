@@ -1,58 +1,17 @@
-//! From a sweep to its segmentation.
+//! The segmentation of whole sweeps.
 
 use crate::components::Components;
 use crate::ground::{GroundFinder, sector};
 use crate::image::{Columns, RangeImage};
+use crate::label::Label;
 use crate::link::link_column;
-use crate::segmentation::{Label, Segmentation};
+use crate::segmentation::Segmentation;
 use crate::sets::Sets;
 use crate::settings::{Settings, SettingsError};
+use crate::sweep::{SegmentError, Sweep};
 
-/// The points of one sweep of a sensor, or of several stacked closely.
-#[derive(Clone, Copy, Debug)]
-pub struct Sweep<'a> {
-    /// Metres, in the sensor's frame: its origin is the sensor, z points up.
-    pub points: &'a [[f32; 3]],
-    /// The ring of each point, counted from the lowest elevation; any other numbers work as well,
-    /// one for each laser, because rows are sorted by their elevation.
-    pub rings: Option<&'a [u16]>,
-}
-
-/// A sweep that cannot be segmented.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum SegmentError {
-    /// Not one ring for each point.
-    #[error("expected {expected} rings, one for each point, found {found}")]
-    RingCount {
-        /// The number of points.
-        expected: usize,
-        /// The number of rings.
-        found: usize,
-    },
-    /// More rings than sensors have.
-    #[error("expected at most {most} different rings, found {found}")]
-    TooManyRings {
-        /// The most that are supported.
-        most: usize,
-        /// How many the sweep has.
-        found: usize,
-    },
-    /// A ring of which the settings do not tell the elevation.
-    #[error("expected rings below {expected}, as many as there are elevations, found {found}")]
-    UnknownRing {
-        /// The number of elevations.
-        expected: usize,
-        /// A ring of the sweep.
-        found: usize,
-    },
-    /// More points than their indices can count.
-    #[error("expected at most 4,294,967,294 points, found {0}")]
-    TooManyPoints(usize),
-}
-
-/// Segments one sweep after the other. Its memory grows with the largest sweep
-/// (most points, most rings) and is then used again.
+/// Segments one sweep after the other. Its memory grows to the largest sweep (most points, most
+/// rings) and is reused.
 pub struct Segmenter {
     settings: Settings,
     image: RangeImage,
@@ -66,7 +25,7 @@ impl Segmenter {
     /// A segmenter with these settings.
     ///
     /// # Errors
-    /// A setting that is not as it must be.
+    /// An invalid setting.
     pub fn new(settings: Settings) -> Result<Self, SettingsError> {
         settings.check()?;
         Ok(Self {
@@ -79,10 +38,10 @@ impl Segmenter {
         })
     }
 
-    /// Cuts `sweep` into ground and clusters. The same sweep gives the same result.
+    /// Segments `sweep` into ground and clusters. The same sweep gives the same result.
     ///
     /// # Errors
-    /// Rings that do not fit the points; more than four billion points.
+    /// A wrong number of rings, or more than four billion points.
     pub fn segment(&mut self, sweep: &Sweep<'_>) -> Result<&Segmentation, SegmentError> {
         let n = sweep.points.len();
         if n >= u32::MAX as usize {

@@ -1,9 +1,8 @@
-//! Disjoint sets of points: who is linked to whom.
+//! Disjoint sets of linked points.
 
 use crate::link::Links;
 
-/// A forest over the points; the root of a set is its first point, whatever the
-/// order of the links.
+/// A disjoint-set forest; the root of a set is its first point, in any order of the links.
 #[derive(Default)]
 pub struct Sets {
     parents: Vec<u32>,

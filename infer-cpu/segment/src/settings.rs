@@ -1,8 +1,9 @@
-//! What a segmentation depends on.
+//! The parameters of a segmentation.
 
-use crate::image::MOST_ROWS;
+/// The most rings: at 2,000 columns, the cells of the range image then take 16 MB.
+pub const MOST_ROWS: usize = 2048;
 
-/// The numbers that decide what is ground and what belongs together.
+/// The limits that define ground and clusters.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Settings {
@@ -15,10 +16,10 @@ pub struct Settings {
     /// Height of a row of the range image in degrees, for sweeps that come without rings.
     pub row_height_deg: f32,
     /// The elevation of each ring of the sensor in degrees, in the order of the rings' numbers.
-    /// `None` takes the mean of each ring's returns. A [`Stream`](crate::Stream) must have them.
+    /// `None` takes the mean of each ring's returns. A [`Stream`](crate::Stream) requires them.
     pub ring_elevations_deg: Option<Vec<f32>>,
-    /// The steepest ground in degrees, against the plane of the ground around the sensor: neither a
-    /// hill nor a tilt of the sensor count, up to 20 degrees.
+    /// The steepest ground in degrees, relative to the ground plane around the sensor, so that a
+    /// hill or a tilt of the sensor of up to 20 degrees does not count.
     pub max_ground_slope_deg: f32,
     /// Points at most this many metres above the ground are ground.
     pub ground_clearance_m: f32,
@@ -34,8 +35,9 @@ pub struct Settings {
     pub max_points: usize,
     /// The largest horizontal diagonal of a cluster's bounding box in metres.
     pub max_size_m: f32,
-    /// With a radius in metres, clusters are the connected components of points within it, of all
-    /// points of a cloud without the structure of a scan: no range image, no ground, any range.
+    /// With a radius in metres, clusters are the connected components of points within it, for
+    /// clouds without the structure of a scan: there is no range image and no ground, and any range
+    /// is valid.
     pub radius_m: Option<f32>,
 }
 
@@ -51,8 +53,8 @@ impl Default for Settings {
             // An HDL-64E's rings lie 0.33 to 0.5 degrees apart, most of a VLP-32C's 0.33.
             row_height_deg: 0.4,
             ring_elevations_deg: None,
-            // Ramps of garages and bridges mostly stay below 8 degrees (14 %); a hill is a plane
-            // of its own.
+            // Ramps of garages and bridges mostly stay below 8 degrees (14 %); a hill is a plane of
+            // its own.
             max_ground_slope_deg: 8.0,
             // A kerb of 0.15 m and range noise.
             ground_clearance_m: 0.2,
@@ -80,54 +82,44 @@ impl Settings {
     /// Checks every number.
     ///
     /// # Errors
-    /// The first setting that is not as it must be.
+    /// The first invalid setting.
     pub fn check(&self) -> Result<(), SettingsError> {
-        let check = |name, found: f32, expected, is_right: bool| {
-            let error = SettingsError { name, expected, found: f64::from(found) };
-            if is_right { Ok(()) } else { Err(error) }
-        };
-        let is_length = |x: f32| (0.0..f32::INFINITY).contains(&x);
         let length = "a length of at least 0 m";
-        for (name, found) in [
-            ("min_range_m", self.min_range_m),
-            ("ground_clearance_m", self.ground_clearance_m),
-            ("reach_m", self.reach_m),
-            ("bridge_m", self.bridge_m),
-        ] {
-            check(name, found, length, is_length(found))?;
-        }
-        let within = |x: f32, low, high| (low..=high).contains(&x);
-        let (far, size) = (self.max_range_m, self.max_size_m);
-        let (width, height) = (self.column_width_deg, self.row_height_deg);
-        let slope = self.max_ground_slope_deg;
-        // Squares of farther ranges overflow.
-        let is_far = within(far, self.min_range_m, 1e15);
-        check("max_range_m", far, "min_range_m to 1e15 m", is_far)?;
-        check("column_width_deg", width, "0.05 to 10 degrees", within(width, 0.05, 10.0))?;
-        check("row_height_deg", height, "0.1 to 10 degrees", within(height, 0.1, 10.0))?;
-        check("max_ground_slope_deg", slope, "0 to 45 degrees", within(slope, 0.0, 45.0))?;
-        check("max_size_m", size, "a length or infinity", size >= 0.0)?;
-        for &elevation in self.ring_elevations_deg.iter().flatten() {
-            let is_elevation = within(elevation, -90.0, 90.0);
-            check("ring_elevations_deg", elevation, "-90 to 90 degrees", is_elevation)?;
-        }
         let n_rings = self.ring_elevations_deg.as_ref().map_or(1, Vec::len);
-        let is_few = (1..=MOST_ROWS).contains(&n_rings);
-        check("ring_elevations_deg", n_rings as f32, "1 to 2048 rings", is_few)?;
-        let radius = self.radius_m.unwrap_or(1.0);
-        check("radius_m", radius, "1e-15 to 1e15 m", within(radius, 1e-15, 1e15))
+        let numbers = [
+            ("min_range_m", self.min_range_m, 0.0..=f32::MAX, length),
+            ("ground_clearance_m", self.ground_clearance_m, 0.0..=f32::MAX, length),
+            ("reach_m", self.reach_m, 0.0..=f32::MAX, length),
+            ("bridge_m", self.bridge_m, 0.0..=f32::MAX, length),
+            // Squares of farther ranges overflow.
+            ("max_range_m", self.max_range_m, self.min_range_m..=1e15, "min_range_m to 1e15 m"),
+            ("column_width_deg", self.column_width_deg, 0.05..=10.0, "0.05 to 10 degrees"),
+            ("row_height_deg", self.row_height_deg, 0.1..=10.0, "0.1 to 10 degrees"),
+            ("max_ground_slope_deg", self.max_ground_slope_deg, 0.0..=45.0, "0 to 45 degrees"),
+            ("max_size_m", self.max_size_m, 0.0..=f32::INFINITY, "a length or infinity"),
+            ("ring_elevations_deg", n_rings as f32, 1.0..=MOST_ROWS as f32, "1 to 2048 rings"),
+            ("radius_m", self.radius_m.unwrap_or(1.0), 1e-15..=1e15, "1e-15 to 1e15 m"),
+        ];
+        let elevations = self.ring_elevations_deg.iter().flatten();
+        let elevations = elevations
+            .map(|&found| ("ring_elevations_deg", found, -90.0..=90.0, "-90 to 90 degrees"));
+        let wrong =
+            numbers.into_iter().chain(elevations).find(|(_, x, valid, _)| !valid.contains(x));
+        wrong.map_or(Ok(()), |(name, found, _, expected)| {
+            Err(SettingsError { name, expected, found: f64::from(found) })
+        })
     }
 }
 
-/// A setting that is not as it must be.
+/// An invalid setting.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("setting {name}: expected {expected}, found {found}")]
 pub struct SettingsError {
     /// The field of [`Settings`].
     pub name: &'static str,
-    /// What it may be.
+    /// The valid values.
     pub expected: &'static str,
-    /// What it was.
+    /// The value.
     pub found: f64,
 }
 

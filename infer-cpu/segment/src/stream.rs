@@ -1,4 +1,4 @@
-//! Clusters of a sensor that turns on and on, each as soon as it is complete.
+//! The segmentation of a continuous stream of returns: each cluster as soon as it is complete.
 
 use std::f32::consts::{PI, TAU};
 use std::ops::Range;
@@ -10,17 +10,16 @@ use crate::link::{Limits, MOST_COLUMNS, MOST_IN_CELL, link_column};
 use crate::open_sets::{NONE, OpenSets};
 use crate::settings::{Settings, SettingsError};
 
-/// Columns that are held for linking: those that a return may look at, and a few to spare.
+/// Columns that are kept for linking: those within reach of a return, and some to spare.
 const WINDOW: usize = 64;
 const _: () = assert!(MOST_COLUMNS + 2 < WINDOW);
 
-/// Cuts the returns of a sensor that turns clockwise into clusters while they come.
+/// Segments the returns of a sensor that turns clockwise, as they arrive.
 ///
-/// A cluster is complete, and handed out, when the beams have passed it by as much as
-/// its neighbours may be apart: at 10 m these are 1.8 degrees. The ground is that of the turn
-/// before. Only the clusters of the first turn wait for its end, because no ground is known
-/// before. Whatever links all around the sensor, such as the walls of a small room, has no end
-/// and is no cluster.
+/// A cluster is complete, and reported, when the beams have passed it by the largest distance that
+/// links: 1.8 degrees at 10 m. The ground is that of the previous turn; the clusters of the first
+/// turn are reported at its end. A set that extends all around the sensor, such as the walls of a
+/// small room, never ends and is not a cluster.
 ///
 /// ```
 /// use edgepuck_segment::{Settings, Stream};
@@ -31,7 +30,7 @@ const _: () = assert!(MOST_COLUMNS + 2 < WINDOW);
 /// let mut n_clusters = 0;
 /// for turn in 0..2 {
 ///     for degrees in 0..360 {
-///         // No return of an azimuth before this comes any more.
+///         // All returns before this azimuth have come.
 ///         let azimuth_rad = (degrees as f32).to_radians();
 ///         stream.advance(azimuth_rad, |cluster| {
 ///             n_clusters += 1;
@@ -60,7 +59,7 @@ pub struct Stream<T> {
     front: Option<u64>,
     /// The last column that has returns.
     newest: u64,
-    /// The first column of the turn at hand.
+    /// The first column of the current turn.
     turn_start: u64,
     n_turns: u64,
     points: OpenSets<T>,
@@ -68,11 +67,12 @@ pub struct Stream<T> {
     waiting: Vec<u32>,
     turn: Turn,
     window: Window,
-    /// The first of those points to which nothing can be linked after a column.
+    /// For each column of the window, the first of the points that no later column can be linked
+    /// to.
     due: [u32; WINDOW],
     finder: GroundFinder,
     ground: Option<HeightGrid>,
-    /// That of the turn before last, whose memory is used again.
+    /// The ground of the turn before last, whose memory is reused.
     spare_ground: HeightGrid,
     column: Vec<(u16, u64, u32)>,
     members: Vec<(u64, u32)>,
@@ -86,19 +86,19 @@ pub struct Stream<T> {
 pub struct StreamCluster<'a, T> {
     /// Metres, in the sensor's frame.
     pub points: &'a [[f32; 3]],
-    /// What came with each point.
+    /// The tag of each point.
     pub tags: &'a [T],
-    /// Height of the ground under the middle of the points' bounding box, in metres in the
-    /// sensor's frame; `None` where it is unknown.
+    /// Height of the ground under the middle of the points' bounding box, in metres in the sensor's
+    /// frame; `None` where it is unknown.
     pub ground_z_m: Option<f32>,
 }
 
-/// How many returns are in no column, by cause.
+/// The number of dropped returns, by cause.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Dropped {
-    /// They came after their column was closed, or before the first one was named.
+    /// They came after their column was closed, or before the first call of [`Stream::advance`].
     pub late: u64,
-    /// There was no room: more came than a turn has.
+    /// There was no room for them.
     pub overflow: u64,
 }
 
@@ -125,12 +125,11 @@ struct WindowColumn {
 }
 
 impl<T: Copy + Default> Stream<T> {
-    /// A stream with these settings. It holds up to `capacity` returns, which is best half
-    /// as many again as the sensor sends in a turn; `T` is what comes with a return.
+    /// A stream with these settings, for up to `capacity` returns at a time: 1.5 times as many as
+    /// the sensor sends in a turn are enough. `T` is a tag that comes with each return.
     ///
     /// # Errors
-    /// A setting that is not as it must be: there must be `ring_elevations_deg`, and no
-    /// `radius_m`.
+    /// An invalid setting. `ring_elevations_deg` is required, and `radius_m` must be `None`.
     pub fn new(settings: Settings, capacity: u32) -> Result<Self, SettingsError> {
         settings.check()?;
         let wrong = |name, expected| SettingsError { name, expected, found: f64::NAN };
@@ -175,9 +174,8 @@ impl<T: Copy + Default> Stream<T> {
         })
     }
 
-    /// Takes in a return at `position`, metres in the sensor's frame. Whatever is no obstacle
-    /// for a [`Segmenter`](crate::Segmenter), such as a point out of range, is passed over, and
-    /// so is a ring that the settings do not name.
+    /// Adds a return at `position`, metres in the sensor's frame. A point out of range, or of a
+    /// ring that the settings do not have, is ignored.
     pub fn push(&mut self, position: [f32; 3], ring: u16, tag: T) {
         let [x, y, z] = position;
         let square = x * x + y * y + z * z;
@@ -206,12 +204,12 @@ impl<T: Copy + Default> Stream<T> {
         }
     }
 
-    /// Says that all returns before `azimuth_rad` have come, clockwise from x, and hands each
-    /// cluster that is complete by that to `each`. An azimuth behind the one before changes
-    /// nothing. The first one is where the stream begins.
+    /// States that all returns before `azimuth_rad` (clockwise from x) have come, and passes each
+    /// cluster that this completes to `each`. An azimuth behind the previous one has no effect. The
+    /// first call marks where the stream begins.
     pub fn advance(&mut self, azimuth_rad: f32, mut each: impl FnMut(StreamCluster<'_, T>)) {
         let n_columns = self.waiting.len();
-        // What rounding may take a return back by: `angle::atan2` is off by 2e-5.
+        // A margin for rounding: the error of `angle::atan2` is at most 2e-5.
         const ROUNDING: f32 = 1e-4;
         let turned = (azimuth_rad - ROUNDING + PI).rem_euclid(TAU) / TAU;
         let column = ((turned * n_columns as f32) as usize).min(n_columns - 1);
@@ -226,8 +224,8 @@ impl<T: Copy + Default> Stream<T> {
         }
     }
 
-    /// Hands out what has come so far, complete or not. The stream begins anew where it is
-    /// next advanced to, with the ground that it knows.
+    /// Reports all clusters so far, complete or not. The stream begins anew at the next call of
+    /// [`Stream::advance`], with the ground that it knows.
     pub fn end(&mut self, mut each: impl FnMut(StreamCluster<'_, T>)) {
         if self.front.is_none() {
             return;
@@ -244,19 +242,19 @@ impl<T: Copy + Default> Stream<T> {
         (self.front, self.newest) = (None, 0);
     }
 
-    /// How many turns have ended.
+    /// The number of turns that have ended.
     #[must_use]
     pub fn n_turns(&self) -> u64 {
         self.n_turns
     }
 
-    /// The returns that were dropped so far.
+    /// The number of returns dropped so far.
     #[must_use]
     pub fn dropped(&self) -> Dropped {
         self.dropped
     }
 
-    /// Closes the column at the front, and with its last one the turn.
+    /// Closes the front column, and the turn after its last column.
     fn close(&mut self, each: &mut impl FnMut(StreamCluster<'_, T>)) {
         self.close_column(each);
         if self.front == Some(self.turn_start + self.waiting.len() as u64) {
@@ -273,7 +271,7 @@ impl<T: Copy + Default> Stream<T> {
         }
     }
 
-    /// Takes what waits for the column into the turn.
+    /// Moves the waiting returns of a column into the turn.
     fn sort_column(&mut self, place: u64) {
         let Self { waiting, column, points, turn, .. } = self;
         let n_columns = waiting.len();
@@ -305,8 +303,8 @@ impl<T: Copy + Default> Stream<T> {
         turn.columns[n_columns - 1 - at] = start..turn.returns.len();
     }
 
-    /// Takes the obstacles of a column of the turn into the window, links the column before,
-    /// to which this is the last neighbour, and hands out what that completes.
+    /// Copies the obstacles of a column from the turn into the window, links the previous column,
+    /// whose last neighbour this is, and reports the clusters that this completes.
     fn open(&mut self, place: u64, each: &mut impl FnMut(StreamCluster<'_, T>)) {
         let Self { ground: Some(ground), points, turn, window, settings, .. } = self else {
             return;
@@ -340,7 +338,7 @@ impl<T: Copy + Default> Stream<T> {
         }
     }
 
-    /// Hands out the clusters to which nothing can be linked after the column `place`.
+    /// Reports the clusters that no column after `place` can be linked to.
     fn complete(&mut self, place: u64, each: &mut impl FnMut(StreamCluster<'_, T>)) {
         let mut next = std::mem::replace(&mut self.due[place as usize % WINDOW], NONE);
         while next != NONE {
@@ -373,8 +371,8 @@ impl<T: Copy + Default> Stream<T> {
         each(StreamCluster { points: positions, tags, ground_z_m });
     }
 
-    /// Finds the ground of the turn, for the next one. The columns of the first turn, which
-    /// waited for it, are opened.
+    /// Finds the ground of the turn, for the next one. Then opens the columns of the first turn,
+    /// which waited for it.
     fn end_turn(&mut self, each: &mut impl FnMut(StreamCluster<'_, T>)) {
         let mut ground = std::mem::take(&mut self.spare_ground);
         self.finder.find(&self.turn, &self.settings, &mut ground);
@@ -391,13 +389,13 @@ impl<T: Copy + Default> Stream<T> {
     }
 }
 
-/// How many columns from `front` on to `column` of a turn.
+/// The number of columns from `front` to `column`, clockwise.
 fn ahead(front: u64, column: usize, n_columns: usize) -> usize {
     let front = (front % n_columns as u64) as usize;
     if column >= front { column - front } else { column + n_columns - front }
 }
 
-/// The number in an image of a column that is counted clockwise.
+/// The image's number of a column that is counted clockwise.
 fn image_column(place: u64, n_columns: usize) -> usize {
     n_columns - 1 - (place % n_columns as u64) as usize
 }
@@ -479,7 +477,7 @@ impl Cells for Window {
     }
 
     fn cell(&self, column: usize, row: usize) -> &[Return] {
-        // The newest column of this number is so many columns old.
+        // How many columns ago this column was the newest.
         let newest = image_column(self.newest, self.n_columns);
         let age = if column >= newest { column - newest } else { column + self.n_columns - newest };
         if age >= WINDOW || age as u64 > self.newest {

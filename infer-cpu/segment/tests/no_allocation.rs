@@ -1,5 +1,5 @@
-//! A segmenter allocates nothing for sweeps that are no larger than those it has
-//! seen: a robot's memory does not grow.
+//! A segmenter allocates nothing for sweeps that are no larger than those it has seen: a robot's
+//! memory does not grow.
 //!
 //! One test alone: the count is the whole process's.
 

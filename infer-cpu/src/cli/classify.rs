@@ -3,11 +3,9 @@
 use std::fs::File;
 use std::io::{self, BufReader, stdin};
 use std::path::{Path, PathBuf};
-use std::thread::available_parallelism;
 use std::time::Instant;
 
 use anyhow::Context;
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 use formats::FormatError;
 use formats::cloud_file::CloudFormat;
 use formats::model_card::{ModelCard, Normalization};
@@ -21,10 +19,7 @@ use super::model::ModelArgs;
 use super::names;
 use super::report::Style;
 use super::sampler::SamplerArgs;
-use super::{Outcome, of_setup};
-
-/// More threads than a Raspberry Pi has cores were never measured to help.
-const MOST_THREADS_BY_DEFAULT: usize = 4;
+use super::{Outcome, n_threads, of_setup};
 
 /// Flags of `classify`.
 #[derive(clap::Args)]
@@ -37,32 +32,31 @@ Examples:
   find scans -name '*.npz' | infer-cpu classify --json --files-from -
 
 One line is printed for each file: its name, the class and the confidence,
-separated by tabs. The class is `unknown` for an object that the model is not meant
-to recognise. With --json the line is an object with these keys: file, class
-(a number), label, unknown (true, only for such an object; class, label and
-confidence then state what it resembles most), confidence (0 to 1), logits, points
-(number of valid points),
-dropped (number of invalid points), outliers (number of points that the outlier filter
-dropped, if any), used (points that the network saw), clipped
-(number of activations, with i8), precision (f32 if the chosen one overflowed) and
-ms (time without reading the file). If the file fails, the keys are file and error.
+separated by tabs. The class is `unknown` for an object that belongs to no known
+class. With --json, the line is an object with these keys: file, class (a number),
+label, unknown (true, only for such an object; class, label and confidence are then
+those of the most similar class), confidence (0 to 1), logits, points (number of
+valid points), dropped (number of invalid points), outliers (number of points that
+the outlier filter dropped, if any), used (number of points that the network
+processed), clipped (number of activations, with i8), precision (f32 if the chosen
+one overflowed) and ms (time without reading the file). If the file fails, the keys
+are file and error.
 After a failure, the program continues with the next file, and exits with 1 at the
 end.
 
 Formats, by file extension: PLY, NPZ, NPY, PCD, XYZ, CSV, KITTI's .bin, LAS.")]
-pub struct Args {
+pub struct ClassifyArgs {
     /// Files of clouds; `-` reads one cloud from standard input
     #[arg(value_name = "FILES", required_unless_present = "files_from")]
     files: Vec<PathBuf>,
 
-    /// Read file names from LIST, one per line; with `-`, from standard input,
-    /// and print the result for each name before reading the next one
+    /// Read file names from LIST, one per line; with `-`, from standard input, and print the result
+    /// for each name before reading the next one
     #[arg(long, value_name = "LIST", conflicts_with = "files")]
     files_from: Option<PathBuf>,
 
-    /// Format of all clouds: ply, npz, npy, pcd, xyz, csv, kitti, las [default:
-    /// detected from the file extension, or from the first bytes of standard
-    /// input]
+    /// Format of all clouds: ply, npz, npy, pcd, xyz, csv, kitti, las [default: detected from the
+    /// file extension, or from the first bytes of standard input]
     #[arg(long)]
     format: Option<CloudFormat>,
 
@@ -73,19 +67,17 @@ pub struct Args {
     #[command(flatten)]
     model: ModelArgs,
 
-    /// Drop points with NaN or infinite coordinates instead of rejecting the
-    /// cloud
+    /// Drop points with NaN or infinite coordinates instead of rejecting the cloud
     #[arg(long)]
     drop_invalid: bool,
 
-    /// Normalization of clouds: unit-sphere, metric (metres, from the mean of x and
-    /// y and the lowest z), metric-sight (the same, turned to the line of sight),
-    /// none [default: as in training]
+    /// Normalization of clouds: unit-sphere, metric (metres, from the mean of x and y and the
+    /// lowest z), metric-sight (the same, turned to the line of sight), none [default: as in
+    /// training]
     #[arg(long, value_name = "HOW")]
     normalize: Option<Normalization>,
 
-    /// Drop outliers before the sampler, from clouds of the unit sphere [default: as in
-    /// training]
+    /// Drop outliers before the sampler, from clouds of the unit sphere [default: as in training]
     #[arg(long, value_name = "YES", value_parser = clap::value_parser!(bool))]
     outlier_filter: Option<bool>,
 
@@ -93,8 +85,8 @@ pub struct Args {
     #[arg(long, default_value = "f32")]
     precision: Precision,
 
-    /// Kernels to use: scalar, avx2, avx512, neon, neon_f16, neon_dot [default:
-    /// the fastest that this machine supports]
+    /// Kernels to use: scalar, avx2, avx512, neon, neon_f16, neon_dot [default: the fastest that
+    /// this machine supports]
     #[arg(long)]
     kernel: Option<KernelName>,
 
@@ -102,8 +94,8 @@ pub struct Args {
     #[arg(long, value_name = "T", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
 
-    /// Classify K times and average the log-probabilities; requires --sampler
-    /// random or --vote-rotations, because the passes are identical otherwise
+    /// Classify K times and average the log-probabilities; requires --sampler random or
+    /// --vote-rotations, because the passes are identical otherwise
     #[arg(long, value_name = "K", default_value_t = 1)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=1000))]
     votes: u32,
@@ -112,12 +104,12 @@ pub struct Args {
     #[arg(long)]
     vote_rotations: bool,
 
-    /// Up axis of the clouds
-    #[arg(long, default_value = "z", value_parser = up_axis())]
+    /// Up axis of the clouds: x, y or z
+    #[arg(long, default_value = "z")]
     up: UpAxis,
 
-    /// Sampler that chooses the points that the network sees: all, first,
-    /// random, fps, voxel, cpl [default: as in training, else all]
+    /// Sampler that chooses the points that the network sees: all, first, random, fps, voxel, cpl
+    /// [default: as in training, else all]
     #[arg(long, value_name = "NAME")]
     sampler: Option<SamplerKind>,
 
@@ -125,20 +117,12 @@ pub struct Args {
     how: SamplerArgs,
 }
 
-fn up_axis() -> impl TypedValueParser<Value = UpAxis> {
-    PossibleValuesParser::new(["x", "y", "z"]).map(|axis| match &*axis {
-        "x" => UpAxis::X,
-        "y" => UpAxis::Y,
-        _ => UpAxis::Z,
-    })
-}
-
-/// Classifies what `args` name, one after the other.
+/// Classifies the clouds that `args` name, one after the other.
 ///
 /// # Errors
-/// Options that cannot be met, a model or a list of names that cannot be read,
-/// an output that cannot be written to. A cloud that fails is reported instead.
-pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+/// Invalid options; a model or a list of names that cannot be read; an output that cannot be
+/// written to. The failure of a cloud is printed instead.
+pub fn run(args: &ClassifyArgs) -> anyhow::Result<Outcome> {
     input::check_names(args.files.iter().map(PathBuf::as_path))?;
     let (model, card) = args.model.open()?;
     let options = args.options(&model, &card)?;
@@ -166,17 +150,13 @@ fn for_each_name(list: &Path, take: impl FnMut(&Path) -> io::Result<()>) -> anyh
     names::for_each(BufReader::new(file), take).with_context(|| list.display().to_string())
 }
 
-impl Args {
+impl ClassifyArgs {
     fn options(&self, model: &Path, card: &ModelCard) -> anyhow::Result<Options> {
         let trained = SamplerSpec::as_trained(model, card)?;
-        let cores = || available_parallelism().map_or(1, usize::from);
         Ok(Options {
             precision: self.precision,
             kernel: self.kernel,
-            threads: match self.threads {
-                Some(threads) => threads.into(),
-                None => cores().min(MOST_THREADS_BY_DEFAULT),
-            },
+            threads: n_threads(self.threads),
             sampler: Some(self.how.apply(self.sampler, trained)?),
             normalization: self.normalize,
             outlier_filter: self.outlier_filter,
@@ -189,7 +169,7 @@ impl Args {
     }
 }
 
-/// A model at work, and whether a cloud failed.
+/// A loaded classifier, and whether a cloud has failed.
 struct Session {
     classifier: Classifier,
     precision: Precision,
@@ -198,7 +178,7 @@ struct Session {
 }
 
 impl Session {
-    /// Classifies the cloud `name`, which was `read`, and says what came out.
+    /// Classifies the cloud `name`, if it could be `read`, and prints the result.
     fn answer(&mut self, name: &Path, read: Result<Vec<[f64; 3]>, FormatError>) -> io::Result<()> {
         let points = match read {
             Ok(points) => points,

@@ -9,11 +9,11 @@ use formats::cloud_file::{CloudFormat, read_cloud, read_cloud_from};
 
 use super::Usage;
 
-/// What stands for standard input among names of files.
+/// The file name that stands for standard input.
 const STANDARD_INPUT: &str = "-";
 
-/// Reads the cloud that an argument names: a file, or standard input. Without
-/// a `format`, a file's name tells it, or the first bytes of standard input.
+/// Reads a cloud from a file or from standard input. Without a `format`, the extension of the file
+/// or the first bytes of standard input determine it.
 ///
 /// # Errors
 /// Input that cannot be read or is not a cloud.
@@ -45,10 +45,10 @@ pub fn read_file(path: &Path, format: Option<CloudFormat>) -> Result<Vec<[f64; 3
     }
 }
 
-/// That standard input is named once at most: it holds one cloud.
+/// Checks that standard input, which holds one cloud, is named at most once.
 ///
 /// # Errors
-/// It is named more often.
+/// Standard input is named more often.
 pub fn check_names<'a>(names: impl IntoIterator<Item = &'a Path>) -> Result<(), Usage> {
     let n = names.into_iter().filter(|name| name.as_os_str() == STANDARD_INPUT).count();
     match n {

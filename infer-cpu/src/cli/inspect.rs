@@ -1,4 +1,4 @@
-//! `infer-cpu inspect`: what a model file holds.
+//! `infer-cpu inspect`: shows the content of a model file.
 
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -21,7 +21,7 @@ Examples:
 Every tensor is read and checked. A MAC is one multiplication and one addition.
 The MACs of a point are needed for each point that the network sees. The bytes
 include weights, biases and scales, with batch norms folded in.")]
-pub struct Args {
+pub struct InspectArgs {
     /// Model file [default: $EDGEPUCK_MODEL, else the bundled weights]
     model: Option<PathBuf>,
 
@@ -34,7 +34,7 @@ pub struct Args {
 ///
 /// # Errors
 /// A file that is not a model.
-pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+pub fn run(args: &InspectArgs) -> anyhow::Result<Outcome> {
     let path = model::find(args.model.as_deref())?;
     let summary = infer_cpu::inspect(&path)?;
     let sampler = SamplerSpec::as_trained(&path, &summary.card)?;
@@ -152,7 +152,7 @@ fn as_text(
     row(
         "int8",
         match card.activation_ranges.len() {
-            0 => "not calibrated: shapes made by rule are used at load".to_owned(),
+            0 => "not calibrated: loading uses generated shapes".to_owned(),
             n => format!("calibrated, {n} layers"),
         },
     )?;
@@ -166,10 +166,10 @@ fn classes(summary: &Summary) -> String {
     }
 }
 
-/// What is answered as unknown, if anything is.
+/// The classes and energies that count as unknown, if there are any.
 fn unknown(card: &ModelCard) -> Option<String> {
     let classes = card.unknown_classes.join(", ");
-    let energy = card.unknown_energy.map(|most| format!("any of an energy above {most:.3}"));
+    let energy = card.unknown_energy.map(|most| format!("any energy above {most:.3}"));
     let parts: Vec<String> =
         Some(classes).filter(|classes| !classes.is_empty()).into_iter().chain(energy).collect();
     (!parts.is_empty()).then(|| parts.join("; "))
@@ -185,7 +185,7 @@ fn net(net: Option<&NetShape>) -> String {
     net.map_or("none".to_owned(), |net| format!("{}, max, {}", chain(&net.convs), chain(&net.fcs)))
 }
 
-/// The widths that layers go through: `3-64-128-1024`.
+/// The widths of the layers: `3-64-128-1024`.
 fn chain(layers: &[LayerShape]) -> String {
     let first = layers.first().map(|layer| layer.inputs);
     let widths = first.into_iter().chain(layers.iter().map(|layer| layer.outputs));

@@ -1,4 +1,4 @@
-//! The commands.
+//! The command line.
 
 mod bench;
 mod classify;
@@ -15,8 +15,7 @@ mod sampler;
 use clap::{Parser, Subcommand};
 use formats::outcome::{Outcome, Usage};
 
-/// Classify point clouds on a CPU with PointNet, after a Critical Points Layer
-/// or another sampler.
+/// Classify point clouds on a CPU with PointNet, after a Critical Points Layer or another sampler.
 #[derive(Parser)]
 #[command(name = "infer-cpu", version, max_term_width = 100)]
 #[command(after_help = "\
@@ -30,22 +29,22 @@ pub struct Cli {
 #[derive(Subcommand)]
 enum Command {
     /// Classify clouds
-    Classify(Box<classify::Args>),
+    Classify(Box<classify::ClassifyArgs>),
     /// Reduce a cloud with a sampler, and write the chosen points
-    Sample(Box<sample::Args>),
+    Sample(Box<sample::SampleArgs>),
     /// Show the layers of a model file, their sizes and operation counts
-    Inspect(inspect::Args),
-    /// Name and track the objects that a LiDAR sees, from its packets, as they come
+    Inspect(inspect::InspectArgs),
+    /// Classify and track the objects in the packets of a LiDAR
     #[cfg(feature = "mcap")]
-    Live(Box<live::Args>),
+    Live(Box<live::LiveArgs>),
     /// Measure the latency on this machine
-    Bench(Box<bench::Args>),
+    Bench(Box<bench::BenchArgs>),
 }
 
-/// Does what the command line asks for.
+/// Runs the command.
 ///
 /// # Errors
-/// Whatever ends a command: a [`Usage`] if it is the command line's fault.
+/// The error of the command: a [`Usage`] if the command line is invalid.
 pub fn run(cli: &Cli) -> anyhow::Result<Outcome> {
     match &cli.command {
         Command::Classify(args) => classify::run(args),
@@ -59,8 +58,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<Outcome> {
     }
 }
 
-/// The error of a model or of options, as a [`Usage`] where only another
-/// command line can help.
+/// Turns an error of a model or of options into a [`Usage`] if only another command line can help.
 fn of_setup(error: infer_cpu::Error) -> anyhow::Error {
     use infer_cpu::Error;
     match error {
@@ -73,4 +71,11 @@ fn of_setup(error: infer_cpu::Error) -> anyhow::Error {
         | Error::Threads { .. } => Usage(error.to_string()).into(),
         _ => error.into(),
     }
+}
+
+/// The requested number of threads, else one per core, at most as many as a Raspberry Pi has cores:
+/// more never helped in measurements.
+fn n_threads(requested: Option<u16>) -> usize {
+    let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+    requested.map_or_else(|| cores().min(4), usize::from)
 }

@@ -1,4 +1,4 @@
-//! Which model a command uses.
+//! Finds the model of a command.
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -7,19 +7,18 @@ use formats::model_card::ModelCard;
 
 use super::Usage;
 
-/// Names a model file where `--model` does not.
+/// The environment variable that names a model file if `--model` does not.
 const VARIABLE: &str = "EDGEPUCK_MODEL";
 
-/// Bundled weights: the trained ones wherever they lie, else those of chance.
+/// The bundled weights: the trained ones in any of the folders, else the random ones.
 const NAMES: [&str; 2] = ["edge-64.safetensors", "untrained-test.safetensors"];
 
-/// Flags that name a model.
+/// The flags for a model.
 #[derive(clap::Args)]
 pub struct ModelArgs {
-    /// Model file in safetensors format [default: $EDGEPUCK_MODEL, else
-    /// edge-64.safetensors (for whole objects of ModelNet40), or street-128.safetensors for
-    /// `live`, in weights/ beside this program, in ../share/edgepuck/weights from there or in
-    /// ./assets/weights]
+    /// Model file in safetensors format [default: $EDGEPUCK_MODEL, else edge-64.safetensors (for
+    /// whole objects of ModelNet40), or street-128.safetensors for `live`, in weights/ beside this
+    /// program, in ../share/edgepuck/weights from there or in ./assets/weights]
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
 
@@ -29,16 +28,15 @@ pub struct ModelArgs {
 }
 
 impl ModelArgs {
-    /// The model's file and card.
+    /// The path and the card of the model.
     ///
     /// # Errors
-    /// None is found; it cannot be read; it is untrained, and that is not
-    /// allowed.
+    /// The model is not found or cannot be read, or is untrained without --allow-untrained.
     pub fn open(&self) -> anyhow::Result<(PathBuf, ModelCard)> {
         self.open_or(&NAMES)
     }
 
-    /// The same, where `names` are those of the bundled weights that will do.
+    /// The same, with `names` as the file names of suitable bundled weights.
     ///
     /// # Errors
     /// As [`ModelArgs::open`].
@@ -57,10 +55,10 @@ impl ModelArgs {
     }
 }
 
-/// The model `named`, or that of [`VARIABLE`], or the bundled one.
+/// The path of the model `named`, else of [`VARIABLE`], else of the bundled one.
 ///
 /// # Errors
-/// None is found.
+/// No model is found.
 pub fn find(named: Option<&Path>) -> Result<PathBuf, Usage> {
     find_or(named, &NAMES)
 }
@@ -84,16 +82,16 @@ fn find_or(named: Option<&Path>, names: &[&str]) -> Result<PathBuf, Usage> {
     })
 }
 
-/// Where bundled weights may lie.
+/// The folders that may have the bundled weights.
 fn folders() -> Vec<PathBuf> {
     let program = env::current_exe().ok();
     let beside = program.as_deref().and_then(Path::parent);
-    // An archive that was unpacked, and a package that was installed under /usr.
+    // The layouts of an unpacked archive, and of a package installed under /usr.
     let places =
         beside.map(|beside| ["weights", "../share/edgepuck/weights"].map(|at| beside.join(at)));
     let mut folders: Vec<PathBuf> = places.into_iter().flatten().collect();
     folders.push(Path::new("assets").join("weights"));
-    // A developer's build finds the weights of its own workspace.
+    // A debug build also finds the weights of its workspace.
     #[cfg(debug_assertions)]
     folders.push(Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/weights"));
     folders

@@ -1,18 +1,17 @@
-//! Names of files, one a line.
+//! Lists of file names, one per line.
 
 use std::borrow::Cow;
 use std::io::{self, BufRead, Read};
 use std::path::Path;
 
-/// No system has longer paths; a line without end must not fill the memory.
+/// The longest path of any system. The limit keeps an endless line from filling the memory.
 const LONGEST: u64 = 1 << 16;
 
-/// Calls `take` with each name in `list`, as soon as its line is there. Empty
-/// lines are passed over, as is a carriage return at a line's end; a line that
-/// is too long for a name is cut.
+/// Calls `take` with each name in `list`, as soon as its line has come. Empty lines and a carriage
+/// return at the end of a line are ignored; a line that is too long is truncated.
 ///
 /// # Errors
-/// Of reading, and of `take`.
+/// Errors of reading, and of `take`.
 pub fn for_each<E: From<io::Error>>(
     mut list: impl BufRead,
     mut take: impl FnMut(&Path) -> Result<(), E>,
@@ -27,8 +26,8 @@ pub fn for_each<E: From<io::Error>>(
     Ok(())
 }
 
-/// Reads a line into `line`, without its end and without what is too long.
-/// There was none if this is false.
+/// Reads a line into `line`, without the newline and truncated to [`LONGEST`]. Returns false at the
+/// end of the list.
 fn read_line(list: &mut impl BufRead, line: &mut Vec<u8>) -> io::Result<bool> {
     line.clear();
     let n_read = list.by_ref().take(LONGEST).read_until(b'\n', line)?;

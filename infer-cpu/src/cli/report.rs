@@ -1,4 +1,4 @@
-//! What `classify` says of a cloud: a line each, for people or for programs.
+//! The output of `classify`: one line per cloud, as text or JSON.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -8,10 +8,10 @@ use formats::outcome::say;
 use infer_cpu::{Precision, Prediction};
 use serde::Serialize;
 
-/// How lines are written.
+/// The format of lines.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Style {
-    /// Name, answer and confidence between tabs; all else on standard error.
+    /// Name, class and confidence, separated by tabs; warnings go to standard error.
     Text,
     /// One JSON object a line.
     Json,
@@ -42,7 +42,7 @@ fn is_zero(n: &usize) -> bool {
     *n == 0
 }
 
-/// A cloud without one.
+/// A failure as a line of JSON.
 #[derive(Serialize)]
 struct Failed<'a> {
     file: &'a str,
@@ -50,8 +50,8 @@ struct Failed<'a> {
 }
 
 impl Style {
-    /// Writes what was found of the cloud `name`, in `precision` if it could
-    /// be, and within `time`; the line is flushed.
+    /// Prints and flushes the prediction for the cloud `name`; `precision` is the requested one and
+    /// `time` the duration.
     ///
     /// # Errors
     /// Standard output cannot be written to.
@@ -85,7 +85,7 @@ impl Style {
         })
     }
 
-    /// Says that the cloud `name` failed by `error`.
+    /// Prints that the cloud `name` failed with `error`.
     ///
     /// # Errors
     /// Standard output cannot be written to.
@@ -100,7 +100,7 @@ impl Style {
     }
 }
 
-/// Says on standard error what a line of text has no place for.
+/// Prints warnings, which a line of text does not include.
 fn warn(name: &Path, prediction: &Prediction, precision: Precision) {
     let warn = |what: &str| say(format!("warning: {}: {what}", name.display()));
     match prediction.n_dropped {

@@ -1,4 +1,4 @@
-//! `infer-cpu sample`: some of a cloud's points, as a cloud.
+//! `infer-cpu sample`: reduces a cloud by a sampler.
 
 use std::collections::BTreeSet;
 use std::io::{Write, stdout};
@@ -27,7 +27,7 @@ The output holds the chosen points with the coordinates of the input. cpl
 normalizes the cloud as in training before it chooses points. If it repeats points
 to reach M, the output repeats them, too. The extension of the output file
 determines its format: PLY, NPZ, NPY, PCD, XYZ, CSV, .bin, LAS.")]
-pub struct Args {
+pub struct SampleArgs {
     /// Sampler that chooses the points: all, first, random, fps, voxel, cpl
     #[arg(long, value_name = "NAME")]
     sampler: SamplerKind,
@@ -35,14 +35,12 @@ pub struct Args {
     #[command(flatten)]
     how: SamplerArgs,
 
-    /// Drop points with NaN or infinite coordinates instead of rejecting the
-    /// cloud
+    /// Drop points with NaN or infinite coordinates instead of rejecting the cloud
     #[arg(long)]
     drop_invalid: bool,
 
-    /// Format of the input: ply, npz, npy, pcd, xyz, csv, kitti, las [default:
-    /// detected from the file extension, or from the first bytes of standard
-    /// input]
+    /// Format of the input: ply, npz, npy, pcd, xyz, csv, kitti, las [default: detected from the
+    /// file extension, or from the first bytes of standard input]
     #[arg(long)]
     format: Option<CloudFormat>,
 
@@ -56,13 +54,12 @@ pub struct Args {
     output: PathBuf,
 }
 
-/// Writes the points that are chosen.
+/// Writes the chosen points.
 ///
 /// # Errors
-/// A cloud or a model that cannot be read, a sampler that cannot be met, a file
-/// that cannot be written.
-pub fn run(args: &Args) -> anyhow::Result<Outcome> {
-    // What cannot be written should be known before a long choice.
+/// A cloud or a model that cannot be read; an invalid sampler; a file that cannot be written.
+pub fn run(args: &SampleArgs) -> anyhow::Result<Outcome> {
+    // An unknown extension fails before a long computation.
     CloudFormat::of_path(&args.output)?;
     let mut points = input::read(&args.input, args.format)?;
     if args.drop_invalid {
@@ -86,8 +83,8 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-/// The indices of the points to keep.
-fn choose(args: &Args, points: &[[f64; 3]]) -> anyhow::Result<Vec<u32>> {
+/// The indices of the chosen points.
+fn choose(args: &SampleArgs, points: &[[f64; 3]]) -> anyhow::Result<Vec<u32>> {
     let here = || args.input.display().to_string();
     if args.sampler != SamplerKind::Cpl {
         let spec = args.how.apply(Some(args.sampler), SamplerSpec::default())?;

@@ -1,10 +1,10 @@
-//! Flags that say how points are chosen.
+//! The flags of samplers.
 
 use infer_cpu::sampler::{FpsStart, FrontChoice, Resize, SamplerKind, SamplerSpec};
 
 use super::Usage;
 
-/// Flags beside the sampler's name.
+/// The flags besides the name of the sampler.
 #[derive(clap::Args, Default)]
 pub struct SamplerArgs {
     /// Number of points to keep [default: as in training, else 1024]
@@ -15,41 +15,39 @@ pub struct SamplerArgs {
     #[arg(long)]
     seed: Option<u64>,
 
-    /// First point of fps: `farthest` takes the point farthest from the
-    /// centroid, which does not depend on the order of the points; `first`
-    /// takes the first point of the cloud [default: as in training, else
-    /// farthest]
+    /// First point of fps: `farthest` takes the point farthest from the centroid, which does not
+    /// depend on the order of the points; `first` takes the first point of the cloud [default: as
+    /// in training, else farthest]
     #[arg(long, value_name = "WHERE")]
     fps_start: Option<FpsStart>,
 
-    /// Edge length of a voxel, instead of --points; `sample` takes it in the
-    /// unit of the cloud, `classify` in the unit of the normalized cloud
+    /// Edge length of a voxel, instead of --points; `sample` takes it in the unit of the cloud,
+    /// `classify` in the unit of the normalized cloud
     #[arg(long, value_name = "LENGTH", conflicts_with = "points")]
     voxel_size: Option<f64>,
 
-    /// Rule by which cpl resizes its set of critical points to M points:
-    /// truncate, cyclic, nearest, weighted [default: cyclic]
+    /// Rule by which cpl resizes its set of critical points to M points: truncate, cyclic, nearest,
+    /// weighted [default: cyclic]
     #[arg(long, value_name = "RULE")]
     resize: Option<Resize>,
 
-    /// Number of additional max poolings of cpl over the points that it has not
-    /// yet chosen [default: 0]
+    /// Number of additional max poolings of cpl over the points that it has not yet chosen
+    /// [default: 0]
     #[arg(long, value_name = "K")]
     passes: Option<usize>,
 
-    /// Layers whose features cpl pools: `own` is the model's own front end,
-    /// `stn` the trunk of its input T-Net, `trunk` its trunk, and `auto` the
-    /// first of these that the model has [default: auto]
+    /// Layers whose features cpl pools: `own` is the model's own front end, `stn` the trunk of its
+    /// input T-Net, `trunk` its trunk, and `auto` the first of these that the model has [default:
+    /// auto]
     #[arg(long, value_name = "NET")]
     front: Option<FrontChoice>,
 }
 
 impl SamplerArgs {
-    /// The sampler `kind` or that of `trained`, with these flags in place of
-    /// what `trained` has.
+    /// The sampler `kind`, or that of `trained`; these flags override the values of `trained`.
     ///
     /// # Errors
-    /// A flag that says nothing to the sampler.
+    /// A flag that does not apply to the sampler.
     pub fn apply(
         &self,
         kind: Option<SamplerKind>,

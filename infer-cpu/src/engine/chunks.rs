@@ -1,4 +1,4 @@
-//! What one thread does at a time.
+//! The chunks of work of one thread.
 
 use std::sync::atomic::Ordering;
 
@@ -25,17 +25,21 @@ impl<T: Format> Work for Engine<T> {
 }
 
 impl<T: Format> Engine<T> {
-    /// Takes block `slot` of a run up to a pass's last layer.
+    /// Computes the features of block `slot` of a run up to the last layer of a pass.
     fn hidden(&self, thread: usize, pass: Pass, run: Run, slot: usize) {
         let (feature, folded) = (read(&self.feature), read(&self.folded));
+        // Nothing writes these during a task, so the read locks never wait.
         let points = read(&self.points);
         let mut scratch = lock(&self.threads[thread]);
+        // A thread locks only its own scratch memory, so there is no contention.
         let ThreadScratch { edged, edge_scratch, wide, narrow: [from, to], .. } = &mut *scratch;
         let rows = block_rows(&points, run.block, run.first_block + slot);
         let n = rows.n();
         let first = self.first(pass);
         let mut width = first.panels.padded_outputs();
         match pass {
+            // These two see raw coordinates; the others see them after the input transform, with
+            // EdgeConv features.
             Pass::Front | Pass::Stn => self.multiply(&rows, &first.panels, wide, width),
             Pass::Fstn | Pass::Trunk => {
                 let rows = self.with_edge_features(&rows, edged, edge_scratch);
@@ -50,6 +54,7 @@ impl<T: Format> Engine<T> {
         self.round(&wide[..n * width], first.range, next, from);
         while let Some(layer) = next {
             next = layers.next();
+            // The last layer is pooled by `pool_group`, never stored.
             if next.is_none() {
                 break;
             }
@@ -81,6 +86,7 @@ impl<T: Format> Engine<T> {
         let edged = &mut edged[..rows.n() * stride];
         let points = rows.data().chunks_exact(rows.stride());
         for (point, row) in points.zip(edged.chunks_exact_mut(stride)) {
+            // Points have 4 numbers; in rows with features, the features begin after the third.
             row[..3].copy_from_slice(&point[..3]);
         }
         let rows_out = (&mut *edged, stride);
@@ -88,28 +94,31 @@ impl<T: Format> Engine<T> {
         Rows::new(edged, stride, rows.n())
     }
 
-    /// Rounds a layer's outputs for the layer `next`, and notes what is lost.
+    /// Rounds a layer's outputs to the input format of the layer `next`, and records range events.
     fn round(&self, wide: &[f32], range: f32, next: Option<&Packed<T>>, out: &mut [T::Activation]) {
         let met = T::narrow(self.kernels, wide, range, &mut out[..wide.len()]);
         if met.clipped > 0 {
+            // Relaxed suffices: `Team::run` synchronises before `events` reads the counters.
             self.clipped.fetch_add(met.clipped, Ordering::Relaxed);
         }
-        // No partial sum of the next layer exceeds this.
+        // `largest * gain` bounds every partial sum of the next layer, which fp16 kernels
+        // accumulate in fp16.
         let gain = next.map_or(1.0, |layer| layer.gain.max(1.0));
         if met.largest * gain > F16_LARGEST {
             self.overflow.store(true, Ordering::Relaxed);
         }
     }
 
-    /// Pools group `group` of a pass's last channels over some blocks.
+    /// Pools channel group `group` of the last layer of a pass over the blocks of a run.
     fn pool_group(&self, thread: usize, pass: Pass, run: Run, group: usize) {
         let Run { block: block_points, first_block, n_blocks, winners } = run;
         let (feature, folded) = (read(&self.feature), read(&self.folded));
         let last = self.last(pass, &feature, &folded);
         let n_points = read(&self.points).len() / 4;
         let stride = self.width_before_last(pass, &feature, &folded);
+        // One chunk of work owns a group, so the lock never waits.
         let mut pool = lock(&self.groups[group]);
-        // Later runs of blocks go on with the maxima of those before.
+        // Later runs continue with the maxima of the runs before.
         if first_block == 0 {
             pool.begin::<T>(last, group, winners);
         }
@@ -128,8 +137,9 @@ impl<T: Format> Engine<T> {
                     first_row,
                 )
             };
-            // A block whose products cannot be ruled out cheaply ends the prefilter for
-            // this group: those that follow will hardly be better.
+            // Once the prefilter rules out too few products of a block, it is off for the group:
+            // later blocks of the cloud are alike, since `Interleave` makes each a sample of the
+            // whole.
             if !is_pooled {
                 pool.prefilters &= !block.has_levels;
                 let first_row = winners.then_some(first_row as u32);
@@ -141,11 +151,12 @@ impl<T: Format> Engine<T> {
     fn width_before_last(&self, pass: Pass, feature: &Packed<T>, folded: &Packed<T>) -> usize {
         let first = self.first(pass).panels.padded_outputs();
         let widths = self.route(pass, feature, folded).map(Packed::width);
-        // The last but one, the first layer counted in.
+        // The width before the last layer; the first layer counts.
         std::iter::once(first).chain(widths).fold((0, 0), |(_, before), width| (before, width)).0
     }
 
     fn vector_chunk(&self, head: Head, layer: usize, chunk: usize) {
+        // The matrix exceeds the caches, so each thread reads its own part of it once.
         let columns = &self.head(head)[layer].columns;
         let first = chunk * VECTOR_CHUNK;
         let blocks = first..columns.n_panels().min(first + VECTOR_CHUNK);
@@ -156,9 +167,10 @@ impl<T: Format> Engine<T> {
 }
 
 impl<T: Format> Block<T> {
-    /// Keeps `rows` for the layer `next`.
+    /// Stores `rows` for the layer `next`.
     fn set(&mut self, kernels: &Kernels, rows: &Rows<'_, T::Activation>, next: &Packed<T>) {
         let n = rows.n() * rows.stride();
+        // A copy, since the thread overwrites its scratch memory with the next block.
         self.features[..n].copy_from_slice(&rows.data()[..n]);
         let plain = next.prefilter.as_ref().and_then(|_| T::as_f32(rows.data(), &mut []));
         self.has_levels = plain.is_some_and(|(data, _)| {
@@ -180,7 +192,7 @@ impl<S: Copy> Group<S> {
         }
     }
 
-    /// Pools rows whose levels are known; returns whether it did.
+    /// Pools rows by the prefilter; returns false if it gives up or does not apply.
     fn prefilter<T: Format<Sum = S>>(
         &mut self,
         kernels: &Kernels,
@@ -200,8 +212,8 @@ impl<S: Copy> Group<S> {
         prefilter.pool(kernels, group, (&rows, levels), prefilter_scratch, &mut best)
     }
 
-    /// Pools rows by all of their products, and keeps winners if their first
-    /// row is given.
+    /// Pools rows by computing all products; keeps the winners if the number of the first row is
+    /// given.
     fn multiply<T: Format<Sum = S>>(
         &mut self,
         kernels: &Kernels,
@@ -210,6 +222,7 @@ impl<S: Copy> Group<S> {
         first_row: Option<u32>,
     ) {
         let gemm = T::gemm(kernels).expect("invariant: kernels fit the format");
+        // GROUP is a multiple of every `nr`, so that a group is a range of whole panels.
         let first = group * GROUP / gemm.nr;
         let channels = n_channels(last, group);
         let panels = first..first + channels / gemm.nr;
@@ -221,12 +234,12 @@ impl<S: Copy> Group<S> {
     }
 }
 
-/// Channels of a group, padding included.
+/// The number of channels of a group, padding included.
 fn n_channels<T: Format>(last: &Packed<T>, group: usize) -> usize {
     GROUP.min(last.width() - group * GROUP)
 }
 
-/// The rows of block `block` of `points`, of `size` each but for the last.
+/// The rows of block `block` of `points`; every block has `size` rows, the last one may have fewer.
 fn block_rows(points: &[f32], size: usize, block: usize) -> Rows<'_, f32> {
     let n = size.min(points.len() / 4 - block * size);
     Rows::new(&points[block * size * 4..][..n * 4], 4, n)

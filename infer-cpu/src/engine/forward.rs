@@ -7,70 +7,69 @@ use super::{
     Engine, GROUP, Head, Interleave, Pass, RUN_BLOCKS, RangeEvents, Run, SMALL_VECTOR, Task,
     VECTOR_BLOCK, VECTOR_CHUNK, block_points, lock, read, write,
 };
-use crate::kernel::{Panels, Rows};
+use crate::kernel::{Panels, Rows, Sum};
 use crate::layers::Conv;
 use crate::precision::{Format, Matrix};
 use crate::team::{Team, Work};
 
-/// The feature transform is multiplied into the layer after it when it takes
-/// fewer products to do so: for `n` points and a layer of so many `outputs`.
+/// Whether it takes fewer products to multiply the feature transform into the layer after it, for
+/// `n` points and a layer with this number of `outputs`.
 #[must_use]
 pub const fn folding_pays(n: usize, outputs: usize) -> bool {
     n > outputs
 }
 
-/// What a network is run on.
+/// The input of a network.
 #[derive(Clone, Copy)]
 pub struct Input<'a> {
-    /// The points that it sees.
+    /// The points that the network processes.
     pub points: &'a [[f32; 3]],
-    /// The cloud in which EdgeConv layers look for a point's neighbors.
+    /// The cloud in which EdgeConv layers search for neighbours.
     pub cloud: &'a [[f32; 3]],
-    /// Whether [`Scratch::values`] holds the vector that the coordinates'
-    /// T-Net pools of these points, or of a cloud that pools to the same.
+    /// Whether [`Scratch::values`] already holds the pooled vector of the coordinates' T-Net for
+    /// these points.
     pub pooled_stn: bool,
 }
 
-/// The caller's own memory of forward passes.
+/// The caller's working memory for forward passes.
 #[derive(Default)]
 pub struct Scratch {
-    /// The pooled vector, and what follows from it: the logits in the end.
+    /// The pooled vector, and then the outputs of the vector layers; after a whole run, the logits.
     pub values: Vec<f32>,
-    /// Which point won each channel, after a pass that keeps them.
+    /// The point that won each channel, after a pass that keeps winners.
     pub winners: Vec<u32>,
-    /// What passes met that left a format's range, since the caller reset it.
+    /// The range events of all passes since the caller reset them.
     pub events: RangeEvents,
     product: Vec<f32>,
 }
 
 impl Scratch {
-    /// Makes room for a pooling of `channels`.
+    /// Allocates memory for a pooling of `channels`.
     pub fn reserve(&mut self, channels: usize) {
         self.values.reserve(channels.saturating_sub(self.values.len()));
         self.winners.reserve(channels.saturating_sub(self.winners.len()));
     }
 }
 
-/// A network behind whichever format.
+/// A network in any number format.
 ///
-/// A run takes all it needs by its arguments: no call depends on those before.
+/// A run depends on its arguments alone, not on earlier calls.
 pub trait Forward: Send + Sync {
-    /// Makes room for clouds of `n` points.
+    /// Allocates memory for clouds of `n` points.
     fn reserve(&self, n: usize);
-    /// Takes `input` through the whole network; the logits are left in
-    /// `scratch.values`, and what left the format's range is added to
-    /// `scratch.events`.
+    /// Runs the whole network; the logits are in `scratch.values` afterwards, and range events are
+    /// added to `scratch.events`.
     fn run(&self, input: &Input<'_>, scratch: &mut Scratch);
-    /// Pools the features of `pass` into `scratch.values`, with the points
-    /// that won in `scratch.winners`.
+    /// Pools the features of `pass` into `scratch.values`, and the winning points into
+    /// `scratch.winners`.
     fn pool_winners(&self, pass: Pass, input: &Input<'_>, scratch: &mut Scratch);
-    /// How many features `pass` pools.
+    /// The number of features that `pass` pools.
     fn channels(&self, pass: Pass) -> usize;
-    /// Memory that no run outgrows.
+    /// Working memory that is large enough for every run.
     fn scratch(&self) -> Scratch;
-    /// How many classes the network tells apart.
+    /// The number of classes.
     fn n_classes(&self) -> usize;
-    /// The same network, for one thread and with memory of its own.
+    /// The same network, for one thread and with its own working memory.
     fn twin(&self) -> std::io::Result<Box<dyn Forward>>;
 }
 
@@ -78,6 +77,7 @@ impl<T: Format> Forward for Team<Engine<T>> {
     fn reserve(&self, n: usize) {
         let engine = self.work();
         let mut points = write(&engine.points);
+        // A point has four numbers, so that kernels read whole vectors.
         let missing = (n * 4).saturating_sub(points.len());
         points.reserve(missing);
         if !engine.edges.is_empty() {
@@ -127,7 +127,7 @@ impl<T: Format> Forward for Team<Engine<T>> {
 }
 
 impl<T: Format> Engine<T> {
-    /// Takes `input` through every layer that there is.
+    /// Runs every layer of the network, the front end included.
     pub fn observe(team: &Team<Self>, input: &Input<'_>, scratch: &mut Scratch) {
         if team.work().layers.front.is_some() {
             team.pool_winners(Pass::Front, input, scratch);
@@ -139,6 +139,7 @@ impl<T: Format> Engine<T> {
         let engine = team.work();
         let n_points = read(&engine.points).len() / 4;
         if engine.layers.stn.is_some() {
+            // A Critical Points Layer may have left the pooled vector in `values`.
             if !pooled_stn {
                 Self::pool(team, Pass::Stn, false, scratch);
             }
@@ -162,11 +163,11 @@ impl<T: Format> Engine<T> {
         let block = block_points(n_points, engine.threads.len());
         let n_blocks = n_points.div_ceil(block);
         let width = engine.last_width(pass);
-        // Blocks go in runs, so that the features kept before the last layer are
-        // bounded whatever the cloud's size.
+        // A run bounds the features that are kept before the last layer, for clouds of any size.
         for first_block in (0..n_blocks).step_by(RUN_BLOCKS) {
             let n_blocks = RUN_BLOCKS.min(n_blocks - first_block);
             let run = Run { block, first_block, n_blocks, winners };
+            // A group pools all blocks of the run, so their features must be complete first.
             engine.begin(Task::Hidden { pass, run });
             team.run(n_blocks);
             engine.begin(Task::Pool { pass, run });
@@ -175,7 +176,8 @@ impl<T: Format> Engine<T> {
         engine.collect(pass, winners, scratch);
     }
 
-    /// Scales, biases and ReLU, once for the maxima: all of them keep order.
+    /// Applies scale, bias and ReLU to the maxima alone, which is exact, since all three are
+    /// monotonic.
     fn collect(&self, pass: Pass, winners: bool, scratch: &mut Scratch) {
         let (feature, folded) = (read(&self.feature), read(&self.folded));
         let panels = &self.last(pass, &feature, &folded).panels;
@@ -191,18 +193,20 @@ impl<T: Format> Engine<T> {
             }
             for (channel, &sum) in channels.zip(&group.maxima) {
                 let scale = panels.scales().get(channel).copied().unwrap_or(1.0);
-                let value = T::widen(sum) * scale + panels.biases()[channel];
-                let is_cut = panels.relu() && value < 0.0;
+                let value = sum.to_f32() * scale + panels.biases()[channel];
+                // A comparison instead of `max`, which would turn NaN into 0 and hide an overflow.
+                let is_cut = panels.relu && value < 0.0;
                 scratch.values.push(if is_cut { 0.0 } else { value });
             }
         }
     }
 
-    /// Takes `values` through the layers of `head`, in place.
+    /// Runs the layers of `head` on `values`, in place.
     fn vectors(team: &Team<Self>, head: Head, values: &mut Vec<f32>) {
         let engine = team.work();
         for (i, layer) in engine.head(head).iter().enumerate() {
             let nonzero = values.iter().enumerate().filter(|&(_, &value)| value != 0.0);
+            // After a ReLU many inputs are 0, and the kernel skips their columns.
             let mut vector = write(&engine.vector);
             vector.clear();
             vector.extend(nonzero.map(|(j, &value)| (j as u32, value)));
@@ -210,6 +214,7 @@ impl<T: Format> Engine<T> {
             engine.begin(Task::Vector { head, layer: i });
             let columns = &layer.columns;
             let n_chunks = columns.n_panels().div_ceil(VECTOR_CHUNK);
+            // Waking the team would take longer than this product.
             if columns.inputs() * columns.outputs() < SMALL_VECTOR {
                 (0..n_chunks).for_each(|chunk| engine.chunk(0, chunk));
             } else {
@@ -222,14 +227,14 @@ impl<T: Format> Engine<T> {
                 values.extend(out.iter().take(left));
             }
             if layer.relu {
-                // NaN is not below 0: an overflow is still seen in the logits.
+                // NaN is not below 0, so an overflow stays visible in the logits.
                 values.iter_mut().filter(|value| **value < 0.0).for_each(|value| *value = 0.0);
             }
         }
     }
 
-    /// Notes a transform that is not finite, which the ReLU of the layers that
-    /// it turns would hide: kernels take NaN for 0.
+    /// Records an overflow if a transform is not finite. The ReLU of later layers would hide it,
+    /// since kernels turn NaN into 0.
     fn note_overflow(&self, transform: &[f32]) {
         if !transform.iter().all(|value| value.is_finite()) {
             self.overflow.store(true, Ordering::Relaxed);
@@ -240,14 +245,16 @@ impl<T: Format> Engine<T> {
         self.layers.trunk[0].first().turn(transform, &mut write(&self.entry));
     }
 
-    /// Packs the feature transform `[k, k]`, by itself or in the layer after
-    /// it, whichever takes fewer products for `n` points.
+    /// Packs the feature transform `[k, k]` as a layer of its own or multiplied into the layer
+    /// after it, whichever takes fewer products for `n` points.
     fn set_feature_transform(&self, scratch: &mut Scratch, n: usize) {
         let Scratch { values: transform, product, .. } = scratch;
         let Conv::Turned(after, plain) = &self.layers.trunk[self.layers.transform_after] else {
             unreachable!("invariant: the layer after a feature transform has that role");
         };
         let k = plain.inputs();
+        // An unsigned format cannot hold the negative outputs of the transform, and an observing
+        // engine needs the outputs of the layers of the file.
         let fold = !T::SIGNED || self.observing || folding_pays(n, after.panels.outputs());
         self.fold.store(fold, Ordering::Relaxed);
         let range = self.range_before_transform();
@@ -256,6 +263,7 @@ impl<T: Format> Engine<T> {
             return;
         }
         let width = plain.padded_outputs();
+        // Within the capacity of `Forward::scratch`, so that this does not allocate.
         product.resize(k * width, 0.0);
         let rows = Rows::new(transform, k, k);
         self.multiply(&rows, plain, product, width);

@@ -1,9 +1,8 @@
-//! The order in which points come to the kernels.
+//! The order of the points in the kernels.
 //!
-//! Callers sort points, so neighbours follow each other, and a block of them
-//! knows one corner of the cloud. Taken a golden section of the cloud apart, any
-//! block is a sample of the whole, and the first few come close to the
-//! largest products: there is less left for a [`crate::prefilter`] to compute.
+//! Callers sort the points, so that a block would cover only one corner of the cloud. With steps of
+//! a golden section of the cloud, every block is a sample of the whole. The first blocks then come
+//! close to the largest products, which leaves less for the [`crate::prefilter`] to compute.
 
 /// A permutation of the points.
 #[derive(Clone, Copy, Debug, Default)]
@@ -16,14 +15,14 @@ impl Interleave {
     /// The order for `n` points.
     pub fn new(n: usize) -> Self {
         let n = n as u64;
-        // (√5 - 1) / 2: no other ratio leaves rows more evenly spread (Knuth,
-        // TAOCP vol. 3, §6.4, theorem S).
+        // (√5 - 1) / 2: no other ratio leaves rows more evenly spread (Knuth, TAOCP vol. 3, §6.4,
+        // theorem S).
         let golden = (n as f64 * 0.618_033_988_749_895).round() as u64;
         let step = (golden.max(1)..=n).find(|&step| gcd(step, n) == 1).unwrap_or(1);
         Self { n, step }
     }
 
-    /// Which point comes at row `row`.
+    /// The point in row `row`.
     pub fn point(self, row: usize) -> usize {
         (row as u64 * self.step % self.n.max(1)) as usize
     }

@@ -1,15 +1,14 @@
-//! The forward pass, shared out over a team of threads.
+//! The forward pass, divided among a team of threads.
 //!
-//! A *pass* takes all points through point-wise layers and pools them: that of
-//! each T-Net, of the trunk, of a front end. Points go in blocks of
-//! [`BLOCK`]; a few blocks' features before the last layer are kept
-//! ([`RUN_BLOCKS`]), and the last layer's are pooled as they arise, never
-//! stored. The last layer is shared out by output channels, so that a core's
-//! share of its weights stays in that core's cache while points stream by.
+//! A *pass* runs point-wise layers on all points and pools the result: the passes are the T-Nets,
+//! the trunk and the front end. Points are processed in blocks of [`BLOCK`]. The features before
+//! the last layer are kept for a few blocks ([`RUN_BLOCKS`]); the outputs of the last layer are
+//! pooled at once and never stored. The last layer is divided by output channels, so that a core's
+//! share of the weights stays in its cache while points stream by.
 //!
-//! Every output is computed by one thread in a fixed order, so results are the
-//! same for any number of threads. All memory is allocated when the engine is
-//! built, but for points beyond any seen before.
+//! One thread computes each output in a fixed order, so results are the same for any number of
+//! threads. All memory is allocated when the engine is built, except for the points of the largest
+//! cloud so far.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
@@ -30,22 +29,22 @@ pub use forward::{Forward, Input, Scratch, folding_pays};
 use interleave::Interleave;
 use route::stacks;
 
-/// Points of a block at most: whole tiles of every kernel, and few enough that their
-/// features stay in a first-level cache.
+/// The most points of a block: whole tiles of every kernel, and few enough that their features stay
+/// in a first-level cache.
 pub const BLOCK: usize = 48;
-/// Points of a block are a multiple of this: whole tiles of most kernels.
+/// The size of a block is a multiple of this: whole tiles of most kernels.
 const BLOCK_STEP: usize = 8;
 /// Blocks whose features are kept: 1,056 points, 540 KiB for 128 features.
 pub const RUN_BLOCKS: usize = 22;
-/// Blocks of outputs (64 each) of a vector layer that a thread does at a time.
+/// Blocks of 64 outputs of a vector layer in one chunk of work.
 pub const VECTOR_CHUNK: usize = 2;
 /// Outputs of a block of a vector layer.
 pub const VECTOR_BLOCK: usize = GEMV_NR;
-/// A vector layer of fewer products than this is not worth sharing out.
+/// A vector layer of fewer products than this runs in one thread: waking others would take longer.
 pub const SMALL_VECTOR: usize = 1 << 15;
 
-/// How many points a block has where `n_threads` share out `n_points`: as many as leave no
-/// thread idle while others work.
+/// The number of points of a block when `n_threads` divide `n_points`, chosen so that no thread is
+/// idle while others work.
 #[must_use]
 pub fn block_points(n_points: usize, n_threads: usize) -> usize {
     let n_threads = n_threads.clamp(1, RUN_BLOCKS);
@@ -53,7 +52,7 @@ pub fn block_points(n_points: usize, n_threads: usize) -> usize {
     n_points.div_ceil(n_threads * rounds).next_multiple_of(BLOCK_STEP).clamp(BLOCK_STEP, BLOCK)
 }
 
-/// What is taken through which layers.
+/// A sequence of point-wise layers that ends in a pooling.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pass {
     /// The front end of a Critical Points Layer.
@@ -66,7 +65,7 @@ pub enum Pass {
     Trunk,
 }
 
-/// Which vector layers.
+/// A sequence of vector layers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Head {
     Stn,
@@ -74,18 +73,18 @@ enum Head {
     Class,
 }
 
-/// The task that the team is at.
+/// The current task of the team.
 #[derive(Clone, Copy)]
 enum Task {
-    /// Features of blocks of points before a pass's last layer.
+    /// Compute the features of blocks of points before the last layer of a pass.
     Hidden { pass: Pass, run: Run },
-    /// The last layer and its maxima, of some blocks.
+    /// Compute the last layer of these blocks and pool it.
     Pool { pass: Pass, run: Run },
-    /// One vector layer.
+    /// Compute one vector layer.
     Vector { head: Head, layer: usize },
 }
 
-/// Blocks whose features are at hand, and whether to keep the points that win.
+/// The blocks of a run, and whether to keep the winning points.
 #[derive(Clone, Copy)]
 struct Run {
     /// Points of a block, but for the last.
@@ -95,12 +94,12 @@ struct Run {
     winners: bool,
 }
 
-/// A network of format `T` and the memory that it works in.
+/// A network of format `T` and its working memory.
 pub struct Engine<T: Format> {
     kernels: &'static Kernels,
-    /// Engines of one model share them.
+    /// Shared by all engines of one model.
     layers: Arc<Layers<T>>,
-    /// The trunk's first layer, behind the input transform.
+    /// The trunk's first layer, multiplied by the input transform.
     entry: RwLock<Panels<f32>>,
     feature: RwLock<Packed<T>>,
     folded: RwLock<Packed<T>>,
@@ -109,12 +108,12 @@ pub struct Engine<T: Format> {
     /// Rows x, y, z, 0, in the order of [`Interleave`].
     points: RwLock<Vec<f32>>,
     edges: EdgeConv,
-    /// All points among which `edges` looks for neighbours.
+    /// All points in which `edges` searches for neighbours.
     cloud: RwLock<Neighborhood>,
     blocks: Vec<RwLock<Block<T>>>,
     groups: Vec<Mutex<Group<T::Sum>>>,
     threads: Vec<Mutex<ThreadScratch<T>>>,
-    /// The input of the vector layer at hand: what is not 0.
+    /// The nonzero inputs of the current vector layer, with their indices.
     vector: RwLock<Vec<(u32, f32)>>,
     vector_out: Vec<Mutex<Vec<f32>>>,
     clipped: AtomicU64,
@@ -125,12 +124,12 @@ pub struct Engine<T: Format> {
 /// Features of up to [`BLOCK`] points before the last layer.
 struct Block<T: Format> {
     features: Vec<T::Activation>,
-    /// The same in levels, if they have any.
+    /// The features in levels, if `has_levels`.
     levels: Levels,
     has_levels: bool,
 }
 
-/// Maxima of [`GROUP`] channels, and the points that gave them.
+/// The maxima of [`GROUP`] channels, and the points that attain them.
 struct Group<S> {
     maxima: Vec<S>,
     winners: Vec<u32>,
@@ -138,7 +137,7 @@ struct Group<S> {
     prefilters: bool,
 }
 
-/// A thread's own memory: a block's features, before and after rounding.
+/// The working memory of a thread: the features of a block, before and after rounding.
 struct ThreadScratch<T: Format> {
     /// Points with their EdgeConv features.
     edged: Vec<f32>,
@@ -158,7 +157,7 @@ pub struct RangeEvents {
 }
 
 impl RangeEvents {
-    /// Adds those of further passes.
+    /// Adds the events of further passes.
     pub fn add(&mut self, further: Self) {
         self.clipped += further.clipped;
         self.overflow |= further.overflow;
@@ -166,8 +165,8 @@ impl RangeEvents {
 }
 
 impl<T: Format> Engine<T> {
-    /// An engine for `layers` and a team of `n_threads`. One that observes
-    /// keeps the largest activation of each layer.
+    /// An engine for `layers` and a team of `n_threads`. If it is `observing`, it keeps the largest
+    /// activation of each layer.
     pub fn new(
         layers: Arc<Layers<T>>,
         kernels: &'static Kernels,
@@ -181,18 +180,21 @@ impl<T: Format> Engine<T> {
         });
         let (feature, folded) = match transformed {
             Some((k, after)) => {
+                // Only the weights depend on the cloud; bias and ReLU are those of the layer after
+                // the transform.
                 let mut folded = Packed::zeros(kernels, k, after.panels.outputs());
                 folded.name.clone_from(&after.name);
                 folded.panels.biases_mut().copy_from_slice(after.panels.biases());
-                folded.panels.set_relu(after.panels.relu());
+                folded.panels.relu = after.panels.relu;
                 folded.range = after.range;
                 (Packed::zeros(kernels, k, k), folded)
             }
             None => (Packed::zeros(kernels, 1, 1), Packed::zeros(kernels, 1, 1)),
         };
-        let Widths { hidden, pooled, vector } = Widths::of(&layers);
+        let Widths { hidden, pooled, vector } = Widths::new(&layers);
         let prefilters = pooled_layers(&layers).any(|layer| layer.prefilter.is_some());
         let edges = EdgeConv::new(&layers.edges);
+        // Without EdgeConv layers, rows are the points themselves.
         let edged = if edges.is_empty() { 0 } else { BLOCK * trunk_first.panels.padded_inputs() };
         let edge_scratch = edges.scratch(BLOCK);
         let thread = || ThreadScratch {
@@ -200,15 +202,12 @@ impl<T: Format> Engine<T> {
             edge_scratch: edge_scratch.clone(),
             wide: vec![0.0; BLOCK * hidden],
             narrow: [(); 2].map(|()| vec![T::Activation::default(); BLOCK * hidden]),
-            prefilter_scratch: if prefilters {
-                PrefilterScratch::new(BLOCK)
-            } else {
-                PrefilterScratch::new(0)
-            },
+            prefilter_scratch: PrefilterScratch::new(if prefilters { BLOCK } else { 0 }),
         };
         let group =
             || Group { maxima: vec![T::LOWEST; GROUP], winners: vec![0; GROUP], prefilters: false };
         let block = || {
+            // Blocks outlive a task: one thread computes a block, and all threads pool it.
             RwLock::new(Block {
                 features: vec![T::Activation::default(); BLOCK * hidden],
                 levels: Levels::with_room(if prefilters { BLOCK * hidden } else { 0 }),
@@ -222,11 +221,13 @@ impl<T: Format> Engine<T> {
             feature: RwLock::new(feature),
             folded: RwLock::new(folded),
             fold: AtomicBool::new(false),
+            // Any task will do before the first `begin`.
             task: RwLock::new(Task::Vector { head: Head::Class, layer: 0 }),
             points: RwLock::new(Vec::new()),
             edges,
             cloud: RwLock::default(),
             blocks: (0..RUN_BLOCKS).map(|_| block()).collect(),
+            // Enough for the widest pass; the others use the first ones.
             groups: (0..pooled.div_ceil(GROUP)).map(|_| Mutex::new(group())).collect(),
             threads: (0..n_threads.max(1)).map(|_| Mutex::new(thread())).collect(),
             vector: RwLock::new(Vec::with_capacity(vector)),
@@ -240,13 +241,13 @@ impl<T: Format> Engine<T> {
         }
     }
 
-    /// Takes `input` for the pass that follows, and forgets what earlier ones
-    /// met.
+    /// Stores `input` for the next pass, and resets the range events.
     fn take(&self, input: &Input<'_>) {
         let Input { points, cloud, .. } = *input;
         let mut rows = write(&self.points);
         rows.clear();
         let interleave = Interleave::new(points.len());
+        // The order does not change a maximum, only how early the prefilter finds it.
         let in_order = (0..points.len()).map(|row| points[interleave.point(row)]);
         rows.extend(in_order.flat_map(|[x, y, z]| [x, y, z, 0.0]));
         if !self.edges.is_empty() {
@@ -272,6 +273,7 @@ impl<T: Format> Engine<T> {
                 _ => (conv.packed().name.clone(), conv.packed().seen.get()),
             })
             .collect();
+        // The folded layer stands in for the layer of the file with the same name.
         let folded = read(&self.folded);
         for (name, largest) in &mut seen {
             if *name == folded.name {
@@ -295,7 +297,7 @@ impl<T: Format> Engine<T> {
     }
 }
 
-/// How large an engine's buffers must be, in elements of a row.
+/// The sizes of an engine's buffers, in elements of a row.
 struct Widths {
     /// Features between point-wise layers.
     hidden: usize,
@@ -306,7 +308,7 @@ struct Widths {
 }
 
 impl Widths {
-    fn of<T: Format>(layers: &Layers<T>) -> Self {
+    fn new<T: Format>(layers: &Layers<T>) -> Self {
         let nets = [&layers.stn, &layers.fstn].into_iter().flatten();
         let fcs = nets.flat_map(|net| &net.fcs).chain(&layers.head);
         let columns = fcs.map(|layer| &layer.columns);
@@ -325,8 +327,7 @@ fn pooled_layers<T: Format>(layers: &Layers<T>) -> impl Iterator<Item = &Packed<
     stacks(layers).filter_map(<[_]>::last).map(Conv::packed)
 }
 
-/// Locks cannot be poisoned but by a panic, which is a defect that a caller
-/// must see.
+/// Only a panic of another thread poisons a lock. It is a defect, which the caller must see.
 fn read<V>(lock: &RwLock<V>) -> std::sync::RwLockReadGuard<'_, V> {
     lock.read().unwrap_or_else(|_| panic!("a worker panicked"))
 }

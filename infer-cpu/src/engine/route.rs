@@ -1,4 +1,4 @@
-//! Which layers a pass goes through.
+//! The layers of each pass.
 
 use std::sync::atomic::Ordering;
 
@@ -17,15 +17,15 @@ fn front<T: Format>(layers: &Layers<T>) -> &[Conv<T>] {
     layers.front.as_deref().unwrap_or_default()
 }
 
-/// The point-wise layers of each part of a network, those of a missing part left out.
+/// The point-wise layers of each part that the network has.
 pub(super) fn stacks<T: Format>(layers: &Layers<T>) -> impl Iterator<Item = &[Conv<T>]> {
     let stacks = [convs(&layers.stn), convs(&layers.fstn), &layers.trunk, front(layers)];
     stacks.into_iter().filter(|convs| !convs.is_empty())
 }
 
 impl<T: Format> Engine<T> {
-    /// The layers of `pass` after its first. The feature transform is a layer of its
-    /// own, or `folded` into the one after it.
+    /// The layers of `pass` after its first. The feature transform is a layer of its own, or
+    /// `folded` into the one after it.
     pub(super) fn route<'a>(
         &'a self,
         pass: Pass,
@@ -35,12 +35,14 @@ impl<T: Format> Engine<T> {
         let Network { stn, trunk, fstn, transform_after, .. } = &*self.layers;
         let after = *transform_after;
         let fold = self.fold.load(Ordering::Relaxed);
-        // Up to the transform, through it, on.
+        // The layers before the transform, the transform, and those after it.
         let (stem, through, rest): (_, _, &[Conv<T>]) = match pass {
             Pass::Front => (&front(&self.layers)[1..], None, &[]),
             Pass::Stn => (&convs(stn)[1..], None, &[]),
+            // The T-Net of features branches off the trunk before the transform.
             Pass::Fstn => (&trunk[1..after], None, convs(fstn)),
             Pass::Trunk if fstn.is_none() => (&trunk[1..], None, &[]),
+            // The folded layer replaces the transform and the layer after it.
             Pass::Trunk if fold => (&trunk[1..after], Some(folded), &trunk[after + 1..]),
             Pass::Trunk => (&trunk[1..after], Some(feature), &trunk[after..]),
         };

@@ -1,5 +1,5 @@
-//! AVX2 with FMA and F16C: tiles of 6 rows by 16 channels, 12 of the 16
-//! registers accumulating. See [`super::x86`] for the loops.
+//! AVX2 with FMA and F16C: tiles of 6 rows by 16 channels, whose sums take 12 of the 16 registers.
+//! See [`super::x86`] for the loops.
 
 use std::arch::x86_64::*;
 
@@ -25,6 +25,7 @@ implement!(Vector for __m256 {
     fn add(self, other: Self) -> Self = _mm256_add_ps(self, other);
     fn max(self, other: Self) -> Self = _mm256_max_ps(self, other);
     fn keep_greater(self, best: &mut Self, who: &mut Self::Int, index: Self::Int) = {
+        // An ordered comparison: NaN is never greater.
         let greater = _mm256_cmp_ps::<_CMP_GT_OQ>(self, *best);
         *best = _mm256_blendv_ps(*best, self, greater);
         *who = _mm256_blendv_epi8(*who, index, _mm256_castps_si256(greater))
@@ -59,6 +60,7 @@ implement!(Lanes for __m256 {
         _mm_storeu_si128(to.cast(), _mm256_cvtps_ph::<_MM_FROUND_TO_NEAREST_INT>(self));
     fn store_u8(self, to: *mut u8) = {
         let ints = _mm256_cvtps_epi32(self);
+        // Packing works within halves of 128 bits, so both halves are packed into one.
         let words =
             _mm_packs_epi32(_mm256_castsi256_si128(ints), _mm256_extracti128_si256::<1>(ints));
         _mm_storel_epi64(to.cast(), _mm_packus_epi16(words, words))
@@ -78,7 +80,7 @@ implement!(Lanes for __m256 {
         _mm_cvtss_f32(_mm_add_ss(two, _mm_movehdup_ps(two)))
     };
     fn dot4(sum: Self::Int, a: Self::Int, w: Self::Int) -> Self::Int = {
-        // Two products of at most 127 * 127 fit 16 bits: nothing saturates.
+        // Two products of at most 127 * 127 fit into 16 bits, so nothing saturates.
         let pairs = _mm256_maddubs_epi16(a, w);
         _mm256_add_epi32(sum, _mm256_madd_epi16(pairs, _mm256_set1_epi16(1)))
     };

@@ -1,8 +1,7 @@
-//! AVX-512 with VNNI: tiles of 12 rows by 32 channels, 24 of the 32 registers
-//! accumulating. See [`super::x86`] for the loops.
+//! AVX-512 with VNNI: tiles of 12 rows by 32 channels, whose sums take 24 of the 32 registers. See
+//! [`super::x86`] for the loops.
 //!
-//! VNNI is asked for as a whole: machines with AVX-512 but without it (before
-//! Cascade Lake) take AVX2.
+//! VNNI is required: machines with AVX-512 but without VNNI (before Cascade Lake) use AVX2.
 
 use std::arch::x86_64::*;
 
@@ -29,6 +28,7 @@ implement!(Vector for __m512 {
     fn add(self, other: Self) -> Self = _mm512_add_ps(self, other);
     fn max(self, other: Self) -> Self = _mm512_max_ps(self, other);
     fn keep_greater(self, best: &mut Self, who: &mut Self::Int, index: Self::Int) = {
+        // An ordered comparison: NaN is never greater.
         let greater = _mm512_cmp_ps_mask::<_CMP_GT_OQ>(self, *best);
         *best = _mm512_mask_mov_ps(*best, greater, self);
         *who = _mm512_mask_mov_epi32(*who, greater, index)

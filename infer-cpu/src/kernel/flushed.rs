@@ -1,6 +1,5 @@
-//! What a caller's thread does with subnormal numbers must not show in a class:
-//! the promise of the module above, on a processor that flushes them to 0 and on
-//! one that does not.
+//! Tests that logits are the same whether or not the caller's thread flushes subnormal numbers to
+//! 0, as the module above states.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -19,16 +18,15 @@ use crate::{Classifier, Options};
 #[path = "../../tests/support/tiny_model.rs"]
 mod tiny_model;
 
-/// Runs `work` on this thread while its arithmetic flushes subnormal numbers, taken
-/// and given, to 0.
+/// Runs `work` on this thread while its arithmetic flushes subnormal operands and results to 0.
 ///
-/// Rust does not model the processor's mode: the compiler may move arithmetic out of a
-/// region between two `asm!` blocks that change it. It cannot move anything out of a
-/// function that [`call_flushed`] calls, since all it sees of the call is a pointer.
+/// Rust does not model the processor's mode: the compiler may move arithmetic out of a region
+/// between two `asm!` blocks that change it. It cannot move anything out of a function that
+/// [`call_flushed`] calls through a pointer.
 fn flushed<T>(work: impl FnOnce() -> T) -> T {
     let mut call = Call { work: Some(work), result: None };
-    // SAFETY: `run` gets a pointer to the `Call` of its own types, which outlives the
-    // call and is used by nothing else meanwhile. `run` does not unwind.
+    // SAFETY: `Call::entry` gives the `run` of the same `Call<F, T>`, which outlives the call and
+    // is not used elsewhere meanwhile. `run` does not unwind.
     unsafe { call_flushed((&raw mut call).cast(), call.entry()) };
     match call.result.expect("the trampoline calls `run`") {
         Ok(result) => result,
@@ -36,7 +34,7 @@ fn flushed<T>(work: impl FnOnce() -> T) -> T {
     }
 }
 
-/// What is to be called, and what came of it.
+/// A function to call, and its result.
 struct Call<F, T> {
     work: Option<F>,
     result: Option<std::thread::Result<T>>,
@@ -53,7 +51,7 @@ impl<F: FnOnce() -> T, T> Call<F, T> {
     /// # Safety
     /// `call` points to a `Call` of these types that nothing else uses.
     unsafe extern "C" fn run(call: *mut c_void) {
-        // SAFETY: this function's contract.
+        // SAFETY: `flushed` passes a pointer to a `Call` of these types that it owns.
         let call = unsafe { &mut *call.cast::<Self>() };
         let work = call.work.take().expect("the trampoline calls `run` once");
         // A panic must not pass the trampoline, which has no unwind tables.
@@ -61,8 +59,8 @@ impl<F: FnOnce() -> T, T> Call<F, T> {
     }
 }
 
-/// Calls `entry(data)` while bits 15 (flush to zero) and 6 (denormals are zeros) of
-/// MXCSR are set (Intel's manual, volume 1, 10.2.3), and restores MXCSR.
+/// Calls `entry(data)` while bits 15 (flush to zero) and 6 (denormals are zeros) of MXCSR are set
+/// (Intel's manual, volume 1, 10.2.3), and restores MXCSR.
 ///
 /// # Safety
 /// `entry` may be called with `data`, and does not unwind.
@@ -86,8 +84,8 @@ unsafe extern "C" fn call_flushed(data: *mut c_void, entry: Entry) {
     )
 }
 
-/// Calls `entry(data)` while bits 24 (FZ) and 19 (FZ16) of FPCR are set (Arm's manual,
-/// C5.2.8), and restores FPCR. A processor ignores a bit that it lacks.
+/// Calls `entry(data)` while bits 24 (FZ) and 19 (FZ16) of FPCR are set (Arm's manual, C5.2.8), and
+/// restores FPCR. A processor ignores a bit that it lacks.
 ///
 /// # Safety
 /// `entry` may be called with `data`, and does not unwind.
@@ -112,7 +110,7 @@ unsafe extern "C" fn call_flushed(data: *mut c_void, entry: Entry) {
     )
 }
 
-/// The logits of a small model, one layer of which is `factor` times as large.
+/// The logits of a small model.
 fn logits(model: &Path, precision: Precision, kernel: KernelName) -> Vec<f32> {
     let options = Options { precision, kernel: Some(kernel), ..Options::default() };
     let mut classifier = Classifier::load(model, &options).unwrap();
@@ -136,9 +134,8 @@ fn a_panic_of_flushed_work_comes_through_and_restores_the_mode() {
     assert!(black_box(black_box(f32::MIN_POSITIVE) * black_box(0.5)) > 0.0);
 }
 
-/// Weights of 1e-42 and products of as much: each sum of K = 64 of them moves by
-/// 64 * 1.2e-38 at most, and so does what later layers, of gains below 10^2, make of
-/// it: below 1e-33, which no logit of 1 has room for.
+/// With weights of 1e-42, flushing changes a sum of K = 64 products by at most 64 * 1.2e-38. Later
+/// layers have gains below 10^2, so that logits change by less than 1e-33.
 #[test]
 fn subnormal_weights_move_no_logit_whether_flushed_or_not() {
     let folder = tempfile::tempdir().unwrap();

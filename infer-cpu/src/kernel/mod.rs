@@ -1,17 +1,15 @@
-//! The hot loops, written by hand for each instruction set, behind one table
-//! of functions chosen at run time.
+//! The hot loops, written by hand for each instruction set, behind a table of functions that is
+//! chosen at run time.
 //!
-//! A layer multiplies rows of activations (one row a point) by a matrix packed
-//! into `Panels` (one panel a few output channels). A register tile is a few
-//! rows by one panel: vector lanes run along output channels, so that rows need
-//! no packing and the maximum over points is lane by lane. `scalar` is the
-//! reference that every other file is held to by `suite`.
+//! A layer multiplies rows of activations (one row per point) by a matrix that is packed into
+//! `Panels` (a few output channels each). A register tile is a few rows by one panel: vector lanes
+//! run along output channels, so that rows need no packing and the maximum over points is taken
+//! lane by lane. `suite` tests every file against the reference, `scalar`.
 //!
-//! Subnormal numbers are treated as the caller's thread has them treated: kernels
-//! leave the processor's mode alone. Flushed to 0 or not, a sum of K products moves
-//! by at most K times 1.2e-38 (f32's least normal number), which is nothing beside
-//! activations that a class depends on. So logits are promised to be the same to
-//! 1e-33 in either mode, and to the bit in the same one; `flushed` tests it.
+//! Kernels do not change the processor's mode for subnormal numbers. Flushing them to 0 changes a
+//! sum of K products by at most K times 1.2e-38 (the least normal f32), which is negligible beside
+//! activations that decide a class. Logits agree to 1e-33 in both modes, and to the bit in the same
+//! mode; `flushed` tests it.
 
 #![expect(unsafe_code, reason = "SIMD intrinsics; every block says why it is sound")]
 
@@ -41,9 +39,8 @@ pub(crate) mod suite;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
-/// Declares the kernels of one file and, with them, the tests that hold them
-/// to the reference, so that none can exist untested: `runs_here` says whether
-/// this machine has the instructions.
+/// Declares the kernels of one file together with the tests that compare them with the reference,
+/// so that no kernel is untested. `runs_here` says whether this machine has the instructions.
 macro_rules! declare_kernels {
     ($name:ident, runs_here: $runs_here:expr, $kernels:tt) => {
         static KERNELS: $crate::kernel::Kernels =
@@ -66,26 +63,26 @@ macro_rules! declare_kernels {
 use declare_kernels;
 
 pub(crate) use panels::Panels;
+#[doc(hidden)]
 pub use pooled::PooledProducts;
 
-/// Output channels are padded to a multiple of this, so that the rows of one
-/// layer are whole vectors of any kernel for the next.
+/// Output channels are padded to a multiple of this, so that a layer's outputs are whole vectors of
+/// every kernel in the next layer.
+#[doc(hidden)]
 pub const WIDTH_STEP: usize = 64;
 
-/// Output channels of a panel for [`Gemv`]: 16 NEON accumulators of fp32.
+/// Output channels of a panel for [`Gemv`]: 16 NEON registers of fp32.
 pub(crate) const GEMV_NR: usize = 64;
 
-/// The largest activation of an int8 layer: seven bits, so that kernels for
-/// signed and for unsigned activations take the same bytes.
+/// The largest activation of an int8 layer: with seven bits, kernels for signed and for unsigned
+/// activations accept the same bytes.
 pub(crate) const I8_LARGEST: u8 = 127;
 
-/// Activations of `n` points, row by row, `stride` apart; the last row may be
-/// shorter.
+/// Activations of `n` points: rows that are `stride` apart; the last one may be shorter.
 ///
 /// # Invariant
-/// Every row begins within the data: `(n - 1) * stride` does not exceed its
-/// length. [`Rows::new`] checks it and the fields are private, so that
-/// [`Rows::check`] cannot wrap.
+/// Every row begins within the data: `(n - 1) * stride` does not exceed its length. [`Rows::new`]
+/// checks it and the fields are private, so that [`Rows::check`] cannot wrap.
 #[derive(Clone, Copy)]
 pub(crate) struct Rows<'a, T> {
     data: &'a [T],
@@ -103,17 +100,17 @@ impl<'a, T> Rows<'a, T> {
         Self { data, stride, n }
     }
 
-    /// The elements of all rows.
+    /// All elements.
     pub fn data(&self) -> &'a [T] {
         self.data
     }
 
-    /// How far one row's beginning is from the next.
+    /// The distance from one row to the next.
     pub fn stride(&self) -> usize {
         self.stride
     }
 
-    /// How many rows there are.
+    /// The number of rows.
     pub fn n(&self) -> usize {
         self.n
     }
@@ -127,22 +124,22 @@ impl<'a, T> Rows<'a, T> {
 /// Whether `len` elements hold `n` rows of `width`, `stride` apart.
 fn holds_rows(len: usize, n: usize, stride: usize, width: usize) -> bool {
     let Some(before_last) = n.checked_sub(1) else { return true };
+    // A product that wraps would pass the comparison.
     let end = before_last.checked_mul(stride).and_then(|last| last.checked_add(width));
     width <= stride && end.is_some_and(|end| end <= len)
 }
 
-/// `rows` times the panels of a range, scaled, with bias and ReLU as the panels
-/// say, into rows of `out` that are `out_stride` apart. The column of a channel
-/// is its number.
+/// Multiplies `rows` by a range of panels, applies the panels' scale, bias and ReLU, and writes to
+/// rows of `out` that are `out_stride` apart. The column is the number of the channel.
 pub(crate) type RowsKernel<A, W> =
     fn(&Rows<'_, A>, &Panels<W>, Range<usize>, out: &mut [f32], out_stride: usize);
 
-/// Raises each of `maxima` (a channel of the range each) to the largest
-/// accumulator over the rows, before scale and bias. NaN raises nothing.
+/// Raises `maxima`, one for each channel of the range, to the largest accumulator over the rows,
+/// before scale and bias. NaN does not count.
 pub(crate) type MaxKernel<A, W, C> = fn(&Rows<'_, A>, &Panels<W>, Range<usize>, maxima: &mut [C]);
 
-/// The same, and remembers in `winners` the row (counted from `first_row`) that
-/// raised each last. Of equal rows the first wins.
+/// Does the same, and writes the row (counted from `first_row`) that attains a raised maximum to
+/// `winners`. If rows are equal, the first wins.
 pub(crate) type ArgmaxKernel<A, W, C> = fn(
     &Rows<'_, A>,
     &Panels<W>,
@@ -152,41 +149,56 @@ pub(crate) type ArgmaxKernel<A, W, C> = fn(
     winners: &mut [u32],
 );
 
-/// Matrix products of one number format: activations `A`, weights `W`,
-/// accumulators `C`.
+/// A sum of products.
+pub(crate) trait Sum: Copy + PartialOrd + Send + Sync {
+    /// Rounds to f32, before scale and bias.
+    fn to_f32(self) -> f32;
+}
+
+impl Sum for f32 {
+    fn to_f32(self) -> f32 {
+        self
+    }
+}
+
+impl Sum for i32 {
+    fn to_f32(self) -> f32 {
+        self as f32
+    }
+}
+
+/// Matrix products of one number format: activations `A`, weights `W`, accumulators `C`.
 pub(crate) struct Gemm<A, W, C> {
     /// Output channels of a panel; divides [`WIDTH_STEP`].
     pub nr: usize,
-    /// Panels hold inputs up to a multiple of this; divides [`WIDTH_STEP`].
+    /// The inputs of panels are padded to a multiple of this; divides [`WIDTH_STEP`].
     pub k_step: usize,
-    /// Products that are kept.
+    /// Products that are stored.
     pub rows: RowsKernel<A, W>,
     /// Products that are pooled.
     pub max: MaxKernel<A, W, C>,
-    /// Products that are pooled, with the rows that won.
+    /// Products that are pooled, with the winning rows.
     pub argmax: ArgmaxKernel<A, W, C>,
 }
 
-/// Products of a sparse vector and a matrix of weights stored as `W`, in f32
-/// arithmetic. The matrix is packed by [`Panels::columns`]: within a panel, an
-/// input that is left out spares a stretch of memory.
+/// Multiplies a sparse vector by a matrix of weights stored as `W`, in f32 arithmetic.
+/// [`Panels::columns`] packs the matrix: within a panel, a zero input skips a contiguous block of
+/// memory.
 ///
-/// `nonzero` holds (input, value) in the order of inputs; what is left out
-/// counts as 0 and its column is never read. Writes dot products, scaled and
-/// with biases, of a range of panels to `out`.
+/// `nonzero` holds (input, value) in the order of inputs; other inputs are 0 and their columns are
+/// not read. Writes the products of a range of panels, with scale and bias, to `out`.
 pub(crate) type Gemv<W> = fn(nonzero: &[(u32, f32)], &Panels<W>, Range<usize>, out: &mut [f32]);
 
-/// What rounding a row to levels lost and left, in levels.
+/// Sums over a row that was quantised to levels, in units of levels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct LevelSums {
-    /// The sum of the squares of what rounding took.
+    /// The sum of the squared rounding errors.
     pub lost: f32,
     /// The sum of the squares of the levels.
     pub squares: f32,
 }
 
-/// A product that a prefilter could not rule out to be the largest of its
-/// channel.
+/// A product that a prefilter could not rule out as the largest of its channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Candidate {
     /// Its row.
@@ -195,29 +207,25 @@ pub(crate) struct Candidate {
     pub channel: u16,
 }
 
-/// What tells the largest products from estimates of all of them, and from few
-/// in fp32. Rows are whole vectors: multiples of [`WIDTH_STEP`].
+/// The kernels of the int8 prefilter. Rows are whole vectors: multiples of [`WIDTH_STEP`].
 pub(crate) struct PrefilterKernels {
-    /// Rounds a row of `value * per_unit`, 0 to [`I8_LARGEST`] (clipped there),
-    /// to levels.
+    /// Rounds `value * per_unit` to levels, clipped to 0..=[`I8_LARGEST`].
     pub levels: fn(&[f32], per_unit: f32, out: &mut [u8]) -> LevelSums,
-    /// Finds each column's largest value and the first row that has it. Values
-    /// are no NaN.
+    /// Finds each column's largest value and the first row that has it. No value may be NaN.
     pub peaks: fn(values: &[f32], peaks: &mut [f32], rows: &mut [u32]),
-    /// Finds what is above the floors.
+    /// Finds the values above the floors.
     pub above_floors: AboveFloors,
-    /// Products of candidates.
+    /// Computes the products of candidates.
     pub dots: Dots,
 }
 
-/// Puts every value above the floor of its column into `found`, row by row.
-/// Returns how many there are, or `None` if there is no room for them.
+/// Writes every value above the floor of its column to `found`, row by row. Returns their number,
+/// or `None` if there is no room for them.
 pub(crate) type AboveFloors =
     fn(values: &[f32], floors: &[f32], found: &mut [Candidate]) -> Option<usize>;
 
-/// Products of `candidates`: rows by `weights`, which has as many elements for
-/// each channel as `rows` has from one row to the next, a multiple of
-/// [`WIDTH_STEP`]. One product's roundings do not depend on the others.
+/// Computes the products of `candidates`. `weights` has `rows.stride()` elements for each channel,
+/// a multiple of [`WIDTH_STEP`]. The rounding of one product does not depend on the others.
 pub(crate) type Dots =
     fn(rows: &Rows<'_, f32>, weights: &[f32], candidates: &[Candidate], out: &mut [f32]);
 
@@ -225,20 +233,20 @@ pub(crate) type Dots =
 pub(crate) type EdgeFeatures =
     fn(&EdgeConv, rows: (&mut [f32], usize), &Neighborhood, &mut EdgeScratch);
 
-/// Cloud coordinates as structure of arrays, for sampling.
+/// The coordinates of a cloud as one array per axis, for sampling.
 #[derive(Clone, Copy)]
 pub(crate) struct Soa<'a> {
     /// Coordinates along x.
     pub x: &'a [f32],
-    /// Along y, as many.
+    /// As many along y.
     pub y: &'a [f32],
-    /// Along z, as many.
+    /// As many along z.
     pub z: &'a [f32],
 }
 
 /// The kernels of one instruction set.
 pub struct Kernels {
-    /// Which instruction set.
+    /// The instruction set.
     pub name: KernelName,
     /// fp32.
     pub(crate) f32: Option<Gemm<f32, f32, f32>>,
@@ -246,10 +254,9 @@ pub struct Kernels {
     pub(crate) f16: Option<Gemm<f16, f16, f32>>,
     /// Unsigned seven-bit activations, int8 weights.
     pub(crate) i8: Option<Gemm<u8, i8, i32>>,
-    /// Whether int8 products cost so much less than those of fp32 that most of
-    /// the latter are worth ruling out by the former.
+    /// Whether int8 products are so much faster than fp32 ones that the prefilter pays.
     pub(crate) prefilters: bool,
-    /// What it takes to do so.
+    /// The kernels of the prefilter.
     pub(crate) prefilter: PrefilterKernels,
     /// fp32 weights.
     pub(crate) gemv_f32: Gemv<f32>,
@@ -259,12 +266,12 @@ pub struct Kernels {
     pub(crate) gemv_i8: Gemv<i8>,
     /// Rounds to fp16 and returns the largest magnitude before rounding.
     pub(crate) narrow_f16: fn(&[f32], &mut [f16]) -> f32,
-    /// Rounds `value * per_unit` to 0..=[`I8_LARGEST`] and returns how many
-    /// values had to be clipped at the top.
+    /// Rounds `value * per_unit` to 0..=[`I8_LARGEST`] and returns the number of values that were
+    /// clipped at the top.
     pub(crate) narrow_i8: fn(&[f32], per_unit: f32, &mut [u8]) -> u64,
-    /// One step of farthest point sampling: lowers `distance` (squared, per
-    /// point) to that from `pick` and returns the first of the farthest points.
-    /// Squares are summed as `(dx² + dy²) + dz²`, each rounded, as NumPy does.
+    /// One step of farthest point sampling: lowers `distance` (squared, per point) to that from
+    /// `pick` and returns the first of the farthest points. Squares are summed as `(dx² + dy²) +
+    /// dz²`, with each step rounded as in NumPy.
     pub(crate) fps_step: fn(Soa<'_>, pick: [f32; 3], distance: &mut [f32]) -> usize,
     /// [`EdgeConv::features`].
     pub(crate) edge_features: EdgeFeatures,
@@ -313,6 +320,7 @@ impl KernelName {
 
 /// All kernels that this machine can run, the fastest first.
 pub fn available() -> impl Iterator<Item = &'static Kernels> {
+    // Names are in the order of speed on each architecture.
     KernelName::ALL.into_iter().rev().filter_map(KernelName::kernels)
 }
 

@@ -11,12 +11,11 @@
 //! a[7]                  sums[7][0]          sums[7][1]
 //! ```
 //!
-//! As in fp32, 16 sums and 8 registers of activations, which must be among the
-//! first 16 for FMLA to read them by element. The sums of [`F16_CHUNK`] inputs
-//! are added in fp16 to those of the chunks before, which wait in memory. Only
-//! a block of [`F16_BLOCK`] inputs, more than PointNet's layers have, is
-//! promoted to fp32, since conversions are slow; of maxima only the largest of
-//! eight rows is.
+//! As in fp32, there are 16 sums and 8 registers of activations, which must be among the first 16
+//! for FMLA to read them by element. The sums of [`F16_CHUNK`] inputs are added in fp16 to those of
+//! earlier chunks, which are in memory. Since conversions are slow, sums are promoted to fp32 only
+//! after a block of [`F16_BLOCK`] inputs, more than most of PointNet's layers have, and of maxima
+//! only the largest of eight rows.
 
 use std::arch::aarch64::*;
 use std::arch::is_aarch64_feature_detected;
@@ -50,7 +49,8 @@ impl Tile<4> for F16 {
 
 impl<S: HalfSink + Sink<float32x4_t, 4>> Feed<S, 4> for F16 {
     unsafe fn feed<const R: usize>(strip: &Strip<f16, f16>, sink: &mut S) {
-        // SAFETY: the contract of `Feed::feed`.
+        // SAFETY: `tile::multiply` made the strip of `Rows` and `Panels` that it checked;
+        // `kernels()` gives out the table only where FEAT_FP16 is.
         unsafe {
             match strip.inputs {
                 ..=F16_BLOCK => tile_f16_8x16::<S, R>(strip, sink),
@@ -60,7 +60,7 @@ impl<S: HalfSink + Sink<float32x4_t, 4>> Feed<S, 4> for F16 {
     }
 }
 
-/// Sums of several blocks, in fp32.
+/// Feeds sums of several blocks, which are added in fp32.
 ///
 /// # Safety
 /// As [`Feed::feed`].
@@ -78,15 +78,16 @@ unsafe fn feed_blocks<S: Sink<float32x4_t, 4>, const R: usize>(
                 n_tiles: 1,
                 ..*strip
             };
-            // SAFETY: a part of the strip, of whole STEPs: the contract of `Feed::feed`.
+            // SAFETY: `block` is a part of the `Strip` that consists of whole STEPs, and `Blocks`
+            // takes R rows.
             unsafe { tile_f16_8x16::<_, R>(&block, &mut blocks) };
         }
-        // SAFETY: the sink has room for the strip's rows, by the contract of `Feed::feed`.
+        // SAFETY: `tile::multiply` feeds a sink the rows that it was made for.
         unsafe { sink.take(blocks.sums) };
     }
 }
 
-/// Sums of one block.
+/// Feeds sums of one block.
 ///
 /// # Safety
 /// As [`Feed::feed`].
@@ -95,8 +96,8 @@ unsafe fn feed_blocks<S: Sink<float32x4_t, 4>, const R: usize>(
 unsafe fn tile_f16_8x16<S: HalfSink, const R: usize>(strip: &Strip<f16, f16>, sink: &mut S) {
     let zero = vreinterpretq_f16_u16(vdupq_n_u16(0));
     let mut rows: [*const f16; R] = strip.first_rows();
-    // Where `black_box` keeps sums of earlier chunks: in the compiler's hands
-    // they would take registers from the inner loop.
+    // `black_box` keeps the sums of earlier chunks in memory: as variables they would take
+    // registers from the inner loop.
     let mut memory = [[zero; 2]; R];
     for _ in 0..strip.n_tiles {
         let (mut weights, mut at) = (strip.weights, 0);
@@ -105,8 +106,8 @@ unsafe fn tile_f16_8x16<S: HalfSink, const R: usize>(strip: &Strip<f16, f16>, si
             let chunk_end = strip.row_bytes().min(at + F16_CHUNK * size_of::<f16>());
             let mut sums = [[zero; 2]; R];
             while at < chunk_end {
-                // SAFETY: 8 inputs of R rows are there, and 16 weights for
-                // each.
+                // SAFETY: a `Strip` has R rows of whole STEPs, here of 8 inputs, and 16 weights for
+                // each input.
                 unsafe {
                     let a = rows.map(|row| load(row.byte_add(at)));
                     add_inputs(&mut sums, &a, weights);
@@ -121,7 +122,7 @@ unsafe fn tile_f16_8x16<S: HalfSink, const R: usize>(strip: &Strip<f16, f16>, si
                 }
             }
             if at >= strip.row_bytes() {
-                // SAFETY: the sink has room for the strip's rows, by the contract of `Feed::feed`.
+                // SAFETY: `tile::multiply` feeds a sink the rows that it was made for.
                 unsafe { sink.take_half(&sums) };
                 break;
             }
@@ -134,7 +135,7 @@ unsafe fn tile_f16_8x16<S: HalfSink, const R: usize>(strip: &Strip<f16, f16>, si
 /// Adds the products of 8 inputs of each row.
 ///
 /// # Safety
-/// There are 16 weights for each.
+/// `weights` points at 16 weights for each of the 8 inputs.
 #[inline]
 #[target_feature(enable = "neon,fp16")]
 unsafe fn add_inputs<const R: usize>(
@@ -142,7 +143,7 @@ unsafe fn add_inputs<const R: usize>(
     a: &[float16x8_t; R],
     weights: *const f16,
 ) {
-    // SAFETY: this function's contract.
+    // SAFETY: `Panels` has `nr` = 16 weights for each of the 8 inputs.
     unsafe {
         add_input::<0, R>(sums, a, weights);
         add_input::<1, R>(sums, a, weights.add(16));
@@ -158,7 +159,7 @@ unsafe fn add_inputs<const R: usize>(
 /// Adds the products of the input that is lane `LANE` of the activations.
 ///
 /// # Safety
-/// There are 16 weights.
+/// `weights` points at 16 weights.
 #[inline]
 #[target_feature(enable = "neon,fp16")]
 unsafe fn add_input<const LANE: i32, const R: usize>(
@@ -166,7 +167,7 @@ unsafe fn add_input<const LANE: i32, const R: usize>(
     a: &[float16x8_t; R],
     weights: *const f16,
 ) {
-    // SAFETY: this function's contract.
+    // SAFETY: `Panels` has `nr` = 16 weights for each input.
     let w = unsafe { [load(weights), load(weights.add(8))] };
     for (sums, &a) in sums.iter_mut().zip(a) {
         sums[0] = vfmaq_laneq_f16::<LANE>(sums[0], w[0], a);
@@ -175,10 +176,11 @@ unsafe fn add_input<const LANE: i32, const R: usize>(
 }
 
 /// # Safety
-/// There are 8 numbers.
+/// `from` points at 8 numbers.
 #[inline]
 #[target_feature(enable = "neon")]
 unsafe fn load(from: *const f16) -> float16x8_t {
-    // SAFETY: this function's contract; an `f16` is its bits.
+    // SAFETY: all pointers lie within a `Strip`, whose rows and weights come in whole vectors;
+    // `f16` is a transparent `u16`.
     vreinterpretq_f16_u16(unsafe { vld1q_u16(from.cast()) })
 }

@@ -1,22 +1,21 @@
-//! Weights in the order in which kernels read them.
+//! Weights in the order of the kernels' accesses.
 
 use std::ops::Range;
 
 use super::{GEMV_NR, WIDTH_STEP};
 
-/// A layer's weights: panels of `nr` output channels.
+/// The weights of a layer, in panels of `nr` output channels.
 ///
-/// Within a panel, inputs go in groups of `group` (1, or 4 for int8, whose
-/// instructions take four inputs at once): element (input k, channel o) is at
-/// `((panel * padded_inputs / group + k / group) * nr + o % nr) * group + k % group`.
+/// Within a panel, inputs form groups of `group` (1, or 4 for int8, whose instructions process four
+/// inputs at once): element (input k, channel o) is at `((panel * padded_inputs / group + k /
+/// group) * nr + o % nr) * group + k % group`.
 ///
 /// # Invariant
-/// Unsafe kernels rely on these lengths. The fields are private, [`Panels::zeros`]
-/// establishes them, and no method changes the length of a vector but
-/// [`Panels::scales_mut`], which makes it whole.
+/// Unsafe kernels rely on these lengths. All fields but `relu` are private, [`Panels::zeros`]
+/// establishes them, and only [`Panels::scales_mut`] changes the length of a vector, from 0 to the
+/// full length.
 ///
-/// - `padded_outputs`, the length of `bias`, is a multiple of [`WIDTH_STEP`] and
-///   so of `nr`.
+/// - `padded_outputs`, the length of `bias`, is a multiple of [`WIDTH_STEP`] and therefore of `nr`.
 /// - `data` has `padded_inputs * padded_outputs` elements.
 /// - `scale` is empty or has `padded_outputs` elements.
 /// - `padded_inputs` is a multiple of the `k_step` of construction and of `group`.
@@ -30,16 +29,17 @@ pub(crate) struct Panels<W> {
     data: Vec<W>,
     scale: Vec<f32>,
     bias: Vec<f32>,
-    relu: bool,
+    /// Whether negative outputs become 0.
+    pub relu: bool,
 }
 
 impl<W: Copy + Default> Panels<W> {
-    /// Panels of zeros of `nr` channels, whose inputs are padded to a multiple
-    /// of `k_step` and go in groups of `group`.
+    /// Panels of zeros, with `nr` channels each, and inputs that are padded to a multiple of
+    /// `k_step` and form groups of `group`.
     ///
     /// # Panics
-    /// If `nr` does not divide [`WIDTH_STEP`], if `group` does not divide
-    /// `k_step`, or if the weights would not fit in memory.
+    /// If `nr` does not divide [`WIDTH_STEP`], if `group` does not divide `k_step`, or if the
+    /// weights would not fit in memory.
     pub fn zeros(
         inputs: usize,
         outputs: usize,
@@ -53,6 +53,7 @@ impl<W: Copy + Default> Panels<W> {
             group > 0 && k_step > 0 && k_step.is_multiple_of(group),
             "expected a k step of whole groups of {group}, found {k_step}"
         );
+        // At least one input, so that a panel is never empty.
         let padded_inputs = padded(inputs.max(1), k_step);
         let padded_outputs = padded(outputs, WIDTH_STEP);
         Self {
@@ -81,7 +82,7 @@ impl<W: Copy + Default> Panels<W> {
         self.inputs
     }
 
-    /// Inputs of the layer, with zeros up to the kernel's step.
+    /// Inputs of the layer, padded with zeros to the kernel's step.
     pub fn padded_inputs(&self) -> usize {
         self.padded_inputs
     }
@@ -96,44 +97,34 @@ impl<W: Copy + Default> Panels<W> {
         self.nr
     }
 
-    /// How many weights there are, padding included.
+    /// The number of weights, padding included.
     pub fn n_weights(&self) -> usize {
         self.data.len()
     }
 
-    /// What an accumulator is multiplied by, for each padded output; empty
-    /// for 1.
+    /// The factor of the accumulator of each padded output; empty if all are 1.
     pub fn scales(&self) -> &[f32] {
         &self.scale
     }
 
-    /// The scales, to be set: one for each padded output, 1 until then.
+    /// The scales for writing: one for each padded output, initially 1.
     pub fn scales_mut(&mut self) -> &mut [f32] {
+        // All scales or none: kernels read whole vectors of them.
         self.scale.resize(self.bias.len(), 1.0);
         &mut self.scale
     }
 
-    /// What is added to a scaled accumulator, for each padded output.
+    /// The summand of the scaled accumulator of each padded output.
     pub fn biases(&self) -> &[f32] {
         &self.bias
     }
 
-    /// The biases, to be set: one for each padded output, 0 until then.
+    /// The biases for writing: one for each padded output, initially 0.
     pub fn biases_mut(&mut self) -> &mut [f32] {
         &mut self.bias
     }
 
-    /// Whether negative outputs become 0.
-    pub fn relu(&self) -> bool {
-        self.relu
-    }
-
-    /// Sets whether negative outputs become 0.
-    pub fn set_relu(&mut self, relu: bool) {
-        self.relu = relu;
-    }
-
-    /// Where the weight of `input` for `output` is.
+    /// The index of the weight of `input` for `output`.
     fn index(&self, input: usize, output: usize) -> usize {
         let Self { nr, group, padded_inputs, .. } = self;
         let row = output / nr * (padded_inputs / group) + input / group;
@@ -160,12 +151,12 @@ impl<W: Copy + Default> Panels<W> {
         }
     }
 
-    /// How many panels there are.
+    /// The number of panels.
     pub fn n_panels(&self) -> usize {
         self.padded_outputs() / self.nr
     }
 
-    /// Output channels with those that are padding.
+    /// Output channels, padding included.
     pub fn padded_outputs(&self) -> usize {
         self.bias.len()
     }
@@ -176,13 +167,14 @@ impl<W: Copy + Default> Panels<W> {
         &self.data[panel * size..][..size]
     }
 
-    /// The output channels of some panels.
+    /// The output channels of a range of panels.
     pub fn channels(&self, panels: &Range<usize>) -> Range<usize> {
         panels.start * self.nr..panels.end * self.nr
     }
 }
 
 fn padded(n: usize, step: usize) -> usize {
+    // Widths come from a file, so that they may be of any size.
     n.checked_next_multiple_of(step).expect("a layer's widths fit in memory")
 }
 

@@ -1,20 +1,9 @@
-//! The products that a maximum over points takes, for whoever trains.
+//! Pooled products for training.
 
 use super::{Gemm, Panels, Rows, fastest};
 
-/// Weights `[outputs, inputs]` in fp32, packed for the fastest kernels of this
-/// machine, whose products with points are pooled and never stored.
-///
-/// ```
-/// use infer_cpu::kernel::PooledProducts;
-///
-/// // One output: the coordinate x.
-/// let products = PooledProducts::new(3, 1, |input, _| if input == 0 { 1.0 } else { 0.0 });
-/// let points = [0.5, 0.0, 0.0, 2.0, 0.0, 0.0];
-/// let (mut maxima, mut winners) = ([f32::NEG_INFINITY], [0]);
-/// products.argmax(&points, 10, &mut maxima, &mut winners);
-/// assert_eq!((maxima, winners), ([2.0], [11]));
-/// ```
+/// Weights `[outputs, inputs]` in fp32, packed for the fastest kernels of this machine. Their
+/// products with points are pooled and never stored.
 pub struct PooledProducts {
     gemm: &'static Gemm<f32, f32, f32>,
     panels: Panels<f32>,
@@ -34,14 +23,13 @@ impl PooledProducts {
         Self { gemm, panels }
     }
 
-    /// Raises each of `maxima` `[outputs]` to the largest product over
-    /// `points` `[n, inputs]` in C order, and sets those of `winners`
-    /// `[outputs]` to the first point that has it, counted from `first_row`.
-    /// NaN raises nothing.
+    /// Raises `maxima` `[outputs]` to the largest products over `points` `[n, inputs]` in C order,
+    /// and sets the `winners` `[outputs]` of raised maxima to the first points that attain them,
+    /// counted from `first_row`. NaN does not count.
     ///
     /// # Panics
-    /// If `points` are not whole rows, or `maxima` or `winners` are not as
-    /// many as there are outputs.
+    /// If `points` are not whole rows, or if `maxima` or `winners` do not have one element per
+    /// output.
     pub fn argmax(&self, points: &[f32], first_row: u32, maxima: &mut [f32], winners: &mut [u32]) {
         let Self { gemm, panels } = self;
         let (inputs, stride) = (panels.inputs(), panels.padded_inputs());
@@ -49,11 +37,13 @@ impl PooledProducts {
         let expected = (panels.outputs(), panels.outputs());
         assert_eq!((maxima.len(), winners.len()), expected, "expected a maximum for each output");
         let n = points.len() / inputs;
+        // Kernels read whole steps of inputs, so rows are padded with zeros.
         let mut rows = vec![0.0; n * stride];
         for (row, point) in rows.chunks_exact_mut(stride).zip(points.chunks_exact(inputs)) {
             row[..inputs].copy_from_slice(point);
         }
         let padded = panels.padded_outputs();
+        // Kernels write whole panels, so outputs are padded, too.
         let mut padded_maxima = vec![f32::NEG_INFINITY; padded];
         let mut padded_winners = vec![first_row; padded];
         padded_maxima[..maxima.len()].copy_from_slice(maxima);

@@ -1,12 +1,13 @@
-//! The reference: plain loops, one rounding after another, in the order of
-//! inputs. Every other kernel is held to this one.
+//! The reference: plain loops that round each step, in the order of inputs. All other kernels are
+//! tested against it.
 
 use std::ops::Range;
 
 use half::f16;
 
 use super::{
-    Candidate, Gemm, I8_LARGEST, LevelSums, Panels, PrefilterKernels, Rows, Soa, declare_kernels,
+    Candidate, Gemm, I8_LARGEST, LevelSums, Panels, PrefilterKernels, Rows, Soa, Sum,
+    declare_kernels,
 };
 use crate::edge_conv::EdgeConv;
 
@@ -15,10 +16,10 @@ pub(super) const F16_CHUNK: usize = 32;
 
 /// Sums of chunks are summed in fp16 over this many inputs, then in fp32.
 ///
-/// In a chunk of n products a product is rounded at most n times, in a block of
-/// m chunks then m - 1 times. So a sum is off by at most (n + m - 1) · 2⁻¹¹ of
-/// the sum of magnitudes (Higham 2002, §3.1 and §4.2, each step rounded once):
-/// 1.7 % in the worst case, whatever the layer's width.
+/// In a chunk of n products, a product is rounded at most n times, and in a block of m chunks then
+/// m - 1 times. The error of a sum is therefore at most (n + m - 1) · 2⁻¹¹ of the sum of magnitudes
+/// (Higham 2002, §3.1 and §4.2, each step rounded once): 1.7 % in the worst case, for any width of
+/// the layer.
 pub(super) const F16_BLOCK: usize = 128;
 
 declare_kernels!(Scalar, runs_here: true, {
@@ -39,11 +40,9 @@ declare_kernels!(Scalar, runs_here: true, {
 /// An activation of one number format.
 trait Activation: Copy {
     type Weight: Copy + Default;
-    type Sum: PartialOrd + Copy;
+    type Sum: Sum;
     /// The sum of the products of a row and the weights of `output`.
     fn dot(row: &[Self], weights: &Panels<Self::Weight>, output: usize) -> Self::Sum;
-    /// The nearest number of fp32.
-    fn to_f32(sum: Self::Sum) -> f32;
 }
 
 impl Activation for f32 {
@@ -53,10 +52,6 @@ impl Activation for f32 {
     fn dot(row: &[f32], weights: &Panels<f32>, output: usize) -> f32 {
         let products = row.iter().enumerate();
         products.fold(0.0, |sum, (k, &a)| sum + a * weights.weight(k, output))
-    }
-
-    fn to_f32(sum: f32) -> f32 {
-        sum
     }
 }
 
@@ -69,8 +64,8 @@ impl Activation for f16 {
             let products = chunk.iter().enumerate();
             products.fold(f16::ZERO, |sum, (k, &a)| {
                 let weight = weights.weight(first + k, output);
-                // The product is exact in f64, and the sum but for the rarest
-                // double rounding: a fused multiply-add in fp16.
+                // The product is exact in f64, and so is the sum except for rare double rounding:
+                // this is a fused multiply-add in fp16.
                 f16::from_f64(a.to_f64() * weight.to_f64() + sum.to_f64())
             })
         };
@@ -81,10 +76,6 @@ impl Activation for f16 {
         let blocks = row.chunks(F16_BLOCK).zip((0..).step_by(F16_BLOCK));
         blocks.fold(0.0, |sum, (block, first)| sum + block_sum(first, block).to_f32())
     }
-
-    fn to_f32(sum: f32) -> f32 {
-        sum
-    }
 }
 
 impl Activation for u8 {
@@ -94,10 +85,6 @@ impl Activation for u8 {
     fn dot(row: &[u8], weights: &Panels<i8>, output: usize) -> i32 {
         let products = row.iter().enumerate();
         products.map(|(k, &a)| i32::from(a) * i32::from(weights.weight(k, output))).sum()
-    }
-
-    fn to_f32(sum: i32) -> f32 {
-        sum as f32
     }
 }
 
@@ -113,7 +100,7 @@ fn rows<A: Activation>(
     out_stride: usize,
 ) {
     for_each(rows, weights, panels, |row, output, sum| {
-        out[row * out_stride + output] = finish(weights, output, A::to_f32(sum));
+        out[row * out_stride + output] = finish(weights, output, sum.to_f32());
     });
 }
 
@@ -167,7 +154,8 @@ fn for_each<A: Activation>(
 fn finish<W: Copy + Default>(weights: &Panels<W>, output: usize, sum: f32) -> f32 {
     let scale = weights.scales().get(output).copied().unwrap_or(1.0);
     let value = sum * scale + weights.biases()[output];
-    if weights.relu() { value.max(0.0) } else { value }
+    // `max` turns NaN into 0, as SIMD kernels do.
+    if weights.relu { value.max(0.0) } else { value }
 }
 
 fn levels(row: &[f32], per_unit: f32, out: &mut [u8]) -> LevelSums {
@@ -177,6 +165,7 @@ fn levels(row: &[f32], per_unit: f32, out: &mut [u8]) -> LevelSums {
         let level = exact.round_ties_even().clamp(0.0, f32::from(I8_LARGEST));
         sums.lost += (exact - level) * (exact - level);
         sums.squares += level * level;
+        // The cast turns NaN, which `clamp` keeps, into level 0.
         *out = level as u8;
     }
     sums
@@ -198,6 +187,7 @@ fn above_floors(values: &[f32], floors: &[f32], found: &mut [Candidate]) -> Opti
     let mut n = 0;
     for (row, values) in values.chunks_exact(floors.len()).enumerate() {
         for (channel, _) in values.iter().enumerate().filter(|&(c, value)| *value > floors[c]) {
+            // Too many candidates: the caller then computes all products.
             *found.get_mut(n)? = Candidate { row: row as u16, channel: channel as u16 };
             n += 1;
         }
@@ -253,9 +243,11 @@ pub(super) fn fps_step(cloud: Soa<'_>, pick: [f32; 3], distance: &mut [f32]) -> 
     for (i, distance) in distance.iter_mut().enumerate() {
         let [dx, dy, dz] = [cloud.x[i] - pick[0], cloud.y[i] - pick[1], cloud.z[i] - pick[2]];
         let squared = (dx * dx + dy * dy) + dz * dz;
+        // False for NaN, which keeps the distance.
         if squared < *distance {
             *distance = squared;
         }
+        // Strictly greater, so that the first of equal distances wins.
         if *distance > largest {
             largest = *distance;
             farthest = i;

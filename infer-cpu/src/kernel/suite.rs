@@ -1,9 +1,8 @@
-//! What every kernel must do: the same as exact arithmetic, to a bound that
-//! follows from the number of inputs and the format, on sizes around every
-//! tile and on values at every extreme.
+//! The tests of every kernel: results must equal exact arithmetic within a bound that follows from
+//! the number of inputs and the format, for sizes around every tile and for extreme values.
 //!
-//! [`suite`] makes the tests of one file of kernels; `declare_kernels` calls
-//! it. A machine without the instructions skips them.
+//! [`suite`] generates the tests for one file of kernels; `declare_kernels` calls it. A machine
+//! without the instructions skips them.
 
 use std::fmt::Debug;
 use std::ops::Range;
@@ -13,7 +12,7 @@ use formats::rng::StreamKey;
 use half::f16;
 
 use super::scalar::{F16_BLOCK, F16_CHUNK};
-use super::{Candidate, Gemm, Gemv, I8_LARGEST, Kernels, Panels, Rows, Soa, WIDTH_STEP};
+use super::{Candidate, Gemm, Gemv, I8_LARGEST, Kernels, Panels, Rows, Soa, Sum, WIDTH_STEP};
 use crate::dense::Dense;
 use crate::edge_conv::{EdgeConv, Neighborhood};
 pub use crate::precision::{F16, F32, I8};
@@ -25,7 +24,7 @@ const ROWS: [usize; 12] = [0, 1, 3, 5, 6, 7, 8, 9, 10, 12, 13, 29];
 const INPUTS: [usize; 13] = [1, 2, 3, 4, 5, 8, 15, 16, 17, 31, 33, 64, 130];
 const OUTPUTS: [usize; 4] = [1, 31, 64, 65];
 
-/// What the numbers of a problem are like.
+/// The kind of numbers in a problem.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Values {
     /// Uniform in -1..1, or over all integers.
@@ -43,14 +42,14 @@ pub enum Values {
 impl Values {
     const FLOATS: &[Self] = &[Self::Ordinary, Self::Cancelling, Self::Denormal, Self::NotFinite];
 
-    /// What activations are like beside weights that are like this: beside denormal
-    /// ones of about 1, so that products stay.
+    /// The kind of activations for weights of this kind: beside denormal weights they are about 1,
+    /// so that products do not vanish.
     fn of_activations(self) -> Self {
         if self == Self::Denormal { Self::Ordinary } else { self }
     }
 }
 
-/// Numbers drawn by rule.
+/// A generator of test numbers.
 pub struct Draw {
     key: StreamKey,
     n: u64,
@@ -98,7 +97,7 @@ impl Draw {
     }
 }
 
-/// A number of a problem.
+/// A number type of a problem.
 pub trait Number: Copy + Default + Into<f64> {
     /// Draws number `at` of a dot product.
     fn draw(draw: &mut Draw, values: Values, at: usize) -> Self;
@@ -131,10 +130,9 @@ impl Number for i8 {
 
 /// A format of products, and the bound of their rounding errors.
 pub trait Bounded: Format<Activation: Number, Weight: Number, Sum: Debug> {
-    /// What its problems are like.
+    /// The kinds of numbers in its problems.
     const VALUES: &[Values];
-    /// How far a dot product of `k` terms whose magnitudes sum to `sum` may be
-    /// off.
+    /// The error bound of a dot product of `k` terms whose magnitudes sum to `sum`.
     fn bound(k: usize, sum: f64) -> f64;
 }
 
@@ -146,10 +144,9 @@ const U16: f64 = 1.0 / (1u64 << 11) as f64;
 impl Bounded for F32 {
     const VALUES: &[Values] = Values::FLOATS;
 
-    /// Any order of k steps, fused or not, a scale and a bias: (k + 2) u of the
-    /// sum of magnitudes to first order (Higham 2002, §3.1), one more for the
-    /// second order; half a denormal a step, once for the product and once for
-    /// the sum, where numbers are that small.
+    /// Any order of k steps, fused or not, a scale and a bias: (k + 2) u of the sum of magnitudes
+    /// to first order (Higham 2002, §3.1), one more for the second order; half a denormal a step,
+    /// once for the product and once for the sum, where numbers are that small.
     fn bound(k: usize, sum: f64) -> f64 {
         (k + 3) as f64 * (U32 * sum + 2f64.powi(-149))
     }
@@ -158,9 +155,8 @@ impl Bounded for F32 {
 impl Bounded for F16 {
     const VALUES: &[Values] = Values::FLOATS;
 
-    /// The bound of [`F16_BLOCK`], one more for the second order; half a
-    /// denormal of fp16 (2⁻²⁵) a step where numbers are that small; the sum of
-    /// blocks in f32.
+    /// The bound of [`F16_BLOCK`], one more for the second order; half a denormal of fp16 (2⁻²⁵) a
+    /// step where numbers are that small; the sum of blocks in f32.
     fn bound(k: usize, sum: f64) -> f64 {
         let roundings = F16_CHUNK.min(k) + F16_BLOCK.min(k).div_ceil(F16_CHUNK);
         let block = roundings as f64 * U16 * sum;
@@ -177,7 +173,7 @@ impl Bounded for I8 {
     }
 }
 
-/// What kernels are held to.
+/// The reference kernels.
 fn reference() -> &'static Kernels {
     super::scalar::kernels().unwrap()
 }
@@ -187,7 +183,7 @@ pub fn dot(terms: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
     terms.fold((0.0, 0.0), |(dot, sum), (a, w)| (dot + a * w, sum + (a * w).abs()))
 }
 
-/// A matrix product with its exact answers.
+/// A matrix product with its exact results.
 struct Problem<T: Format> {
     activations: Vec<T::Activation>,
     n: usize,
@@ -208,7 +204,7 @@ impl<T: Bounded> Problem<T> {
         let plain: Vec<T::Weight> =
             (0..inputs * outputs).map(|i| Number::draw(&mut draw, values, i / outputs)).collect();
         weights.fill(|input, output| plain[input * outputs + output]);
-        // A stride of its own: padding of the panels' inputs and some more.
+        // The stride exceeds the padded inputs of the panels.
         let stride = weights.padded_inputs() + 4;
         let mut activations = vec![T::Activation::default(); n * stride];
         for row in activations.chunks_exact_mut(stride) {
@@ -263,10 +259,10 @@ fn assert_near(found: f32, exact: f64, bound: f64, place: impl Debug) {
     }
 }
 
-/// That the matrix products of format `T` are what they must be.
+/// Checks the matrix products of format `T`.
 ///
 /// # Errors
-/// These kernels leave them to others.
+/// These kernels do not support the format.
 pub fn products_are_sound<T: Bounded>(kernels: &Kernels) -> Result<(), String> {
     let gemm = T::gemm(kernels)
         .ok_or_else(|| "this set of kernels leaves these products to another".to_owned())?;
@@ -290,7 +286,7 @@ pub fn products_are_sound<T: Bounded>(kernels: &Kernels) -> Result<(), String> {
 
 type Case = ((usize, usize, usize), Values);
 
-/// That products are exact to the format's bound.
+/// Checks that products are exact within the format's bound.
 fn rows_are_near_exact<T: Bounded>(gemm: &Products<T>, problem: &Problem<T>, case: Case) {
     let ((_, inputs, outputs), _) = case;
     let out = problem.products(gemm);
@@ -301,8 +297,8 @@ fn rows_are_near_exact<T: Bounded>(gemm: &Products<T>, problem: &Problem<T>, cas
     }
 }
 
-/// That maxima and their rows are those of the products, to the bit, of the
-/// first row among equals, whatever the place of a row in its tile.
+/// Checks that maxima and winners equal those of the products, to the bit, with the first of equal
+/// rows, for every position in a tile.
 fn maxima_are_those_of_the_rows<T: Bounded>(
     gemm: &Products<T>,
     mut problem: Problem<T>,
@@ -320,15 +316,15 @@ fn maxima_are_those_of_the_rows<T: Bounded>(
     let ((_, _, outputs), _) = case;
     for output in 0..outputs {
         let column = (0..problem.n).map(|row| out[row * width + output]);
-        let none = (T::widen(T::LOWEST), u32::MAX);
+        let none = (T::LOWEST.to_f32(), u32::MAX);
         let best =
             column.zip(100u32..).fold(none, |best, next| if next.0 > best.0 { next } else { best });
-        assert_eq!((T::widen(maxima[output]), winners[output]), best, "{case:?} {output}");
-        assert_eq!(T::widen(alone[output]), best.0, "{case:?} {output}");
+        assert_eq!((maxima[output].to_f32(), winners[output]), best, "{case:?} {output}");
+        assert_eq!(alone[output].to_f32(), best.0, "{case:?} {output}");
     }
 }
 
-/// That scale, bias and ReLU are applied in this order, to every channel.
+/// Checks that scale, bias and ReLU are applied in this order to every channel.
 fn rows_are_finished<T: Bounded>(gemm: &Products<T>) {
     let (inputs, outputs) = (17, 65);
     let mut problem = Problem::<T>::new(gemm, (13, inputs, outputs), Values::Ordinary);
@@ -337,7 +333,7 @@ fn rows_are_finished<T: Bounded>(gemm: &Products<T>) {
         problem.weights.biases_mut()[output] = 3.0 - output as f32;
     }
     for relu in [false, true] {
-        problem.weights.set_relu(relu);
+        problem.weights.relu = relu;
         let out = problem.products(gemm);
         for (i, &(dot, sum)) in problem.exact.iter().enumerate() {
             let (row, output) = (i / outputs, i % outputs);
@@ -350,7 +346,7 @@ fn rows_are_finished<T: Bounded>(gemm: &Products<T>) {
     }
 }
 
-/// That a range of panels touches its own channels and no others.
+/// Checks that a range of panels writes only its own channels.
 fn a_range_of_panels_is_its_own<T: Bounded>(gemm: &Products<T>) {
     let problem = Problem::<T>::new(gemm, (13, 17, 65), Values::Ordinary);
     let each = problem.panels().map(|panel| panel..panel + 1);
@@ -366,8 +362,8 @@ fn a_range_of_panels_is_its_own<T: Bounded>(gemm: &Products<T>) {
     }
 }
 
-/// That dot products with columns are exact to the bound of f32, and columns
-/// of inputs left out, which hold `unread`, are not read.
+/// Checks that products with columns are exact within the bound of f32, and that columns of zero
+/// inputs, which hold `unread`, are not read.
 pub fn gemv_is_near_exact<W: Weight + From<i8>>(gemv: Gemv<W>, unread: W) {
     for inputs in [0, 1, 2, 3, 7, 64, 257] {
         for (outputs, scale) in [(1, 1.0), (9, 0.25), (63, 1.0), (64, 0.25), (65, 1.0), (200, 0.25)]
@@ -400,7 +396,7 @@ pub fn gemv_is_near_exact<W: Weight + From<i8>>(gemv: Gemv<W>, unread: W) {
     }
 }
 
-/// That narrowing does what the reference does, to the bit.
+/// Checks that narrowing equals the reference to the bit.
 pub fn narrowing_is_the_reference(kernels: &Kernels) {
     let reference = reference();
     let mut draw = Draw::new("narrow");
@@ -423,8 +419,8 @@ pub fn narrowing_is_the_reference(kernels: &Kernels) {
     }
 }
 
-/// That levels are those of the reference, and sums of squares near them: of `n`
-/// steps each, fused or not (Higham 2002, §3.1).
+/// Checks that levels equal the reference, and that sums of squares are near it: `n` steps each,
+/// fused or not (Higham 2002, §3.1).
 pub fn levels_are_the_reference(kernels: &Kernels) {
     let reference = reference();
     let mut draw = Draw::new("levels");
@@ -443,8 +439,8 @@ pub fn levels_are_the_reference(kernels: &Kernels) {
     }
 }
 
-/// That peaks are those of the reference, first rows among equals, and that
-/// what is above a floor is found, in order, or nothing where room is short.
+/// Checks that peaks equal the reference, with the first of equal rows, and that values above a
+/// floor are found in order, or `None` is returned if there is no room.
 pub fn candidates_are_those_of_the_reference(kernels: &Kernels) {
     let reference = reference();
     let mut draw = Draw::new("above_floors");
@@ -471,7 +467,7 @@ pub fn candidates_are_those_of_the_reference(kernels: &Kernels) {
     }
 }
 
-/// That single products are exact to the bound of fp32, wherever they are.
+/// Checks that single products are exact within the bound of fp32.
 pub fn dots_are_near_exact(kernels: &Kernels) {
     let mut draw = Draw::new("dots");
     for &values in F32::VALUES {
@@ -498,8 +494,8 @@ pub fn dots_are_near_exact(kernels: &Kernels) {
     }
 }
 
-/// That farthest point sampling picks what the reference picks and leaves the
-/// same distances, to the bit, ties included.
+/// Checks that farthest point sampling picks the same points as the reference, ties included, and
+/// computes the same distances to the bit.
 pub fn fps_is_the_reference(kernels: &Kernels) {
     let reference = reference();
     for n in [1, 2, 3, 4, 5, 7, 8, 15, 16, 17, 31, 33, 64, 100, 1000] {
@@ -519,7 +515,7 @@ pub fn fps_is_the_reference(kernels: &Kernels) {
     }
 }
 
-/// That EdgeConv features are near those of the reference.
+/// Checks that EdgeConv features are near the reference.
 pub fn edge_features_are_near_the_reference(kernels: &Kernels) {
     let mut draw = Draw::new("edges");
     let mut dense = |outputs: usize| Dense {
@@ -546,14 +542,14 @@ pub fn edge_features_are_near_the_reference(kernels: &Kernels) {
     };
     let expected = features(reference());
     assert!(expected.iter().filter(|&&feature| feature > 0.0).count() > 100);
-    // Each is off by 150 u at most: the tests of `edge_conv` derive it for larger weights
+    // The error of each is at most 150 u: the tests of `edge_conv` derive it for larger weights
     // over the radius (5 there, 3.4 here).
     let bound = 2.0 * 150.0 * f32::EPSILON / 2.0;
     let near = |(found, expected): (&f32, &f32)| (found - expected).abs() <= bound;
     assert!(features(kernels).iter().zip(&expected).all(near));
 }
 
-/// That `work` panics with a message that contains `words`.
+/// Checks that `work` panics with a message that contains `words`.
 pub fn panics_with<T>(words: &str, work: impl FnOnce() -> T) {
     let panic = catch_unwind(AssertUnwindSafe(|| drop(work()))).expect_err("it goes through");
     let message = panic.downcast_ref::<String>().map(String::as_str);
@@ -561,7 +557,7 @@ pub fn panics_with<T>(words: &str, work: impl FnOnce() -> T) {
     assert!(message.contains(words), "expected a message with `{words}`, found `{message}`");
 }
 
-/// That operands of which a kernel would read or write beyond the end are refused.
+/// Checks that kernels reject operands whose ends they would exceed.
 fn operands_that_do_not_fit_are_refused<T: Bounded>(gemm: &Products<T>) {
     let (group, k_step) = (T::GROUP, gemm.k_step);
     let panels = Panels::zeros(2 * k_step, WIDTH_STEP, (gemm.nr, k_step, group));
@@ -591,7 +587,7 @@ fn operands_that_do_not_fit_are_refused<T: Bounded>(gemm: &Products<T>) {
     }
 }
 
-/// The tests of the kernels that `$kernels()` gives.
+/// Generates the tests of the kernels that `$kernels()` returns.
 macro_rules! suite {
     ($kernels:path) => {
         use test_support::need;

@@ -1,11 +1,11 @@
-//! What came and what did not.
+//! Counters of packets, returns and clusters.
 
 /// Packets, returns and clusters since the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// Packets that were decoded.
     pub packets: u64,
-    /// Packets that are missing by the time stamps of those that came.
+    /// Packets that are missing according to the time stamps of the others.
     pub lost: u64,
     /// Packets that came after a later one.
     pub late: u64,
@@ -13,14 +13,14 @@ pub struct Counts {
     pub duplicated: u64,
     /// Packets that are not the sensor's data: of another length or model, or damaged.
     pub foreign: u64,
-    /// How often the sensor or its clock began anew, the first time aside.
+    /// The number of restarts of the sensor or its clock.
     pub restarts: u64,
     /// Returns that were decoded.
     pub points: u64,
-    /// Returns that are in no column, because they came late or there was no room.
+    /// Returns that were dropped because they came late or there was no room.
     pub dropped_points: u64,
-    /// Clusters that were answered.
+    /// Clusters that were reported.
     pub clusters: u64,
-    /// Of those, clusters of too few points to be classified.
+    /// Reported clusters that had too few points to be classified.
     pub unclassified: u64,
 }

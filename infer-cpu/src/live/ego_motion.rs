@@ -1,4 +1,4 @@
-//! How the sensor moves.
+//! The motion of the sensor.
 
 use std::path::Path;
 
@@ -6,23 +6,23 @@ use formats::FormatError;
 use formats::trajectory::{KeyedPose, read_trajectory};
 use glam::{DQuat, DVec3};
 
-/// Where the sensor is, and how it is turned.
+/// The position and orientation of the sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
-    /// In the world, metres.
+    /// The position in the world, metres.
     pub position_m: DVec3,
-    /// From the sensor's frame to the world's.
+    /// The rotation from the sensor's frame to the world's.
     pub world_from_sensor: DQuat,
 }
 
 impl Pose {
-    /// A point of the sensor's frame in the world.
+    /// Transforms a point from the sensor's frame to the world's.
     #[must_use]
     pub fn to_world(&self, point_m: DVec3) -> DVec3 {
         self.world_from_sensor * point_m + self.position_m
     }
 
-    /// A point of the world in the sensor's frame.
+    /// Transforms a point from the world's frame to the sensor's.
     #[must_use]
     pub fn from_world(&self, point_m: DVec3) -> DVec3 {
         self.world_from_sensor.inverse() * (point_m - self.position_m)
@@ -32,15 +32,16 @@ impl Pose {
 /// The motion of the sensor.
 #[derive(Clone, Debug, PartialEq)]
 pub enum EgoMotion {
-    /// A steady one, in the sensor's frame; the world's frame is the sensor's at the first packet.
+    /// A constant twist in the sensor's frame. The world's frame is the sensor's frame at the first
+    /// packet.
     Twist {
-        /// Metres a second.
+        /// Metres per second.
         linear_m_s: DVec3,
-        /// Radians a second.
+        /// Radians per second.
         angular_rad_s: DVec3,
     },
-    /// Poses at times of Unix time, ascending; in between they are interpolated, before the first
-    /// and after the last they stay.
+    /// Poses with their Unix times, ascending. Between them, poses are interpolated; before the
+    /// first and after the last, the pose is constant.
     Poses(Vec<(f64, Pose)>),
 }
 
@@ -57,7 +58,7 @@ impl EgoMotion {
         Ok(Self::Poses(read_trajectory(file, 0.1)?.into_iter().map(pose).collect()))
     }
 
-    /// The pose at `time_s` of Unix time, for a sensor whose first packet is of `start_s`.
+    /// The pose at the Unix time `time_s`, for a sensor with its first packet at `start_s`.
     #[must_use]
     pub fn pose(&self, time_s: f64, start_s: f64) -> Pose {
         match self {
@@ -80,7 +81,7 @@ impl EgoMotion {
         }
     }
 
-    /// From when to when poses are known; `None` of a steady motion.
+    /// The times of the first and the last pose; `None` for a twist.
     #[must_use]
     pub fn known_s(&self) -> Option<[f64; 2]> {
         match self {
@@ -90,11 +91,11 @@ impl EgoMotion {
     }
 }
 
-/// Where a steady motion leads within `time_s`: the exponential of the twist.
+/// The pose after `time_s` of constant motion: the exponential of the twist.
 fn moved(linear_m_s: DVec3, angular_rad_s: DVec3, time_s: f64) -> Pose {
     let (v, w) = (linear_m_s * time_s, angular_rad_s * time_s);
     let angle = w.length();
-    // Below this, the terms that are left out are below rounding.
+    // Below this angle, the omitted terms are below rounding.
     let (a, b) = if angle < 1e-6 {
         (0.5, 1.0 / 6.0)
     } else {

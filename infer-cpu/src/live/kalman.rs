@@ -1,26 +1,26 @@
-//! A point that moves steadily along one axis, seen with noise.
+//! A Kalman filter for one axis.
 
-/// Place and velocity along an axis, and how sure they are: a Kalman filter for
-/// constant velocity, disturbed by accelerations.
+/// A Kalman filter for the position and velocity along one axis, with the constant-velocity model
+/// and random accelerations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Axis {
     /// Metres.
     pub place: f64,
-    /// Metres a second.
+    /// Metres per second.
     pub velocity: f64,
-    /// Covariance: place, place with velocity, velocity.
+    /// The covariance: position, position with velocity, velocity.
     p: [f64; 3],
 }
 
 impl Axis {
-    /// A thing first seen at `place`, give or take `place_sigma`; it may move at
-    /// `velocity_sigma` in either direction.
+    /// The state after the first measurement, `place` with standard deviation `place_sigma`. The
+    /// velocity is 0 with standard deviation `velocity_sigma`.
     pub fn new(place: f64, place_sigma: f64, velocity_sigma: f64) -> Self {
         Self { place, velocity: 0.0, p: [place_sigma.powi(2), 0.0, velocity_sigma.powi(2)] }
     }
 
-    /// Where it will be after `dt` seconds, with accelerations of `acceleration_sigma`
-    /// in between that stay the same for that long.
+    /// Predicts the state after `dt` seconds. The acceleration in between is constant, with
+    /// standard deviation `acceleration_sigma`.
     pub fn after(self, dt: f64, acceleration_sigma: f64) -> Self {
         let [pp, pv, vv] = self.p;
         let q = acceleration_sigma.powi(2);
@@ -35,12 +35,12 @@ impl Axis {
         }
     }
 
-    /// The variance of a sighting with noise `sigma`.
+    /// The variance of the innovation of a measurement with noise `sigma`.
     pub fn variance(&self, sigma: f64) -> f64 {
         self.p[0] + sigma.powi(2)
     }
 
-    /// Takes in a sighting at `place` with noise `sigma`.
+    /// Updates the state with a measurement `place` with noise `sigma`.
     pub fn update(&mut self, place: f64, sigma: f64) {
         let innovation = place - self.place;
         let variance = self.variance(sigma);
@@ -56,8 +56,8 @@ impl Axis {
 mod tests {
     use super::*;
 
-    /// With no accelerations, the filter is the weighted least-squares line through the sightings
-    /// and its first guess of the velocity.
+    /// Without accelerations, the filter is the weighted least-squares line through the
+    /// measurements and the initial velocity.
     #[test]
     fn without_accelerations_it_is_a_line_of_least_squares() {
         let (sigma, guess) = (0.2, 5.0);
@@ -67,8 +67,8 @@ mod tests {
             axis = axis.after(0.1, 0.0);
             axis.update(*place, sigma);
         }
-        // Normal equations of place and velocity at the last sighting; a row per sighting and
-        // one for the guess that the velocity is 0.
+        // Normal equations for position and velocity at the last measurement: one row per
+        // measurement, and one for the initial velocity of 0.
         let (mut a, mut b) = ([[0.0; 2]; 2], [0.0; 2]);
         let rows = seen.iter().enumerate().map(|(i, &y)| ([1.0, (i as f64 - 4.0) * 0.1], y, sigma));
         for (row, y, sigma) in rows.chain([([0.0, 1.0], 0.0, guess)]) {

@@ -1,8 +1,8 @@
-//! From the packets of a LiDAR to named, tracked objects, while the sensor turns.
+//! Classified and tracked objects from the packets of a LiDAR, while the sensor turns.
 //!
-//! A [`Pipeline`] takes packets one by one. Each is decoded, its returns join the columns of
-//! [`edgepuck_segment::Stream`], and each cluster that is complete is classified and becomes
-//! part of a track. An [`Object`] says what is known of it then.
+//! A [`Pipeline`] takes packets one by one. It decodes each, passes the returns to
+//! [`edgepuck_segment::Stream`], classifies each complete cluster and assigns it to a track. An
+//! [`Object`] is the result for a cluster.
 //!
 //! ```no_run
 //! use std::path::Path;

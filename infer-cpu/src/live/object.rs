@@ -1,14 +1,14 @@
-//! What is said of a cluster.
+//! The result for a cluster.
 
 use std::sync::Arc;
 
 use serde::{Serialize, Serializer};
 
-/// The version of what [`Object`] is written as. A field that goes or changes its meaning raises
-/// it; a new field at the end does not.
+/// The version of the JSON form of [`Object`]. Removing a field or changing its meaning raises it;
+/// a new field at the end does not.
 pub const SCHEMA_VERSION: u32 = 1;
 
-/// A cluster, named and tracked. As JSON, the fields are in this order.
+/// A classified and tracked cluster. The fields of the JSON form are in this order.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Object {
@@ -18,72 +18,78 @@ pub struct Object {
     pub turn: u64,
     /// The number of its track, from 1.
     pub track: u64,
-    /// The class of the track by all that was seen of it, or `unknown`; `None` where no cluster of
-    /// it had enough points to be classified.
+    /// The class of the track, from all of its clusters, or `unknown`; `None` if no cluster of it
+    /// had enough points to be classified.
     #[serde(serialize_with = "name")]
     pub class: Option<Arc<str>>,
-    /// The class that the track is most like, also where that is none that the model is to
-    /// tell apart.
+    /// The class that the track resembles most, even if `class` is `unknown`.
     #[serde(serialize_with = "name")]
     pub resembles: Option<Arc<str>>,
-    /// The probability of `resembles` by this cluster alone, at the temperature at which the model
-    /// was calibrated; `None` where it has too few points.
+    /// The probability of `resembles` from this cluster alone, at the model's temperature; `None`
+    /// if the cluster has too few points.
     #[serde(serialize_with = "rounded")]
     pub confidence: Option<f64>,
-    /// The probability of `resembles` by all clusters of the track.
+    /// The probability of `resembles` from all clusters of the track.
     #[serde(serialize_with = "rounded")]
     pub probability: Option<f64>,
-    /// The frame of positions and velocities: `sensor`, or `world` where the sensor's
-    /// motion is known.
+    /// The frame of positions and velocities: `sensor`, or `world` if the motion of the sensor is
+    /// known.
     pub frame: &'static str,
     /// The middle of the box around the points, metres.
-    #[serde(serialize_with = "rounded_all")]
+    #[serde(serialize_with = "rounded")]
     pub position_m: [f64; 3],
     /// Length, width and height of that box, metres.
-    #[serde(serialize_with = "rounded_all")]
+    #[serde(serialize_with = "rounded")]
     pub size_m: [f64; 3],
-    /// The direction of the length, degrees counterclockwise from x, -90 to 90: points alone do
-    /// not tell front from rear.
-    #[serde(serialize_with = "rounded_one")]
+    /// The direction of the length, degrees counterclockwise from x, -90 to 90: points alone do not
+    /// distinguish front and rear.
+    #[serde(serialize_with = "rounded")]
     pub yaw_deg: f64,
-    /// The velocity of the track, metres a second; `None` of what was seen once. In the sensor's
+    /// The velocity of the track, metres per second; `None` for its first cluster. In the sensor's
     /// frame it is relative to the sensor.
-    #[serde(serialize_with = "rounded_some")]
+    #[serde(serialize_with = "rounded")]
     pub velocity_m_s: Option<[f64; 3]>,
     /// The number of points.
     pub points: usize,
     /// The horizontal distance from the sensor, metres.
-    #[serde(serialize_with = "rounded_one")]
+    #[serde(serialize_with = "rounded")]
     pub range_m: f64,
-    /// When the first point was measured, seconds of Unix time by the sensor's clock.
+    /// When the first point was measured: Unix time in seconds by the sensor's clock.
     pub first_s: f64,
-    /// When the last point was.
+    /// When the last point was measured.
     pub last_s: f64,
-    /// From the arrival of the packet with the last point to this answer, milliseconds; `None`
-    /// where packets do not come at their time.
+    /// The time from the arrival of the packet with the last point to this result, milliseconds;
+    /// `None` if packets do not arrive in real time.
     #[serde(serialize_with = "rounded")]
     pub latency_ms: Option<f64>,
 }
 
-/// To the millimetre, and to the thousandth of all else: a sensor's noise is ten times that.
-fn thousandths(x: f64) -> f64 {
-    (x * 1e3).round() / 1e3
+/// Numbers that are written in thousandths, such as millimetres: the noise of a sensor is ten times
+/// larger.
+trait Thousandths: Copy + Serialize {
+    fn thousandths(self) -> Self;
 }
 
-fn rounded<S: Serializer>(x: &Option<f64>, serializer: S) -> Result<S::Ok, S::Error> {
-    x.map(thousandths).serialize(serializer)
+impl Thousandths for f64 {
+    fn thousandths(self) -> Self {
+        (self * 1e3).round() / 1e3
+    }
 }
 
-fn rounded_one<S: Serializer>(x: &f64, serializer: S) -> Result<S::Ok, S::Error> {
-    thousandths(*x).serialize(serializer)
+impl Thousandths for [f64; 3] {
+    fn thousandths(self) -> Self {
+        self.map(f64::thousandths)
+    }
 }
 
-fn rounded_all<S: Serializer>(x: &[f64; 3], serializer: S) -> Result<S::Ok, S::Error> {
-    x.map(thousandths).serialize(serializer)
+impl<T: Thousandths> Thousandths for Option<T> {
+    fn thousandths(self) -> Self {
+        self.map(T::thousandths)
+    }
 }
 
-fn rounded_some<S: Serializer>(x: &Option<[f64; 3]>, serializer: S) -> Result<S::Ok, S::Error> {
-    x.map(|x| x.map(thousandths)).serialize(serializer)
+fn rounded<T: Thousandths, S: Serializer>(x: &T, serializer: S) -> Result<S::Ok, S::Error> {
+    x.thousandths().serialize(serializer)
 }
 
 fn name<S: Serializer>(name: &Option<Arc<str>>, serializer: S) -> Result<S::Ok, S::Error> {

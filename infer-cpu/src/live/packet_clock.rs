@@ -1,19 +1,20 @@
-//! The times of packets: which one follows which, how many are lost, and when it was.
+//! The times of packets: their order, losses, and Unix times.
 
-/// After this long without a packet, or back by as much, a sensor counts as started anew.
+/// A gap of this length, or a step back by it, counts as a restart of the sensor.
 const RESTART_S: f64 = 1.0;
-/// The share of the difference between the clocks of the host and of the sensor that each packet
-/// takes away: they drift apart by some microseconds a second, and packets come with
-/// milliseconds of jitter.
+/// The share of the difference between the clocks of host and sensor by which each packet corrects
+/// the time. The clocks drift apart by some microseconds per second, and packets arrive with a
+/// jitter of milliseconds.
 const DRIFT_SHARE: f64 = 1e-3;
 
 /// Follows the time stamps of one sensor.
 #[derive(Clone, Debug)]
 pub struct PacketClock {
-    /// Microseconds after which time stamps begin anew, if they do.
+    /// The period of the time stamps in microseconds, if they wrap around.
     wraps_us: Option<f64>,
-    /// When the first packet arrived, seconds of Unix time. Steps are not added to Unix time: an
-    /// f64 holds it to a quarter of a microsecond, and a thousand steps would be off by a hundred.
+    /// The Unix time of the arrival of the first packet, seconds. Steps are added up separately
+    /// from Unix time, which an f64 holds to a quarter of a microsecond: rounding would add up to
+    /// 100 µs in a thousand steps.
     start_s: f64,
     last: Option<Last>,
 }
@@ -21,38 +22,39 @@ pub struct PacketClock {
 #[derive(Clone, Copy, Debug)]
 struct Last {
     stamp_us: f64,
-    /// How long the packet takes.
+    /// The duration of the packet.
     duration_us: f64,
-    /// When it was sent, seconds after the start.
+    /// When it was sent, in seconds since the start.
     after_s: f64,
 }
 
-/// What a packet is after the one before.
+/// The relation of a packet to the one before.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Succession {
-    /// There is none before.
+    /// It is the first packet.
     First,
-    /// It follows, after so many that are missing.
+    /// It follows, after a number of missing packets.
     Follows {
-        /// The packets between.
+        /// The number of missing packets in between.
         missing: u64,
     },
-    /// The same once more.
+    /// It is the same packet again.
     Duplicate,
-    /// It should have come earlier.
+    /// It was sent before the last packet.
     Late,
-    /// The sensor, or its clock, began anew.
+    /// The sensor or its clock has restarted.
     Restart,
 }
 
 impl PacketClock {
-    /// For time stamps that begin anew after `wraps_us` microseconds, if they do.
+    /// A clock for time stamps with a period of `wraps_us` microseconds, if they wrap around.
     pub fn new(wraps_us: Option<f64>) -> Self {
         Self { wraps_us, start_s: 0.0, last: None }
     }
 
-    /// Takes a packet of this time stamp and duration, which arrived at `arrival_s` of Unix
-    /// time: what it is, and when it was sent by the sensor's clock, in Unix time.
+    /// Registers a packet with this time stamp and duration, which arrived at the Unix time
+    /// `arrival_s`. Returns its relation to the one before, and when it was sent: the sensor's
+    /// clock in Unix time.
     pub fn take(&mut self, stamp_us: f64, duration_us: f64, arrival_s: f64) -> (Succession, f64) {
         let Some(last) = self.last else {
             self.start_s = arrival_s;
@@ -62,7 +64,7 @@ impl PacketClock {
         let arrived_s = arrival_s - self.start_s;
         let mut step_us = stamp_us - last.stamp_us;
         if let Some(wraps_us) = self.wraps_us {
-            // The shorter way around.
+            // The step is the shorter way around.
             step_us = (step_us + wraps_us / 2.0).rem_euclid(wraps_us) - wraps_us / 2.0;
         }
         let by_stamp_s = last.after_s + step_us * 1e-6;
@@ -123,7 +125,7 @@ mod tests {
         }
     }
 
-    /// Each is of Unix time as near as an f64 is, however many came before.
+    /// Times stay within the precision of an f64 over many packets.
     #[test]
     fn clocks_that_agree_stay_so_to_the_microsecond() {
         let mut clock = PacketClock::new(Some(HOUR_US));
@@ -135,7 +137,7 @@ mod tests {
         }
     }
 
-    /// The host's clock is faster by 50 millionths, and packets come up to 2 ms late.
+    /// The host's clock is faster by 50 ppm, and packets arrive up to 2 ms late.
     #[test]
     fn clocks_that_drift_apart_stay_together() {
         let mut clock = PacketClock::new(Some(HOUR_US));

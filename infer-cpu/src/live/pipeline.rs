@@ -1,4 +1,4 @@
-//! From packets to objects.
+//! The pipeline from packets to objects.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::ops::{Range, RangeInclusive};
@@ -16,37 +16,37 @@ use super::object::{Object, SCHEMA_VERSION};
 use super::packet_clock::{PacketClock, Succession};
 use super::sensor::{Decoder, Facts, Flaw};
 use super::stats::{Stage, Stats};
-use super::tracker::{Seen, Tracker};
+use super::tracker::{Observation, Tracker};
 use crate::classifier::Classifier;
 use crate::classifier_team::ClassifierTeam;
 use crate::error::Error;
 use crate::prediction::{UNKNOWN, UnknownRule};
 
-/// Returns for which there is room, for each ring: half as many again as a VLP-32C sends in
-/// its slowest turn with both returns.
+/// The capacity for returns of each ring: 1.5 times as many as a VLP-32C sends in its slowest turn
+/// with dual returns.
 const ROOM_PER_RING: u32 = 8192;
 
-/// Times of arrival that are believed, seconds of Unix time: three thousand years.
+/// Valid times of arrival, seconds of Unix time: three thousand years.
 const LIKELY_S: RangeInclusive<f64> = 0.0..=1e11;
 
-/// So many packets of another model, and none of the sensor's own in between, mean that the sensor
-/// is another one: some tenths of a second of packets.
+/// After this number of consecutive packets of another model (about 0.3 s), the sensor is taken as
+/// replaced.
 const MOST_FOREIGN: u32 = 300;
 
-/// The widest columns, degrees: a sensor's steps are narrower, unless its packet is damaged.
+/// The widest columns, degrees: the steps of a sensor are narrower, unless its packet is damaged.
 const WIDEST_DEG: f32 = 1.0;
 
-/// How a pipeline works.
+/// The options of a pipeline.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct LiveOptions {
-    /// Clusters of fewer points are not classified.
+    /// The fewest points of a cluster that is classified.
     pub min_points: usize,
-    /// What is ground and what belongs together. The elevations of the rings are the sensor's.
+    /// The settings of the segmentation. The elevations of the rings come from the sensor.
     pub segmentation: Settings,
-    /// How the sensor moves, if that is known.
+    /// The motion of the sensor, if known.
     pub ego_motion: Option<EgoMotion>,
-    /// What an Ouster tells of itself; without it the sensor is a Velodyne.
+    /// The metadata of an Ouster; without it, the sensor is a Velodyne.
     pub ouster: Option<Metadata>,
 }
 
@@ -56,91 +56,90 @@ impl Default for LiveOptions {
     }
 }
 
-/// A pipeline that cannot be set up.
+/// Errors of creating a pipeline.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LiveError {
-    /// Its settings.
+    /// Invalid settings of the segmentation.
     #[error(transparent)]
     Settings(#[from] SettingsError),
-    /// Its classifiers.
+    /// The classifiers cannot be created.
     #[error(transparent)]
     Classifier(#[from] Error),
 }
 
-/// When a packet came.
+/// The time of arrival of a packet.
 #[derive(Clone, Copy, Debug)]
 pub struct Arrival {
-    /// Seconds of Unix time.
+    /// Unix time in seconds.
     pub time_s: f64,
-    /// The moment, for latencies; `None` for packets of a capture that is read as fast as it can
-    /// be.
+    /// The moment, for latencies; `None` for packets of a capture that is read as fast as possible.
     pub moment: Option<Instant>,
 }
 
 impl Arrival {
-    /// Of a packet that has just come.
+    /// The arrival of a packet now.
     #[must_use]
     pub fn now() -> Self {
         let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
-        // A clock before 1970 has not been set.
+        // A clock before 1970 is not set; its time is taken as 0.
         let time_s = since.map_or(0.0, |since| since.as_secs_f64());
         Self { time_s, moment: Some(Instant::now()) }
     }
 }
 
-/// What a packet held.
+/// A decoded packet.
 #[derive(Clone, Copy, Debug)]
 pub struct Decoded<'a> {
-    /// Its returns, in the sensor's frame. Their times count from `time_s`.
+    /// Its returns, in the sensor's frame, with times relative to `time_s`.
     pub returns: &'a [Return],
-    /// When it was sent by the sensor's clock, seconds of Unix time.
+    /// When it was sent: Unix time in seconds by the sensor's clock.
     pub time_s: f64,
     /// The number of the turn, from 0.
     pub turn: u64,
 }
 
-/// Decodes, segments, classifies and tracks what one sensor sends.
+/// Decodes, segments, classifies and tracks the data of one sensor.
 ///
-/// Whatever comes over the network, a packet is decoded or counted; nothing ends the pipeline,
-/// and its memory does not grow with what comes.
+/// Every packet is decoded or counted as foreign; no packet ends the pipeline, and its memory is
+/// bounded.
 pub struct Pipeline {
     options: LiveOptions,
     sensor: Option<Sensor>,
     returns: Vec<Return>,
-    /// When the packet of `returns` was sent, seconds of Unix time; `None` where it was not taken.
+    /// When the packet of `returns` was sent, Unix time in seconds; `None` if it was not used.
     taken_s: Option<f64>,
     waiting: Waiting,
-    namer: Namer,
+    classifiers: ObjectClassifier,
     tracker: Tracker,
     counts: Counts,
     stats: Stats,
-    /// The flaws of packets so far, one of each kind, and how many of them were told.
+    /// The flaws of packets so far, one of each kind.
     flaws: Vec<Flaw>,
-    n_told: usize,
+    n_reported: usize,
 }
 
-/// The sensor that the first packet is of.
+/// The sensor of the first packet.
 struct Sensor {
     decoder: Decoder,
     clock: PacketClock,
     stream: Stream<Tag>,
-    /// When its first packet came, seconds of Unix time.
+    /// When its first packet came, Unix time in seconds.
     start_s: f64,
-    /// Packets since its last one that were not its data.
+    /// The number of foreign packets since its last packet.
     n_foreign: u32,
 }
 
-/// What is known of a point besides its place.
+/// The time of a point.
 #[derive(Clone, Copy, Default)]
 struct Tag {
-    /// Seconds of Unix time.
+    /// Unix time in seconds.
     time_s: f64,
-    /// When its packet came.
+    /// When its packet arrived.
     moment: Option<Instant>,
 }
 
-/// Clusters that are complete and not answered.
+/// Complete clusters that are not reported yet.
 #[derive(Default)]
 struct Waiting {
     points: Vec<[f32; 3]>,
@@ -156,25 +155,25 @@ struct Cluster {
     turn: u64,
 }
 
-/// Gives clusters their classes.
-struct Namer {
+/// Classifies clusters and tracks.
+struct ObjectClassifier {
     team: ClassifierTeam,
     classes: Vec<Arc<str>>,
     unknown: UnknownRule,
     unknown_name: Arc<str>,
-    /// Of each cluster, the log-probabilities of all classes; empty where it has too few points.
+    /// The log-probabilities of all classes for each classified cluster.
     log_probabilities: Vec<f64>,
     views: Vec<Option<(Range<usize>, f64)>>,
 }
 
 impl Pipeline {
-    /// A pipeline whose clusters are classified by as many threads as `classifier` has.
+    /// A pipeline that classifies clusters with as many threads as `classifier` has.
     ///
     /// # Errors
-    /// Settings that are not as they must be; threads that cannot be started.
+    /// Invalid settings; threads that cannot be started.
     pub fn new(classifier: Classifier, options: &LiveOptions) -> Result<Self, LiveError> {
         options.segmentation.check()?;
-        let namer = Namer {
+        let classifiers = ObjectClassifier {
             classes: classifier.classes().to_vec(),
             unknown: UnknownRule::new(classifier.card(), classifier.classes()),
             unknown_name: UNKNOWN.into(),
@@ -188,18 +187,18 @@ impl Pipeline {
             returns: Vec::new(),
             taken_s: None,
             waiting: Waiting::default(),
-            tracker: Tracker::new(namer.classes.len()),
-            namer,
+            tracker: Tracker::new(classifiers.classes.len()),
+            classifiers,
             counts: Counts::default(),
             stats: Stats::new(),
             flaws: Vec::new(),
-            n_told: 0,
+            n_reported: 0,
         })
     }
 
-    /// Takes a packet. What it completes is there for [`Pipeline::answer`].
+    /// Processes a packet. [`Pipeline::answer`] then reports the clusters that it completes.
     pub fn take(&mut self, payload: &[u8], mut arrival: Arrival) {
-        // A capture may state any time.
+        // A capture may have any time stamp.
         if !LIKELY_S.contains(&arrival.time_s) {
             arrival.time_s = 0.0;
         }
@@ -208,7 +207,7 @@ impl Pipeline {
         self.counts.foreign += 1;
         if let Some(sensor) = &mut self.sensor {
             sensor.n_foreign += 1;
-            // Whoever sent the first packet sends no more, and somebody else does.
+            // The first sensor is silent, and another one sends instead.
             if flaw.is_of_another_model() && sensor.n_foreign >= MOST_FOREIGN {
                 self.end();
                 self.sensor = None;
@@ -242,8 +241,8 @@ impl Pipeline {
         Ok(())
     }
 
-    /// Counts what a packet is after the one before. Whether its returns are wanted; if they are
-    /// far behind those before, these are ended.
+    /// Counts the relation of a packet to the one before, and returns whether its returns are used.
+    /// After a long gap, all clusters before it are completed.
     fn is_in_order(&mut self, succession: Succession, facts: &Facts) -> bool {
         match succession {
             Succession::Duplicate => self.counts.duplicated += 1,
@@ -256,7 +255,8 @@ impl Pipeline {
             }
             Succession::Follows { missing } => {
                 self.counts.lost += missing.saturating_sub(facts.n_unsent);
-                // Beyond a quarter of a turn, the azimuth does not tell how far the head is.
+                // Beyond a quarter of a turn, the azimuth does not determine how far the head has
+                // turned.
                 let turned_rad = missing as f64 * facts.duration_us * facts.speed_rad_us;
                 if turned_rad > FRAC_PI_2 {
                     self.end();
@@ -266,7 +266,7 @@ impl Pipeline {
         !matches!(succession, Succession::Duplicate | Succession::Late)
     }
 
-    /// Takes the decoded returns of a packet into the stream.
+    /// Passes the decoded returns of a packet to the stream.
     fn segment(&mut self, facts: &Facts, packet: Tag) {
         let Self { sensor: Some(sensor), options, returns, waiting, counts, .. } = self else {
             return;
@@ -286,7 +286,7 @@ impl Pipeline {
         }
     }
 
-    /// Ends what is not complete, as at the end of a recording.
+    /// Completes all clusters, for example at the end of a recording.
     pub fn end(&mut self) {
         self.taken_s = None;
         let Self { sensor: Some(sensor), waiting, options, .. } = self else { return };
@@ -294,26 +294,26 @@ impl Pipeline {
         sensor.end(waiting, motion);
     }
 
-    /// Classifies and tracks the clusters that are complete, and gives each to `each`, in the
-    /// order in which the beams have passed them.
+    /// Classifies and tracks the complete clusters, and passes each to `each`, in the order in
+    /// which the beams passed them.
     pub fn answer(&mut self, mut each: impl FnMut(&Object)) {
         if self.waiting.clusters.is_empty() {
             return;
         }
         let start = Instant::now();
         let motion = self.sensor.as_ref().and_then(|sensor| sensor.motion(&self.options));
-        self.namer.name(&self.waiting, self.options.min_points);
-        let named = Instant::now();
-        self.stats.spend(Stage::Classify, named - start);
-        for (cluster, view) in self.waiting.clusters.iter().zip(&self.namer.views) {
-            let view = view
-                .as_ref()
-                .map(|(range, energy)| (&self.namer.log_probabilities[range.clone()], *energy));
+        self.classifiers.classify(&self.waiting, self.options.min_points);
+        let classified = Instant::now();
+        self.stats.spend(Stage::Classify, classified - start);
+        for (cluster, view) in self.waiting.clusters.iter().zip(&self.classifiers.views) {
+            let view = view.as_ref().map(|(range, energy)| {
+                (&self.classifiers.log_probabilities[range.clone()], *energy)
+            });
             let points = &self.waiting.points[cluster.points.clone()];
             let pose = motion.map(|motion| motion.pose(cluster.last_s));
             let sensor_m = pose.map_or([0.0; 2], |pose| pose.position_m.truncate().to_array());
-            let place = Place::of(points, pose);
-            let track = self.tracker.see(&Seen {
+            let place = Place::locate(points, pose);
+            let track = self.tracker.observe(&Observation {
                 time_s: cluster.last_s,
                 position_m: place.position_m,
                 size_m: [place.size_m[0], place.size_m[1]],
@@ -321,7 +321,7 @@ impl Pipeline {
                 sensor_m,
                 view,
             });
-            let fused = self.namer.fused(&track.log_probabilities, track.energy);
+            let fused = self.classifiers.fused(&track.log_probabilities, track.energy);
             let latency = cluster.last_moment.map(|moment| moment.elapsed());
             let confidence = view.zip(fused.as_ref());
             self.counts.clusters += 1;
@@ -331,7 +331,9 @@ impl Pipeline {
                 turn: cluster.turn,
                 track: track.id,
                 class: fused.as_ref().map(|fused| Arc::clone(&fused.answer)),
-                resembles: fused.as_ref().map(|fused| Arc::clone(&self.namer.classes[fused.class])),
+                resembles: fused
+                    .as_ref()
+                    .map(|fused| Arc::clone(&self.classifiers.classes[fused.class])),
                 confidence: confidence.map(|((view, _), fused)| view[fused.class].exp()),
                 probability: fused.as_ref().map(|fused| fused.probability),
                 frame: place.frame,
@@ -349,18 +351,18 @@ impl Pipeline {
         }
         self.waiting.points.clear();
         self.waiting.clusters.clear();
-        self.stats.spend(Stage::Track, named.elapsed());
+        self.stats.spend(Stage::Track, classified.elapsed());
     }
 
-    /// What the packet held that [`Pipeline::take`] was given last; `None` where it was late, came
-    /// twice, or was not the sensor's, and after [`Pipeline::end`].
+    /// The content of the last packet of [`Pipeline::take`]; `None` if it was late, a duplicate or
+    /// foreign, and after [`Pipeline::end`].
     #[must_use]
     pub fn decoded(&self) -> Option<Decoded<'_>> {
         let turn = self.sensor.as_ref()?.stream.n_turns();
         self.taken_s.map(|time_s| Decoded { returns: &self.returns, time_s, turn })
     }
 
-    /// Where the sensor is at `time_s` of Unix time; `None` where its motion is not known or no
+    /// The pose of the sensor at the Unix time `time_s`; `None` if its motion is unknown or no
     /// packet has come.
     #[must_use]
     pub fn pose(&self, time_s: f64) -> Option<Pose> {
@@ -368,22 +370,22 @@ impl Pipeline {
         motion.map(|motion| motion.pose(time_s))
     }
 
-    /// What came and what did not.
+    /// The counters.
     #[must_use]
     pub fn counts(&self) -> &Counts {
         &self.counts
     }
 
-    /// How long things took.
+    /// The durations of stages and the latencies.
     #[must_use]
     pub fn stats(&self) -> &Stats {
         &self.stats
     }
 
-    /// The flaws of packets that were not told by an earlier call: one of each kind.
+    /// The flaws that no earlier call returned: one of each kind.
     pub fn new_flaws(&mut self) -> &[Flaw] {
-        let told = std::mem::replace(&mut self.n_told, self.flaws.len());
-        &self.flaws[told..]
+        let reported = std::mem::replace(&mut self.n_reported, self.flaws.len());
+        &self.flaws[reported..]
     }
 }
 
@@ -404,7 +406,7 @@ impl Sensor {
         Ok(Self { decoder, clock, stream, start_s, n_foreign: 0 })
     }
 
-    /// Takes in the returns of a packet, which is of the time that `packet` says.
+    /// Passes the returns of a packet to the stream; `packet` has its time.
     fn push(
         &mut self,
         facts: &Facts,
@@ -424,7 +426,7 @@ impl Sensor {
         }
     }
 
-    /// How it moves, if `options` tell.
+    /// Its motion, if `options` state it.
     fn motion<'a>(&self, options: &'a LiveOptions) -> Option<Motion<'a>> {
         let start_s = self.start_s;
         options.ego_motion.as_ref().map(|motion| Motion { motion, start_s })
@@ -436,7 +438,7 @@ impl Sensor {
     }
 }
 
-/// How the sensor moves since its first packet.
+/// The motion of the sensor since its first packet.
 #[derive(Clone, Copy)]
 struct Motion<'a> {
     motion: &'a EgoMotion,
@@ -450,8 +452,8 @@ impl Motion<'_> {
 }
 
 impl Waiting {
-    /// Takes in a cluster of a turn. If the sensor moves, its points are brought to where the
-    /// sensor would have seen them all with the last one.
+    /// Adds a cluster of a turn. If the sensor moves, the points are transformed into its frame at
+    /// the time of the last point.
     fn push(&mut self, cluster: &StreamCluster<'_, Tag>, turn: u64, motion: Option<Motion<'_>>) {
         let (Some(first), Some(last)) = (cluster.tags.first(), cluster.tags.last()) else { return };
         let start = self.points.len();
@@ -474,16 +476,16 @@ impl Waiting {
     }
 }
 
-/// Class and probability of a track.
+/// The class and probability of a track.
 struct Fused {
     class: usize,
     answer: Arc<str>,
     probability: f64,
 }
 
-impl Namer {
-    /// Classifies those of the clusters that have enough points.
-    fn name(&mut self, waiting: &Waiting, min_points: usize) {
+impl ObjectClassifier {
+    /// Classifies the clusters that have enough points.
+    fn classify(&mut self, waiting: &Waiting, min_points: usize) {
         let Self { team, log_probabilities, views, .. } = self;
         log_probabilities.clear();
         views.clear();
@@ -493,7 +495,7 @@ impl Namer {
             large.map(|cluster| (&waiting.points[cluster.points.clone()], cluster.ground_z_m));
         team.classify_many(clouds, |answer| {
             let start = log_probabilities.len();
-            // A network whose arithmetic overflows says nothing of the cluster.
+            // A cluster has no view if the network overflows on it.
             views.push(answer.ok().map(|answer| {
                 let n_classes = answer.logits.len();
                 let all = (0..n_classes).map(|class| answer.log_probability(class));
@@ -501,7 +503,8 @@ impl Namer {
                 (start..start + n_classes, answer.energy)
             }));
         });
-        // Those of too few points have their places between the others.
+        // This moves the views to the indices of their clusters; clusters of too few points have
+        // none.
         let mut next = views.len();
         views.resize(waiting.clusters.len(), None);
         for at in (0..waiting.clusters.len()).rev() {
@@ -512,8 +515,8 @@ impl Namer {
         }
     }
 
-    /// What the mean log-probabilities and the mean energy of a track make of it; `None`
-    /// without a view.
+    /// The class of a track with these mean log-probabilities and this mean energy; `None` without
+    /// a view.
     fn fused(&self, means: &[f64], energy: f64) -> Option<Fused> {
         let (class, largest) = means.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
         let sum: f64 = means.iter().map(|mean| (mean - largest).exp()).sum();
@@ -525,7 +528,7 @@ impl Namer {
     }
 }
 
-/// Where a cluster is.
+/// The position of a cluster.
 struct Place {
     frame: &'static str,
     position_m: [f64; 3],
@@ -535,8 +538,8 @@ struct Place {
 }
 
 impl Place {
-    /// Of points in the frame of the sensor, whose pose is known or not.
-    fn of(points: &[[f32; 3]], pose: Option<Pose>) -> Self {
+    /// The bounding box of points in the frame of the sensor, in the world if the pose is known.
+    fn locate(points: &[[f32; 3]], pose: Option<Pose>) -> Self {
         let OrientedBox { centre_m, size_m, yaw_rad } = OrientedBox::around(points);
         let mut place = Self {
             frame: "sensor",

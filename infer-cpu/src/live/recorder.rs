@@ -1,4 +1,4 @@
-//! A recording of a sensor and its objects: MCAP (<https://mcap.dev/spec>) with ROS 2's messages.
+//! Records a sensor and its objects as MCAP (<https://mcap.dev/spec>) with messages of ROS 2.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
@@ -16,12 +16,12 @@ use super::pipeline::{Decoded, Pipeline};
 
 /// The frame of the points.
 const SENSOR: &str = "sensor";
-/// The frame of whatever carries the sensor.
+/// The frame of the vehicle or robot.
 const BASE: &str = "base_link";
 /// The frame of poses.
 const WORLD: &str = "world";
 
-/// The fields of a point, their places and types.
+/// The fields of a point, their offsets and types.
 const FIELDS: [(&str, u32, u8); 6] = [
     ("x", 0, ros::PointField::FLOAT32),
     ("y", 4, ros::PointField::FLOAT32),
@@ -30,29 +30,29 @@ const FIELDS: [(&str, u32, u8); 6] = [
     ("ring", 16, ros::PointField::UINT16),
     ("time", 18, ros::PointField::FLOAT32),
 ];
-/// Bytes of a point.
+/// The bytes of a point.
 const POINT_BYTES: usize = 22;
 
-/// The points of a cloud at most: a head that stands still ends no turn, and memory is not to
-/// grow with what comes.
+/// The most points of a cloud: this bounds the memory if a head stands still and its turn does not
+/// end.
 const MOST_POINTS: usize = 1 << 20;
 
-/// A recording that cannot be written.
+/// The recording cannot be written.
 #[derive(Debug, thiserror::Error)]
 #[error("{}", .file.display())]
 #[non_exhaustive]
 pub struct RecordError {
     /// The file.
     pub file: PathBuf,
-    /// What the system reports.
+    /// The error of the operating system.
     pub source: io::Error,
 }
 
-/// Writes what a [`Pipeline`] decodes and answers to a file, turn by turn.
+/// Writes the points and objects of a [`Pipeline`] to a file, turn by turn.
 ///
-/// What a turn has told is in the file when the turn ends, whatever becomes of the program.
-/// The channels are `/points` (a cloud a turn), `/objects` and `/objects/markers` (a message
-/// a turn), `/tf_static` and, where the sensor's motion is known, `/tf`.
+/// The data of a turn is in the file when the turn ends, even if the program is killed later. The
+/// channels are `/points` (one cloud per turn), `/objects` and `/objects/markers` (one message per
+/// turn), `/tf_static` and, if the motion of the sensor is known, `/tf`.
 pub struct Recorder {
     file: PathBuf,
     writer: Writer<BufWriter<File>>,
@@ -70,10 +70,10 @@ struct Channels {
     tf: u16,
 }
 
-/// What has come since the last turn was written.
+/// The data since the last turn was written.
 #[derive(Default)]
 struct Turn {
-    /// The numbers of the turn and of the sensor's restarts.
+    /// The number of the turn, and the number of restarts of the sensor.
     number: (u64, u64),
     /// The points, [`POINT_BYTES`] each.
     data: Vec<u8>,
@@ -84,15 +84,14 @@ struct Turn {
 }
 
 impl Recorder {
-    /// Begins a recording; its name is there from then on. Pipes and devices are written to as
-    /// they are.
+    /// Creates the file and begins a recording. Existing pipes and devices are allowed.
     ///
     /// # Errors
-    /// A name that another file has; a file that cannot be written.
+    /// An existing file; a file that cannot be written.
     pub fn create(file: &Path) -> Result<Self, RecordError> {
         let begin = || {
-            // Without seeking, a chunk is kept back until it is complete and is then written at
-            // once: whoever kills the program loses the turn that it was in, and no more.
+            // Without seeking, the writer holds a chunk until it is complete: killing the program
+            // loses only the current turn.
             let options =
                 WriteOptions::new().profile("ros2").disable_seeking(true).chunk_size(None);
             let mut writer = options.create(BufWriter::new(open(file)?)).map_err(io_error)?;
@@ -110,16 +109,16 @@ impl Recorder {
         Ok(Self { file: file.to_path_buf(), writer, channels, turn: Turn::default(), n_turns: 0 })
     }
 
-    /// Takes in an object that the pipeline answers.
+    /// Adds an object of the pipeline.
     pub fn object(&mut self, object: &Object) {
         self.turn.objects.push(message_object(object));
     }
 
-    /// Takes in the packet that `pipeline` took last, whose answers were given to
-    /// [`Recorder::object`]; if a turn begins with it, the one before is written.
+    /// Adds the last packet of `pipeline`, after its objects were passed to [`Recorder::object`].
+    /// If a turn begins with it, the turn before is written.
     ///
     /// # Errors
-    /// A file that cannot be written, such as on a full disk.
+    /// A file that cannot be written, for example on a full disk.
     pub fn packet(&mut self, pipeline: &Pipeline) -> Result<(), RecordError> {
         let Some(decoded) = pipeline.decoded() else { return Ok(()) };
         let number = (decoded.turn, pipeline.counts().restarts);
@@ -131,8 +130,8 @@ impl Recorder {
         Ok(())
     }
 
-    /// Ends the recording with what has come since the last whole turn. A file in which nothing
-    /// was recorded goes.
+    /// Writes the data since the last whole turn and ends the recording. A file without data is
+    /// removed.
     ///
     /// # Errors
     /// A file that cannot be written.
@@ -153,7 +152,7 @@ impl Recorder {
         }
         let number = self.turn.number;
         let turn = std::mem::replace(&mut self.turn, Turn { number, ..Turn::default() });
-        // As large as this one, the next is not moved while it grows.
+        // With the size of this turn, the buffer of the next one rarely has to grow.
         self.turn.data.reserve(turn.data.len());
         self.write_turn(turn, pipeline).map_err(|source| failure(&self.file, source))
     }
@@ -167,7 +166,8 @@ impl Recorder {
                 self.write(tf_static, &first, &transform(&first, BASE, SENSOR, &still()))?;
             }
             if let Some(pose) = pipeline.pose(turn.last_s) {
-                // The sensor is where its carrier is, and a frame has one parent only.
+                // A frame has only one parent: the pose moves the base, to which the sensor is
+                // fixed.
                 self.write(tf, &last, &transform(&last, WORLD, BASE, &placed(&pose)))?;
             }
             self.write(points, &last, &cloud(std::mem::take(&mut turn.data), first))?;
@@ -213,13 +213,13 @@ impl Turn {
     }
 }
 
-/// A file of its own; devices and pipes are there before.
+/// Creates a new file, or opens an existing device or pipe.
 fn open(file: &Path) -> io::Result<File> {
     match File::create_new(file) {
         Err(error) if error.kind() != ErrorKind::AlreadyExists => Err(error),
-        Err(_) if file.metadata()?.is_file() => Err(io::Error::other(
-            "expected a name that no file has, found a file: none is replaced",
-        )),
+        Err(_) if file.metadata()?.is_file() => {
+            Err(io::Error::other("expected the name of a new file, found an existing file"))
+        }
         Err(_) => OpenOptions::new().write(true).open(file),
         opened => opened,
     }
@@ -244,7 +244,7 @@ fn io_error(error: McapError) -> io::Error {
     }
 }
 
-/// An object as messages have it: what the line says, unrounded.
+/// An object for messages: the content of the JSON line, unrounded.
 fn message_object(object: &Object) -> ros::Object {
     ros::Object {
         turn: object.turn,
@@ -259,7 +259,7 @@ fn message_object(object: &Object) -> ros::Object {
     }
 }
 
-/// A cloud of points whose times count from `first`.
+/// A cloud of points whose times are relative to `first`.
 fn cloud(data: Vec<u8>, first: Time) -> ros::PointCloud2 {
     let field = |(name, offset, datatype): (&str, u32, u8)| ros::PointField {
         name: name.to_owned(),
@@ -280,7 +280,7 @@ fn cloud(data: Vec<u8>, first: Time) -> ros::PointCloud2 {
     }
 }
 
-/// Where the frame `child` is in `parent`.
+/// The pose of the frame `child` in `parent`.
 fn transform(time: &Time, parent: &str, child: &str, at: &ros::Transform) -> ros::TFMessage {
     let header = ros::Header { stamp: time.clone(), frame_id: parent.to_owned() };
     let child_frame_id = child.to_owned();
@@ -306,7 +306,7 @@ mod tests {
     use super::*;
     use crate::live::SCHEMA_VERSION;
 
-    /// The line of version 1 is read by those who make messages of it elsewhere.
+    /// Other programs read version 1 of the line to create messages.
     #[test]
     fn messages_of_an_object_are_those_of_its_line() {
         assert_eq!(SCHEMA_VERSION, 1);

@@ -1,4 +1,4 @@
-//! The sensors whose packets are taken.
+//! The supported sensors.
 
 use std::f64::consts::TAU;
 use std::mem::discriminant;
@@ -11,21 +11,21 @@ use formats::{ouster, velodyne};
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Flaw {
-    /// Velodyne's.
+    /// An error of a Velodyne packet.
     #[error(transparent)]
     Velodyne(#[from] velodyne::PacketError),
-    /// Ouster's.
+    /// An error of an Ouster packet.
     #[error(transparent)]
     Ouster(#[from] ouster::PacketError),
 }
 
 impl Flaw {
-    /// Whether it is the data of another sensor.
+    /// Whether it is data of another sensor.
     pub(super) fn is_of_another_model(&self) -> bool {
         matches!(self, Self::Velodyne(velodyne::PacketError::OtherModel { .. }))
     }
 
-    /// Whether the other differs in its numbers at most.
+    /// Whether the other flaw is of the same kind.
     pub(super) fn is_like(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Velodyne(a), Self::Velodyne(b)) => discriminant(a) == discriminant(b),
@@ -41,37 +41,38 @@ pub enum Decoder {
     Velodyne(velodyne::Decoder),
     /// An OS0, OS1 or OS2.
     Ouster {
-        /// What decodes it.
+        /// The decoder.
         decoder: Box<ouster::Decoder>,
-        /// How the lidar is turned in the sensor's frame, radians counterclockwise.
+        /// The yaw of the lidar in the sensor's frame, radians counterclockwise.
         yaw_rad: f64,
-        /// Packets of each turn that are not sent, because their columns are not wanted.
+        /// The packets of each turn that are not sent, because their columns are outside of the
+        /// azimuth window.
         n_unsent: u64,
         /// The first column of the packet before.
         before: u16,
     },
 }
 
-/// What is known of a packet, whatever sensor it is of.
+/// The header of a packet, for all sensors.
 #[derive(Clone, Copy, Debug)]
 pub struct Facts {
     /// Its time stamp, microseconds.
     pub stamp_us: f64,
-    /// How long its firings take, microseconds.
+    /// The duration of its firings, microseconds.
     pub duration_us: f64,
-    /// Where the head was at its first firing, radians clockwise from x.
+    /// The azimuth of the head at its first firing, radians clockwise from x.
     pub azimuth_rad: f64,
-    /// By how much the head turns in a microsecond, radians.
+    /// The speed of the head, radians per microsecond.
     pub speed_rad_us: f64,
-    /// Packets that were not sent between the one before and this.
+    /// The packets between the previous one and this that the sensor does not send.
     pub n_unsent: u64,
 }
 
 impl Decoder {
-    /// For the sensor of `metadata`, or else that which the first `payload` is of.
+    /// A decoder for the sensor of `metadata`, or else for the Velodyne that sent `payload`.
     ///
     /// # Errors
-    /// If that is no data packet.
+    /// `payload` is not a data packet.
     pub fn new(metadata: Option<&ouster::Metadata>, payload: &[u8]) -> Result<Self, Flaw> {
         let Some(metadata) = metadata else {
             let header = velodyne::Header::parse(payload)?;
@@ -87,7 +88,7 @@ impl Decoder {
     /// Decodes a packet into `returns`.
     ///
     /// # Errors
-    /// If it is not this sensor's data.
+    /// It is not this sensor's data.
     pub fn decode(&mut self, payload: &[u8], returns: &mut Vec<Return>) -> Result<Facts, Flaw> {
         returns.clear();
         match self {
@@ -117,7 +118,7 @@ impl Decoder {
         }
     }
 
-    /// How far ahead of the head, or behind it, beams aim at most, radians.
+    /// The largest azimuth offset of a beam from the head, radians.
     pub fn most_offset_rad(&self) -> f64 {
         match self {
             Self::Velodyne(decoder) => decoder.most_offset_rad(),
@@ -134,16 +135,16 @@ impl Decoder {
         radians.into_iter().map(f32::to_degrees).collect()
     }
 
-    /// Microseconds after which time stamps begin anew, if they do in a lifetime.
+    /// The period of the time stamps in microseconds; `None` if they practically never wrap around.
     pub fn wraps_us(&self) -> Option<f64> {
         match self {
-            // They count microseconds past the hour.
+            // Velodyne counts microseconds past the hour.
             Self::Velodyne(_) => Some(3.6e9),
             Self::Ouster { .. } => None,
         }
     }
 
-    /// From one firing of all beams to the next in a packet of these facts, radians.
+    /// The azimuth step from one firing of all beams to the next, radians.
     pub fn step_rad(&self, facts: &Facts) -> f64 {
         let step_us = match self {
             Self::Velodyne(_) => SEQUENCE_US,

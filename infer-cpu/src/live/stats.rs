@@ -1,4 +1,4 @@
-//! How long things take.
+//! Durations of stages, and latencies.
 
 use std::time::Duration;
 
@@ -7,31 +7,31 @@ use hdrhistogram::Histogram;
 formats::named! {
     /// A stage of the pipeline.
     pub enum Stage: "stage" {
-        /// Packets become points.
+        /// Decoding packets.
         Decode = "decode",
-        /// Points become clusters.
+        /// Segmenting points into clusters.
         Segment = "segment",
-        /// Clusters get classes.
+        /// Classifying clusters.
         Classify = "classify",
-        /// Clusters get boxes and tracks.
+        /// Computing boxes and tracks.
         Track = "track",
     }
 }
 
-/// The time of each stage a turn, and the latency of each answer.
+/// The durations of each stage per turn, and the latency of each result.
 pub struct Stats {
-    /// What the turn at hand has taken so far, by stage.
+    /// The durations of the current turn, by stage.
     turn: [Duration; Stage::ALL.len()],
     stages: [Histogram<u64>; Stage::ALL.len()],
     latency: Histogram<u64>,
 }
 
-/// The longest time that is told apart, microseconds.
+/// The longest duration in a histogram, microseconds.
 const MOST_US: u64 = 100_000_000;
 
 impl Stats {
     pub(super) fn new() -> Self {
-        // Bounds and digits are constants that the crate accepts.
+        // The bounds and digits are valid constants.
         let histogram = || Histogram::new_with_bounds(1, MOST_US, 2).expect("invariant: bounds");
         Self {
             turn: [Duration::ZERO; Stage::ALL.len()],
@@ -55,26 +55,26 @@ impl Stats {
         self.latency.saturating_record(latency.as_micros() as u64);
     }
 
-    /// How many turns were measured.
+    /// The number of measured turns.
     #[must_use]
     pub fn n_turns(&self) -> u64 {
         self.stages[0].len()
     }
 
-    /// The time below which `share` (0 to 1) of the turns took in a stage, milliseconds.
+    /// The quantile `share` (0 to 1) of the durations of a stage per turn, milliseconds.
     #[must_use]
     pub fn stage_ms(&self, stage: Stage, share: f64) -> f64 {
         self.stages[stage as usize].value_at_quantile(share) as f64 / 1e3
     }
 
-    /// The mean time of a stage a turn, milliseconds.
+    /// The mean duration of a stage per turn, milliseconds.
     #[must_use]
     pub fn mean_ms(&self, stage: Stage) -> f64 {
         self.stages[stage as usize].mean() / 1e3
     }
 
-    /// The time below which `share` (0 to 1) of the answers came after their cluster's last
-    /// packet, milliseconds; `None` where packets did not come at their time.
+    /// The quantile `share` (0 to 1) of the times from a cluster's last packet to its result,
+    /// milliseconds; `None` if packets did not arrive in real time.
     #[must_use]
     pub fn latency_ms(&self, share: f64) -> Option<f64> {
         (!self.latency.is_empty()).then(|| self.latency.value_at_quantile(share) as f64 / 1e3)

@@ -1,76 +1,76 @@
-//! Which cluster is the same object as one of the turn before.
+//! The tracker, which matches clusters with the objects of earlier turns.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 use super::kalman::Axis;
 
-/// How fast what is seen for the first time may move, metres a second: a town's traffic, of
-/// which the fastest is oncoming. Along z, ramps and steps.
+/// The standard deviation of the velocity of a new object, metres per second: urban traffic, of
+/// which oncoming cars are the fastest; along z, ramps and steps.
 const FIRST_VELOCITY_M_S: [f64; 3] = [8.0, 8.0, 0.5];
-/// Accelerations of cars and persons, metres a second squared.
+/// The standard deviation of accelerations of cars and persons, metres per second squared.
 const ACCELERATION_M_S2: [f64; 3] = [3.0, 3.0, 0.5];
-/// By how much the middle of a box is off: the range noise and the spacing of the
-/// beams, metres, and a share of the box's length, because other sides come into sight.
+/// The error of the middle of a box: range noise and beam spacing in metres, plus a share of the
+/// box's length, because the visible sides change.
 const OFF_M: f64 = 0.1;
 const OFF_SHARE: f64 = 0.05;
-/// By how much two views of a side differ: metres, and a share of it.
+/// The difference between two measurements of a side: metres, plus a share of the side.
 const SIZE_OFF_M: f64 = 0.2;
 const SIZE_OFF_SHARE: f64 = 0.3;
-/// What is kept of a side from turn to turn, when less is seen of it: what was one with a
-/// neighbour is not taken for larger than it is for long.
+/// A side that is measured shorter decays by 1 % per turn, so that a size that merging with a
+/// neighbour inflated does not persist.
 const SHRINKAGE: f64 = 0.99;
-/// The most of a side that is taken to be hidden, metres: most of a car's length.
+/// The largest hidden part of a side, metres: most of a car's length.
 const MOST_HIDDEN_M: f64 = 4.0;
-/// The squared Mahalanobis distance beyond which a cluster is another object: one in a hundred
-/// of the right ones is farther (chi-squared, three degrees of freedom).
+/// The gate: a cluster beyond this squared Mahalanobis distance is another object. It excludes one
+/// in a hundred correct matches (chi-squared, three degrees of freedom).
 const GATE: f64 = 11.34;
-/// How long a track waits for its object, seconds.
+/// How long a track survives without a cluster, seconds.
 const PATIENCE_S: f64 = 1.05;
-/// Sensors turn 5 to 20 times a second; a damaged packet may say anything.
+/// Sensors turn 5 to 20 times per second; a damaged packet may state any speed.
 const LEAST_TURN_S: f64 = 0.02;
 const MOST_TURN_S: f64 = 0.4;
-/// The most tracks: what comes on top replaces the track that has waited longest.
+/// The most tracks: a further one replaces the track that has waited longest.
 const MOST_TRACKS: usize = 1024;
-/// The weight of the latest view among all of a track, at least: some two seconds count at
-/// ten turns a second.
+/// The least weight of the latest view of a track: views of about two seconds count at ten turns
+/// per second.
 const LEAST_WEIGHT: f64 = 0.05;
 
-/// A cluster, as the tracker takes it.
+/// A cluster for the tracker.
 #[derive(Clone, Copy, Debug)]
-pub struct Seen<'a> {
-    /// When, seconds.
+pub struct Observation<'a> {
+    /// The time, seconds.
     pub time_s: f64,
-    /// The middle of its box, metres, in a frame that stays.
+    /// The middle of its box, metres, in a fixed frame.
     pub position_m: [f64; 3],
     /// Length and width of its box, metres.
     pub size_m: [f64; 2],
     /// The direction of the length, radians counterclockwise from x.
     pub yaw_rad: f64,
-    /// Where the sensor is, metres.
+    /// The position of the sensor, metres.
     pub sensor_m: [f64; 2],
-    /// The log-probability of each class and the energy, where it was classified.
+    /// The log-probability of each class, and the energy, if it was classified.
     pub view: Option<(&'a [f64], f64)>,
 }
 
-/// An object over time.
+/// A tracked object.
 #[derive(Clone, Debug, Default)]
 pub struct Track {
     /// Its number, from 1.
     pub id: u64,
     axes: Option<[Axis; 3]>,
     footprint: Footprint,
-    /// When it was last seen.
+    /// The time of the last cluster.
     last_s: f64,
-    /// How often.
+    /// The number of its clusters.
     pub n_seen: u64,
-    /// Weighted means over its views; empty without one.
+    /// Weighted means of the log-probabilities over all views; empty without a view.
     pub log_probabilities: Vec<f64>,
-    /// The same of the energy.
+    /// The weighted mean of the energy.
     pub energy: f64,
     n_views: u64,
 }
 
-/// How large an object is from above, by all that was seen of it.
+/// The size of an object seen from above, from all of its clusters.
 #[derive(Clone, Copy, Debug, Default)]
 struct Footprint {
     /// The direction of the first side, radians counterclockwise from x.
@@ -80,9 +80,9 @@ struct Footprint {
 }
 
 impl Footprint {
-    /// The sides of the box that was seen, in the order of this footprint's, and the direction
-    /// of the first.
-    fn sides_of(&self, seen: &Seen<'_>) -> ([f64; 2], f64) {
+    /// The sides of the measured box, in the order of this footprint's sides, and the direction of
+    /// the first.
+    fn sides_of(&self, seen: &Observation<'_>) -> ([f64; 2], f64) {
         let [length, width] = seen.size_m;
         let turned = (seen.yaw_rad - self.yaw_rad + FRAC_PI_4).rem_euclid(PI);
         match turned < FRAC_PI_2 {
@@ -91,8 +91,8 @@ impl Footprint {
         }
     }
 
-    /// The middle of the whole object: what is not seen of its sides lies behind what is.
-    fn middle(&self, seen: &Seen<'_>) -> [f64; 3] {
+    /// The middle of the whole object, whose hidden parts lie behind the visible ones.
+    fn middle(&self, seen: &Observation<'_>) -> [f64; 3] {
         let (sides, yaw_rad) = self.sides_of(seen);
         let mut middle = seen.position_m;
         let (sin, cos) = yaw_rad.sin_cos();
@@ -106,9 +106,9 @@ impl Footprint {
         middle
     }
 
-    /// How little what is seen of an object has the size of the whole: squares of the sides'
-    /// differences in units of what other views of the same object differ by.
-    fn mismatch(&self, seen: &Seen<'_>) -> f64 {
+    /// The mismatch of the measured size: the sum of the squared differences of the sides, in units
+    /// of the usual difference between two measurements of one object.
+    fn mismatch(&self, seen: &Observation<'_>) -> f64 {
         let (sides, _) = self.sides_of(seen);
         let term = |i: usize| {
             let larger = sides[i].max(self.sides_m[i]);
@@ -117,7 +117,7 @@ impl Footprint {
         term(0) + term(1)
     }
 
-    fn update(&mut self, seen: &Seen<'_>) {
+    fn update(&mut self, seen: &Observation<'_>) {
         let (sides, yaw_rad) = self.sides_of(seen);
         let grown = |i: usize| sides[i].max(SHRINKAGE * self.sides_m[i]);
         *self = Self { yaw_rad, sides_m: [grown(0), grown(1)] };
@@ -126,28 +126,28 @@ impl Footprint {
 
 /// Follows objects from turn to turn.
 ///
-/// Each cluster goes to the track that expects it most, as soon as it comes: the nearest one
-/// by the Mahalanobis distance of a Kalman filter for constant velocity along each axis, that
-/// of the surer prediction of two. A track takes one cluster a turn.
+/// Each cluster is assigned as soon as it comes to the most likely track, by the Mahalanobis
+/// distance of a constant-velocity Kalman filter along each axis; of two equally near tracks, the
+/// one with the smaller variance is more likely. A track takes one cluster per turn.
 pub struct Tracker {
-    /// Room for all of them, of which the first `n_used` have been used.
+    /// Memory for all tracks, of which the first `n_used` have been used.
     tracks: Vec<Track>,
     n_used: usize,
     n_ids: u64,
-    /// The time that a turn takes, seconds.
+    /// The duration of a turn, seconds.
     turn_s: f64,
 }
 
 impl Track {
-    /// Its velocity, metres a second; `None` of what was seen once.
+    /// The velocity, metres per second; `None` after only one cluster.
     #[must_use]
     pub fn velocity_m_s(&self) -> Option<[f64; 3]> {
         self.axes.filter(|_| self.n_seen > 1).map(|axes| axes.map(|axis| axis.velocity))
     }
 
-    /// How unlikely `seen` is its object: squared Mahalanobis distance, and the logarithm of
-    /// the variances on top. `None` beyond the gate.
-    fn cost(&self, seen: &Seen<'_>) -> Option<f64> {
+    /// The cost of matching `seen` (a negative log-likelihood): the squared Mahalanobis distance
+    /// plus the logarithms of the variances plus the mismatch of sizes. `None` beyond the gate.
+    fn cost(&self, seen: &Observation<'_>) -> Option<f64> {
         let (sigma, middle) = (off_m(seen), self.footprint.middle(seen));
         let dt = seen.time_s - self.last_s;
         let (mut distance, mut logarithm) = (0.0, 0.0);
@@ -160,7 +160,7 @@ impl Track {
         (distance <= GATE).then_some(distance + logarithm + self.footprint.mismatch(seen))
     }
 
-    fn update(&mut self, seen: &Seen<'_>) {
+    fn update(&mut self, seen: &Observation<'_>) {
         let (sigma, middle) = (off_m(seen), self.footprint.middle(seen));
         let dt = seen.time_s - self.last_s;
         for (i, axis) in self.axes.iter_mut().flatten().enumerate() {
@@ -170,8 +170,8 @@ impl Track {
         self.note(seen);
     }
 
-    /// Makes a new track of this one's memory.
-    fn begin(&mut self, id: u64, seen: &Seen<'_>) {
+    /// Begins a new track in the memory of this one.
+    fn begin(&mut self, id: u64, seen: &Observation<'_>) {
         let sigma = off_m(seen);
         let axis = |i: usize| Axis::new(seen.position_m[i], sigma, FIRST_VELOCITY_M_S[i]);
         let mut log_probabilities = std::mem::take(&mut self.log_probabilities);
@@ -182,7 +182,7 @@ impl Track {
         self.note(seen);
     }
 
-    fn note(&mut self, seen: &Seen<'_>) {
+    fn note(&mut self, seen: &Observation<'_>) {
         self.footprint.update(seen);
         self.last_s = seen.time_s;
         self.n_seen += 1;
@@ -198,7 +198,7 @@ impl Track {
 }
 
 impl Tracker {
-    /// A tracker of objects of so many classes.
+    /// A tracker of objects with `n_classes` classes.
     pub fn new(n_classes: usize) -> Self {
         let track =
             || Track { log_probabilities: Vec::with_capacity(n_classes), ..Track::default() };
@@ -206,22 +206,22 @@ impl Tracker {
         Self { tracks, n_used: 0, n_ids: 0, turn_s: 0.1 }
     }
 
-    /// Says how long a turn takes, seconds.
+    /// Sets the duration of a turn, seconds.
     pub fn set_turn(&mut self, turn_s: f64) {
         self.turn_s = turn_s.clamp(LEAST_TURN_S, MOST_TURN_S);
     }
 
-    /// Forgets all objects; numbers go on.
+    /// Forgets all objects; track numbers continue.
     pub fn forget(&mut self) {
         for track in &mut self.tracks {
             track.axes = None;
         }
     }
 
-    /// The track that `seen` belongs to, with what it adds: one of those before, or a new one.
-    pub fn see(&mut self, seen: &Seen<'_>) -> &Track {
+    /// Adds `seen` to the track that it matches, or to a new one, and returns the track.
+    pub fn observe(&mut self, seen: &Observation<'_>) -> &Track {
         let waits = |track: &Track| seen.time_s - track.last_s;
-        // A track that was seen in this turn has its cluster.
+        // A track that already has a cluster in this turn does not take another.
         let due = 0.5 * self.turn_s..=PATIENCE_S.max(2.5 * self.turn_s);
         let tracks = self.tracks[..self.n_used].iter().enumerate();
         let tracks = tracks.filter(|(_, track)| due.contains(&waits(track)));
@@ -253,8 +253,8 @@ impl Tracker {
     }
 }
 
-/// By how much the middle of the box is off, metres.
-fn off_m(seen: &Seen<'_>) -> f64 {
+/// The error of the middle of the box, metres.
+fn off_m(seen: &Observation<'_>) -> f64 {
     OFF_M + OFF_SHARE * seen.size_m[0]
 }
 
@@ -262,8 +262,8 @@ fn off_m(seen: &Seen<'_>) -> f64 {
 mod tests {
     use super::*;
 
-    fn seen(time_s: f64, x: f64, y: f64) -> Seen<'static> {
-        Seen {
+    fn seen(time_s: f64, x: f64, y: f64) -> Observation<'static> {
+        Observation {
             time_s,
             position_m: [x, y, 0.0],
             size_m: [1.0; 2],
@@ -279,8 +279,8 @@ mod tests {
         let mut ids = [vec![], vec![]];
         for turn in 0..60 {
             let t = f64::from(turn) * 0.1;
-            ids[0].push(tracker.see(&seen(t, -3.0 + t, 0.0)).id);
-            ids[1].push(tracker.see(&seen(t + 0.01, 3.0 - t, 0.8)).id);
+            ids[0].push(tracker.observe(&seen(t, -3.0 + t, 0.0)).id);
+            ids[1].push(tracker.observe(&seen(t + 0.01, 3.0 - t, 0.8)).id);
         }
         assert!(ids[0].iter().all(|&id| id == 1), "{:?}", ids[0]);
         assert!(ids[1].iter().all(|&id| id == 2), "{:?}", ids[1]);
@@ -291,22 +291,22 @@ mod tests {
         let mut tracker = Tracker::new(2);
         let at = |t: f64| seen(t, 12.0 * t, 3.0);
         (0..20).for_each(|turn| {
-            tracker.see(&at(f64::from(turn) * 0.1));
+            tracker.observe(&at(f64::from(turn) * 0.1));
         });
-        assert_eq!(tracker.see(&at(2.9)).id, 1);
-        let velocity = tracker.see(&at(3.0)).velocity_m_s().unwrap();
+        assert_eq!(tracker.observe(&at(2.9)).id, 1);
+        let velocity = tracker.observe(&at(3.0)).velocity_m_s().unwrap();
         assert!((velocity[0] - 12.0).abs() < 0.1 && velocity[1].abs() < 0.1, "{velocity:?}");
-        assert_eq!(tracker.see(&at(5.0)).id, 2);
+        assert_eq!(tracker.observe(&at(5.0)).id, 2);
     }
 
     #[test]
     fn what_is_cut_in_two_is_two_tracks_and_so_is_what_is_far_off() {
         let mut tracker = Tracker::new(2);
-        tracker.see(&seen(0.0, 5.0, 0.0));
-        assert_eq!(tracker.see(&seen(0.1, 5.1, 0.0)).id, 1);
-        assert_eq!(tracker.see(&seen(0.101, 5.4, 0.0)).id, 2);
-        assert_eq!(tracker.see(&seen(0.2, 9.0, 0.0)).id, 3);
-        assert_eq!(tracker.see(&seen(0.2, 9.0, 0.0)).velocity_m_s(), None);
+        tracker.observe(&seen(0.0, 5.0, 0.0));
+        assert_eq!(tracker.observe(&seen(0.1, 5.1, 0.0)).id, 1);
+        assert_eq!(tracker.observe(&seen(0.101, 5.4, 0.0)).id, 2);
+        assert_eq!(tracker.observe(&seen(0.2, 9.0, 0.0)).id, 3);
+        assert_eq!(tracker.observe(&seen(0.2, 9.0, 0.0)).velocity_m_s(), None);
     }
 
     #[test]
@@ -315,8 +315,8 @@ mod tests {
         let views = [[-2.0, -0.2], [-0.1, -3.0], [-0.1, -3.0]];
         let means = views.iter().enumerate().map(|(turn, view)| {
             let time_s = turn as f64 * 0.1;
-            let seen = Seen { view: Some((view, turn as f64)), ..seen(time_s, 1.0, 0.0) };
-            let track = tracker.see(&seen);
+            let seen = Observation { view: Some((view, turn as f64)), ..seen(time_s, 1.0, 0.0) };
+            let track = tracker.observe(&seen);
             (track.log_probabilities.clone(), track.energy)
         });
         let means: Vec<_> = means.collect();
@@ -324,7 +324,7 @@ mod tests {
         assert!((means[2].0[0] - -2.2 / 3.0).abs() < 1e-12 && (means[2].1 - 1.0).abs() < 1e-12);
     }
 
-    /// Of a car that stands, first a corner is seen, then its side and then its rear.
+    /// A parked car shows first a corner, then its side and then its rear.
     #[test]
     fn what_is_hidden_of_a_car_moves_it_nowhere() {
         let mut tracker = Tracker::new(2);
@@ -336,8 +336,8 @@ mod tests {
         ];
         for turn in 0..24 {
             let ([x, y], size_m, yaw_rad) = views[turn / 6];
-            let seen = Seen { size_m, yaw_rad, ..seen(turn as f64 * 0.1, x, y) };
-            let track = tracker.see(&seen);
+            let seen = Observation { size_m, yaw_rad, ..seen(turn as f64 * 0.1, x, y) };
+            let track = tracker.observe(&seen);
             assert_eq!(track.id, 1, "turn {turn}");
             let [vx, vy, _] = track.velocity_m_s().unwrap_or_default();
             assert!(vx.hypot(vy) < 0.4, "turn {turn}: {vx} {vy}");
@@ -348,12 +348,12 @@ mod tests {
     fn tracks_are_bounded_and_their_memory_is_used_again() {
         let mut tracker = Tracker::new(2);
         for i in 0..5000 {
-            tracker.see(&seen(0.0, f64::from(i) * 100.0, 0.0));
+            tracker.observe(&seen(0.0, f64::from(i) * 100.0, 0.0));
         }
         assert_eq!(tracker.n_used, MOST_TRACKS);
-        tracker.see(&seen(100.0, 0.0, 0.0));
+        tracker.observe(&seen(100.0, 0.0, 0.0));
         assert_eq!(tracker.n_used, MOST_TRACKS);
         tracker.forget();
-        assert_eq!(tracker.see(&seen(100.1, 0.0, 0.0)).id, 5002);
+        assert_eq!(tracker.observe(&seen(100.1, 0.0, 0.0)).id, 5002);
     }
 }

@@ -1,33 +1,33 @@
-//! A block's activations in 128 levels.
+//! The activations of a block, quantised to 128 levels.
 
 use std::ops::RangeInclusive;
 
 use crate::kernel::{I8_LARGEST, Kernels, LevelSums, Rows};
 
-/// Largest activations that divisions by their step leave finite and normal.
+/// The range of largest activations for which quotients by the step are finite and normal.
 const ORDINARY: RangeInclusive<f32> = 1e-15..=1e15;
 
-/// Levels of some rows.
+/// The levels of a block of rows.
 #[derive(Default)]
 pub struct Levels {
-    /// A level for each activation.
+    /// The level of each activation.
     pub bytes: Vec<u8>,
-    /// Between two levels.
+    /// The difference between two levels.
     pub step: f32,
     /// The largest Euclidean norm of a row's levels.
     pub norm: f32,
-    /// The largest Euclidean norm of what rounding took from a row, in levels.
+    /// The largest Euclidean norm of a row's rounding errors, in levels.
     pub lost: f32,
 }
 
 impl Levels {
-    /// Room for `n` activations.
+    /// Memory for `n` activations.
     pub fn with_room(n: usize) -> Self {
         Self { bytes: vec![0; n], ..Self::default() }
     }
 
-    /// Takes the levels of `rows`, whole ones, and returns whether there are
-    /// any: not of activations below 0, of none above 0 and of extreme ones.
+    /// Quantises `rows`, padding included. Returns false if an activation is negative, or if the
+    /// largest one is 0 or extreme.
     pub fn take(&mut self, kernels: &Kernels, rows: &Rows<'_, f32>) -> bool {
         let values = &rows.data()[..rows.n() * rows.stride()];
         let (least, largest) = extremes(values);
@@ -47,11 +47,11 @@ impl Levels {
     }
 }
 
-/// The smallest and the largest of `values`, whole rows, or 0. NaN is passed over.
+/// The smallest and the largest of `values` and 0. NaN does not count.
 fn extremes(values: &[f32]) -> (f32, f32) {
     const LANES: usize = 16;
     let (mut least, mut largest) = ([0.0f32; LANES], [0.0f32; LANES]);
-    // Rows are multiples of a vector's width: nothing is left over.
+    // Rows are multiples of a vector's width, so there is no remainder.
     for chunk in values.as_chunks::<LANES>().0 {
         for lane in 0..LANES {
             let value = chunk[lane];

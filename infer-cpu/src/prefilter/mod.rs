@@ -1,33 +1,29 @@
-//! Maxima in fp32 at little more than the cost of int8 products.
+//! Exact fp32 maxima at little more than the cost of int8 products.
 //!
-//! Pooling wants one product of each channel only, the largest. An int8
-//! estimate of every product, four times as fast, comes with a bound of its
-//! error; a product whose estimate lies two bounds below another's cannot be
-//! the largest. What is left, a few products in a hundred, is computed in fp32.
-//! So the maxima are those of fp32, and no accuracy is traded.
+//! Pooling needs only the largest product of each channel. The prefilter estimates every product in
+//! int8, which is four times as fast, with a bound on the error: a product whose estimate lies two
+//! bounds below another's cannot be the largest. The remaining products, a few in a hundred, are
+//! computed in fp32. The maxima are therefore exactly those of fp32.
 //!
-//! Of a block's rows, the one with a channel's largest estimate is computed
-//! first: it is nearly always the winner, and its product, which is certain,
-//! takes the place of its estimate in the comparison with the others.
+//! For each channel, the row of a block with the largest estimate is computed first. It nearly
+//! always wins, and its exact product replaces its estimate in the comparison with the others.
 //!
 //! # The bound
-//! Activations `x >= 0` of a block of points are `s (p + d)`, levels `p` from 0
-//! to 127; a channel's weights are `w = t q + e`, `|q| <= 127`. Then
+//! Activations `x >= 0` of a block of points are `s (p + d)`, levels `p` from 0 to 127; a channel's
+//! weights are `w = t q + e`, `|q| <= 127`. Then
 //!
 //! ```text
 //! sum(w x) / s  =  t sum(q p)  +  sum(e p)  +  sum(w d)
 //! |sum(w x) / s - t sum(q p)|  <=  |e| |p|  +  |w| |d|
 //! ```
 //!
-//! by Cauchy and Schwarz, with the norms |e|, |w| of the channel and the
-//! largest |p|, |d| of the block's rows. Rounding in fp32 adds at most
-//! `(K + 64) u 127 sum|w|`, u = 2⁻²⁴: K + 1 steps for the product that is
-//! compared with the maximum (Higham 2002, §3.1), of magnitudes of at most `127
-//! sum|w|`; the other 63 for some ten steps of magnitudes of at most twice that
-//! (weights rounded up), in the levels' quotients, the estimate, the maximum's
-//! quotient and its sum with the bound. Norms are rounded up by 10⁻⁴, more than
-//! their sums of squares lose below 10³ inputs a lane. Weights and steps are
-//! kept where nothing overflows or loses digits.
+//! by Cauchy and Schwarz, with the norms |e|, |w| of the channel and the largest |p|, |d| of the
+//! block's rows. Rounding in fp32 adds at most `(K + 64) u 127 sum|w|`, u = 2⁻²⁴: K + 1 steps for
+//! the product that is compared with the maximum (Higham 2002, §3.1), of magnitudes of at most `127
+//! sum|w|`; the other 63 for some ten steps of magnitudes of at most twice that (weights rounded
+//! up): the levels' quotients, the estimate, the maximum's quotient and its sum with the bound.
+//! Norms are rounded up by 10⁻⁴, more than their sums of squares lose below 10³ inputs a lane.
+//! Weights and steps are limited to a range without overflow or loss of digits.
 
 mod levels;
 
@@ -42,46 +38,46 @@ use crate::precision::{Format, I8, Weight};
 /// Output channels that a thread pools at a time.
 pub const GROUP: usize = 128;
 
-/// Whether products of so many inputs are worth ruling out, where kernels
-/// prefilter at all: not of so few that they are cheap.
+/// Whether a prefilter makes a layer of this number of inputs faster: with few inputs, the products
+/// are cheap.
 #[must_use]
 pub const fn prefilter_pays(inputs: usize) -> bool {
     inputs >= 32
 }
 
-/// A product alone costs some three times its share of a tile; with more of
-/// them than one in so many, the tile is the better choice.
+/// A single product costs about three times its share of a tile. If more than one product in four
+/// remains, the tile is faster.
 const ONE_IN: usize = 4;
 
-/// Of channels whose weights sum to magnitudes outside of this, where estimates
-/// might overflow and products lose digits, no product is ruled out.
+/// The range of a channel's sum of weight magnitudes. Outside of it, estimates might overflow and
+/// products lose digits, so that no product is ruled out.
 const ORDINARY: Range<f64> = 1e-15..1e15;
 
-/// Norms are rounded up, by more than fp32 may have lost of them.
+/// Norms are rounded up by more than their rounding errors in fp32.
 const NORM_SLACK: f64 = 1.0001;
 
-/// Int8 weights of a pooled layer, which rule out most of its fp32 products.
+/// The int8 weights of a pooled layer, whose estimates rule out most of its fp32 products.
 pub struct Int8Prefilter {
     channels: Vec<Channels>,
     /// `[outputs, inputs]`, inputs padded to whole vectors.
     weights: Vec<f32>,
-    /// From one channel's weights to the next.
+    /// The distance from one channel's weights to the next.
     stride: usize,
 }
 
 /// Channels that are pooled together.
 struct Channels {
-    /// The first of them.
+    /// The first channel.
     first: usize,
     panels: Panels<i8>,
     bounds: Vec<Bound>,
-    /// A maximum of less than this need not be found, in search of winners.
+    /// In a search for winners, maxima below this do not matter.
     least: Vec<f32>,
-    /// The same, in search of what comes out of a ReLU.
+    /// In a search for outputs of a ReLU, maxima below this do not matter.
     least_seen: Vec<f32>,
 }
 
-/// A channel's part in the bound of its estimates' errors.
+/// The coefficients of a channel's error bound.
 #[derive(Clone, Copy, Default)]
 struct Bound {
     /// |e|.
@@ -91,11 +87,11 @@ struct Bound {
     rounding: f32,
 }
 
-/// A thread's own memory of prefiltering a block of rows.
+/// A thread's working memory for prefiltering a block of rows.
 pub struct PrefilterScratch {
     estimates: Vec<f32>,
     bounds: Vec<f32>,
-    /// The largest estimate of each channel, later what others must exceed.
+    /// The largest estimate of each channel, then the threshold that other estimates must exceed.
     floors: Vec<f32>,
     peak_rows: Vec<u32>,
     found: Vec<Candidate>,
@@ -103,7 +99,7 @@ pub struct PrefilterScratch {
 }
 
 impl PrefilterScratch {
-    /// Memory for so many rows.
+    /// Memory for blocks of this number of rows.
     pub fn new(rows: usize) -> Self {
         let channels = GROUP;
         let most = (channels + 1).max(rows * channels / ONE_IN);
@@ -120,11 +116,11 @@ impl PrefilterScratch {
 
 /// The best products of a group's channels so far.
 pub struct Best<'a> {
-    /// A product for each channel.
+    /// The largest product of each channel.
     pub maxima: &'a mut [f32],
     /// Their rows.
     pub winners: &'a mut [u32],
-    /// What rows at hand are counted from.
+    /// The number of the first row of the current block.
     pub first_row: u32,
 }
 
@@ -134,7 +130,7 @@ impl Best<'_> {
             let channel = usize::from(candidate.channel);
             let row = self.first_row + u32::from(candidate.row);
             let best = self.maxima[channel];
-            // A peak may come before a row that is its equal and its earlier.
+            // A peak may be computed before an equal product of an earlier row.
             if product > best || (product == best && row < self.winners[channel]) {
                 self.maxima[channel] = product;
                 self.winners[channel] = row;
@@ -144,7 +140,7 @@ impl Best<'_> {
 }
 
 impl Int8Prefilter {
-    /// A prefilter of `layer`; none where it would not pay.
+    /// A prefilter for `layer`, if it makes the layer faster.
     pub fn new(layer: &Dense, kernels: &Kernels) -> Option<Self> {
         if !kernels.prefilters || !prefilter_pays(layer.inputs) {
             return None;
@@ -163,17 +159,16 @@ impl Int8Prefilter {
         Some(Self { channels, weights, stride })
     }
 
-    /// Raises `maxima` of a group to what makes it pointless to look for less.
+    /// Sets the `maxima` of a group to the values below which products do not matter.
     pub fn begin(&self, group: usize, wants_winners: bool, maxima: &mut [f32]) {
         let Channels { least, least_seen, .. } = &self.channels[group];
         maxima.copy_from_slice(if wants_winners { least } else { least_seen });
     }
 
-    /// Raises the best of a group to the products of `rows`, whose `levels` are
-    /// known. Of equal products the first wins.
+    /// Raises the best of a group to the products of `rows`, given their `levels`. If products are
+    /// equal, the first row wins.
     ///
-    /// Returns false if too many products come into question; what was raised
-    /// until then is a product all the same.
+    /// Returns false if too many products remain; the maxima raised until then are valid.
     pub fn pool(
         &self,
         kernels: &Kernels,
@@ -194,13 +189,14 @@ impl Int8Prefilter {
         let per_step = 1.0 / levels.step;
         let mut n = 0;
         for channel in 0..width {
-            // Written in any case, counted if need be: no branch to mispredict.
+            // The write is unconditional and only the count depends on the comparison: this avoids
+            // branch mispredictions.
             found[n] = Candidate { row: peak_rows[channel] as u16, channel: channel as u16 };
             let peak = floors[channel] + bounds[channel];
             n += usize::from(peak > best.maxima[channel] * per_step);
         }
         for peak in &found[..n] {
-            // Once is enough.
+            // The peak is computed here; this excludes it from the search below.
             estimates[usize::from(peak.row) * width + usize::from(peak.channel)] =
                 f32::NEG_INFINITY;
         }
@@ -209,7 +205,8 @@ impl Int8Prefilter {
         best.raise(&found[..n], &products[..n]);
         for channel in 0..width {
             let floor = best.maxima[channel] * per_step - bounds[channel];
-            // An infinite bound rules out nothing, not even beside an infinity.
+            // The difference of two infinities is NaN. An infinite bound must not rule out any
+            // product.
             floors[channel] = if floor.is_nan() { f32::NEG_INFINITY } else { floor };
         }
         let most = rows.n() * width / ONE_IN;
@@ -225,12 +222,12 @@ impl Channels {
         let gemm = I8::gemm(kernels).expect("invariant: kernels that prefilter have int8 products");
         let (inputs, n) = (layer.inputs, range.len());
         let mut panels = Panels::zeros(inputs, n, (gemm.nr, gemm.k_step, I8::GROUP));
-        // A range of as many units as there are levels: sums come out in levels.
+        // With a range equal to the number of levels, sums are in units of levels.
         i8::fill(&mut panels, f32::from(I8_LARGEST), |input, output| {
             layer.at(input, range.start + output)
         });
         let width = panels.padded_outputs();
-        // Padding is never looked for.
+        // The search ignores padding: no product exceeds infinity.
         let mut channels = Self {
             first: range.start,
             bounds: vec![Bound::default(); width],
@@ -247,7 +244,7 @@ impl Channels {
     fn bound(&mut self, channel: usize, layer: &Dense, output: usize) {
         let weights = &layer.weight[output * layer.inputs..][..layer.inputs];
         let sum: f64 = weights.iter().map(|w| f64::from(w.abs())).sum();
-        // Products with weights of 0 are 0, of every row.
+        // If all weights are 0, every product is 0.
         self.least[channel] = if sum == 0.0 { 0.0 } else { f32::NEG_INFINITY };
         let cut = if layer.relu { -layer.bias[output] } else { f32::NEG_INFINITY };
         self.least_seen[channel] = self.least[channel].max(cut);
@@ -255,7 +252,7 @@ impl Channels {
             0.0 => Bound::default(),
             sum if ORDINARY.contains(&sum) => self.ordinary_bound(channel, weights, sum),
             _ => {
-                // Estimates of 0 for all: none can be ruled out.
+                // All estimates become 0, so that none is ruled out.
                 self.panels.scales_mut()[channel] = 0.0;
                 Bound { rounding: f32::INFINITY, ..Bound::default() }
             }
@@ -275,8 +272,8 @@ impl Channels {
         }
     }
 
-    /// Leaves an estimate of every product in `prefilter_scratch`, in steps of the levels,
-    /// and its bound.
+    /// Writes an estimate of every product, in units of levels, and the bound of each channel to
+    /// `prefilter_scratch`.
     fn estimate(
         &self,
         kernels: &Kernels,

@@ -7,19 +7,19 @@ use crate::kernel::suite::{Bounded, F32, dot};
 
 const ROWS: usize = 48;
 
-/// Kernels that prefilter; an error if this machine has none.
+/// Kernels with a prefilter; an error if this machine has none.
 fn prefiltering_kernels() -> Result<&'static Kernels, String> {
     let found = available().find(|kernels| kernels.prefilters);
     found.ok_or_else(|| "this machine runs no kernels that prefilter".to_owned())
 }
 
-/// A layer and the activations of some blocks before it, of a kind each.
+/// A layer, and its inputs in some blocks.
 struct Case {
     layer: Dense,
     blocks: Vec<Vec<f32>>,
 }
 
-/// Inputs of every case: not a multiple of a vector.
+/// The inputs of every case: not a multiple of a vector's width.
 const INPUTS: usize = 100;
 const STRIDE: usize = 128;
 const OUTPUTS: usize = 200;
@@ -92,7 +92,7 @@ fn exact_maximum(case: &Case, output: usize) -> (f64, f64) {
     })
 }
 
-/// Pools a case; `None` where the prefilter gave up.
+/// Pools a case; `None` if the prefilter gave up.
 fn pool(case: &Case, kernels: &Kernels, wants_winners: bool) -> Option<(Vec<f32>, Vec<u32>)> {
     let prefilter = Int8Prefilter::new(&case.layer, kernels).unwrap();
     let mut prefilter_scratch = PrefilterScratch::new(ROWS);
@@ -119,7 +119,7 @@ fn pool(case: &Case, kernels: &Kernels, wants_winners: bool) -> Option<(Vec<f32>
     Some((all_maxima, all_winners))
 }
 
-/// How far a product of magnitudes that sum to `sum` may be off.
+/// The error bound of a product whose magnitudes sum to `sum`.
 fn bound(sum: f64) -> f64 {
     F32::bound(INPUTS, sum)
 }
@@ -130,7 +130,7 @@ fn maxima_are_those_of_all_products() {
     for kind in KINDS {
         let case = case(kind);
         let Some((maxima, winners)) = pool(&case, kernels, true) else {
-            // Levels that reach up to a tower are coarse; rows alike stay so.
+            // A very large value makes the levels coarse, and equal rows have equal estimates.
             let hopeless = ["one row towers", "one input towers", "rows alike"];
             assert!(hopeless.contains(&kind), "{kind}: gave up");
             continue;
@@ -169,7 +169,7 @@ fn of_equal_rows_the_first_wins() {
     let kernels = need!(prefiltering_kernels());
     let mut case = case("ordinary");
     let (_, before) = pool(&case, kernels, true).unwrap();
-    // Every winner again, in rows after it.
+    // Copies of all rows, after the originals.
     let copies: Vec<_> =
         (0..ROWS).map(|r| case.blocks[0][r * STRIDE..][..STRIDE].to_vec()).collect();
     case.blocks.push(copies.into_iter().rev().flatten().collect());
@@ -177,7 +177,7 @@ fn of_equal_rows_the_first_wins() {
     assert_eq!(before, after);
 }
 
-/// Of each channel's products, most must be ruled out, or prefiltering gains nothing.
+/// Prefiltering is only useful if it rules out most products of each channel.
 #[test]
 fn few_products_are_left() {
     let kernels = need!(prefiltering_kernels());

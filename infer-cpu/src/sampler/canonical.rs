@@ -1,36 +1,28 @@
-//! The distinct points of a cloud in an order that only geometry decides.
+//! The distinct points of a cloud, in an order that depends on geometry alone.
 //!
-//! What works on this order, and breaks its ties by rows in any fixed way, does
+//! An algorithm that processes points in this order, and breaks ties by row in a fixed way, does
 //! not depend on the order of the input.
 
 use std::cmp::Ordering;
 
-/// Sorts clouds; keeps its memory from call to call.
-///
-/// ```
-/// use infer_cpu::sampler::CanonicalOrder;
-///
-/// let mut order = CanonicalOrder::default();
-/// order.sort(&[[0.5, 0.0, 0.0], [0.1, 0.0, 0.0], [0.5, 0.0, 0.0]]);
-/// assert_eq!(order.points, [[0.1, 0.0, 0.0], [0.5, 0.0, 0.0]]);
-/// assert_eq!(order.index, [1, 0]);
-/// ```
+/// Sorts clouds, and reuses its memory for each.
 #[derive(Default)]
 pub struct CanonicalOrder {
-    /// The distinct points, ascending by x, then y, then z. A zero has no sign.
+    /// The distinct points, ascending by x, then y, then z. Zeros are positive.
     pub points: Vec<[f32; 3]>,
-    /// For each, the lowest index that it has in the input.
+    /// The lowest input index of each point.
     pub index: Vec<u32>,
     /// A coordinate in the upper half, an index of the input in the lower.
     keys: Vec<u64>,
 }
 
 impl CanonicalOrder {
-    /// Fills `points` and `index` from a cloud of at most `u32::MAX` points.
-    /// Points are equal if their coordinates are, -0 and 0 among them. NaN is
-    /// larger than all numbers in magnitude and equal to nothing.
+    /// Fills `points` and `index` from a cloud of at most `u32::MAX` points. Points are equal if
+    /// their coordinates are; -0 equals 0. NaN is larger than all numbers in magnitude, and not
+    /// equal to anything.
     pub fn sort(&mut self, cloud: &[[f32; 3]]) {
         self.keys.clear();
+        // A key holds a coordinate and an index in one word, which sorts faster than a pair.
         self.keys.extend((0..cloud.len() as u32).map(u64::from));
         sort_by_geometry(&mut self.keys, cloud);
 
@@ -38,6 +30,7 @@ impl CanonicalOrder {
         self.index.clear();
         for &key in &self.keys {
             let point = cloud[key as u32 as usize];
+            // Equal points are adjacent, with the lowest index first. NaN is not equal to itself.
             if self.points.last() != Some(&point) {
                 self.points.push(point.map(without_sign_of_zero));
                 self.index.push(key as u32);
@@ -46,24 +39,26 @@ impl CanonicalOrder {
     }
 }
 
-/// Sorts the indices in the lower halves of `keys` by the points that they are
-/// of: by x, then y, then z, then themselves. Upper halves are overwritten.
+/// Sorts the indices in the lower halves of `keys` by their points (x, then y, then z), then by
+/// index. Overwrites the upper halves.
 pub(super) fn sort_by_geometry(keys: &mut [u64], cloud: &[[f32; 3]]) {
     sort_from_axis(keys, cloud, 0);
 }
 
-/// Sorts the indices in the lower halves of `keys` by the coordinates of their
-/// points from `axis` on, then by themselves.
+/// Sorts the indices in the lower halves of `keys` by the coordinates of their points from `axis`
+/// on, then by index.
 fn sort_from_axis(keys: &mut [u64], cloud: &[[f32; 3]], axis: usize) {
     for key in keys.iter_mut() {
         let index = *key as u32;
         *key = u64::from(rank(cloud[index as usize][axis])) << 32 | u64::from(index);
     }
+    // Keys contain the index, so they are distinct, and an unstable sort is deterministic.
     keys.sort_unstable();
     if axis == 2 {
         return;
     }
     for ties in keys.chunk_by_mut(|a, b| a >> 32 == b >> 32) {
+        // Few points share a coordinate, so that the other axes are rarely compared.
         if ties.len() > 1 {
             sort_from_axis(ties, cloud, axis + 1);
         }
@@ -75,10 +70,11 @@ pub(super) fn compare(a: &[f32; 3], b: &[f32; 3]) -> Ordering {
     a.map(rank).cmp(&b.map(rank))
 }
 
-/// An integer that is ordered as the number is.
+/// An integer with the same order as the number.
 fn rank(value: f32) -> u32 {
     const SIGN: u32 = 1 << 31;
     let bits = without_sign_of_zero(value).to_bits();
+    // Setting the sign of positive numbers and inverting negative ones gives the order of integers.
     if bits & SIGN == 0 { bits | SIGN } else { !bits }
 }
 

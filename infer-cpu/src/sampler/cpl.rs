@@ -1,78 +1,66 @@
-//! The Critical Points Layer (Nezhadarya et al., "Adaptive hierarchical
-//! down-sampling for point cloud classification", CVPR 2020): the points that
-//! win a channel of a max-pooling, ranked by what they win.
+//! The Critical Points Layer (Nezhadarya et al., "Adaptive hierarchical down-sampling for point
+//! cloud classification", CVPR 2020): the points that win a channel of a max-pooling, ranked by
+//! what they win.
 //!
-//! Rows are points in canonical order (`canonical`), and features may come
-//! before their ReLU: it is what a maximum that is not positive counts as.
+//! Rows are points in canonical order (`canonical`). Features may precede their ReLU, since maxima
+//! that are not positive count as 0.
 
 use super::SamplerSpec;
 use super::hash::{Map, reset};
 
-/// Ranks critical points; keeps its memory from cloud to cloud.
-///
-/// ```
-/// use infer_cpu::sampler::{CriticalPoints, Resize};
-///
-/// // Of four channels row 7 wins two, row 2 one, and nobody the last.
-/// let mut critical = CriticalPoints::default();
-/// critical.rank(&[1.0, 4.0, 3.5, 0.0], &[7, 2, 7, 5]);
-/// assert_eq!((&critical.rows[..], &critical.scores[..]), (&[7, 2][..], &[4.5, 4.0][..]));
-///
-/// let mut rows = vec![];
-/// Resize::Cyclic.apply(&critical.rows, &critical.scores, 3, &mut rows);
-/// assert_eq!(rows, [7, 2, 7]);
-/// ```
+/// Ranks critical points, and reuses its memory for each cloud.
 #[derive(Default)]
 pub struct CriticalPoints {
-    /// The rows chosen, each once: pass by pass, the best of a pass first.
+    /// The chosen rows, each once: pass by pass, in each the best first.
     pub rows: Vec<u32>,
-    /// For each, the sum of the maxima that it won in its pass.
+    /// For each row, the sum of the maxima that it won in its pass.
     pub scores: Vec<f64>,
-    /// Where a row stands in `ranking`.
+    /// The index of each row in `ranking`.
     ranks: Map<u32>,
-    /// Scores and rows of a pass.
+    /// The scores and rows of a pass.
     ranking: Vec<(f64, u32)>,
-    /// The rows that the secondary pass at hand pools, ascending.
+    /// The rows that the current secondary pass pools, ascending.
     left: Vec<u32>,
     /// The rows chosen so far, ascending.
     taken: Vec<u32>,
     n_passes: usize,
-    /// Whether the last pass chose none.
+    /// Whether the last pass chose no row.
     is_exhausted: bool,
 }
 
 impl CriticalPoints {
-    /// Begins with the pooling of all points: `winners` holds the row that
-    /// attains each of `maxima`; which of several that attain it is up to the
-    /// pooling, as long as geometry decides it and not the order of the input.
+    /// Begins with the pooling of all points: `winners` holds the row that attains each of
+    /// `maxima`. If several rows attain it, the pooling must decide by geometry, not by the order
+    /// of the input.
     ///
-    /// A point's score is the sum of the maxima that it wins, in f64, in the
-    /// order of channels. The ranking descends by score; the lower row, which
-    /// is the lesser point, wins a tie. A channel whose maximum is not positive
-    /// is won by nobody: past a ReLU it is 0 for all points, and a point of
-    /// score 0 is not critical. If there is no other channel, the first row is
-    /// chosen, with score 0.
+    /// The score of a point is the sum of the maxima that it wins, in f64, in the order of
+    /// channels. The ranking descends by score; the lower row (the lesser point) wins a tie. No row
+    /// wins a channel whose maximum is not positive: after a ReLU it is 0 for all points, and a
+    /// point with score 0 is not critical. If no channel is positive, the first row is chosen, with
+    /// score 0.
     pub fn rank(&mut self, maxima: &[f32], winners: &[u32]) {
         self.rows.clear();
         self.scores.clear();
         self.n_passes = 0;
         self.is_exhausted = false;
         self.pool(maxima, winners);
+        // The network needs at least one point.
         if self.ranking.is_empty() {
             self.ranking.push((0.0, 0));
         }
         self.append(|row| row);
     }
 
-    /// The rows, ascending, of the points that a secondary pass is to pool: all
-    /// of `n_rows` not chosen yet. `None` if `spec` asks for no more points or
-    /// passes, or no point is left, or the last pass chose none.
+    /// The rows that a secondary pass must pool, ascending: all of `n_rows` that are not chosen
+    /// yet. `None` if `spec` requests no more points or passes, if no point is left, or if the last
+    /// pass chose none.
     pub fn next_pass(&mut self, n_rows: usize, spec: &SamplerSpec) -> Option<&[u32]> {
         let has_enough = self.rows.len() >= spec.points.min(n_rows);
         if has_enough || self.n_passes == spec.passes || self.is_exhausted {
             return None;
         }
         self.n_passes += 1;
+        // `rows` must stay in the order of the ranking, so a copy is sorted.
         self.taken.clear();
         self.taken.extend(&self.rows);
         self.taken.sort_unstable();
@@ -86,17 +74,18 @@ impl CriticalPoints {
         Some(&self.left)
     }
 
-    /// Appends the critical points of a secondary pass, ranked by themselves.
-    /// `winners` are places in what [`Self::next_pass`] gave.
+    /// Appends the critical points of a secondary pass, ranked among themselves. `winners` are
+    /// indices into the rows of [`Self::next_pass`].
     pub fn rank_next(&mut self, maxima: &[f32], winners: &[u32]) {
         self.pool(maxima, winners);
         self.is_exhausted = self.ranking.is_empty();
+        // Moved out, because `append` borrows `self`.
         let left = std::mem::take(&mut self.left);
         self.append(|place| left[place as usize]);
         self.left = left;
     }
 
-    /// Grows all memory to poolings of `channels` channels among `n_rows` rows.
+    /// Allocates memory for poolings of `channels` channels over `n_rows` rows.
     pub fn reserve(&mut self, channels: usize, n_rows: usize) {
         self.rows.reserve(n_rows);
         self.scores.reserve(n_rows);
@@ -111,6 +100,7 @@ impl CriticalPoints {
         reset(&mut self.ranks, maxima.len());
         self.ranking.clear();
         for (&maximum, &winner) in maxima.iter().zip(winners) {
+            // This is false for NaN, too.
             if maximum > 0.0 {
                 let next = self.ranking.len() as u32;
                 let rank = *self.ranks.entry(winner).or_insert(next) as usize;
@@ -120,6 +110,7 @@ impl CriticalPoints {
                 self.ranking[rank].0 += f64::from(maximum);
             }
         }
+        // Rows are distinct, so the order is total, and an unstable sort is deterministic.
         self.ranking.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     }
 
@@ -175,7 +166,7 @@ mod tests {
         assert_eq!(critical.rows, [0, 2, 1]);
     }
 
-    /// Channels are the coordinates and their negatives, one point a row.
+    /// Pools a row for each point, whose channels are its coordinates and their negatives.
     fn pool(points: &[[f32; 3]], rows: &[u32]) -> (Vec<f32>, Vec<u32>) {
         let channel = |channel: usize| {
             let sign = if channel < 3 { 1.0 } else { -1.0 };

@@ -1,36 +1,32 @@
-//! Farthest point sampling: each point taken is the one farthest from all
-//! those taken before.
+//! Farthest point sampling: each chosen point is the one farthest from all points chosen before.
 
 use super::FpsStart;
 use super::canonical::compare;
 use crate::kernel::{Kernels, Soa};
 
-/// Samples clouds; keeps its memory from call to call.
+/// Samples clouds, and reuses its memory for each.
 #[derive(Default)]
 pub struct FarthestPoints {
     x: Vec<f32>,
     y: Vec<f32>,
     z: Vec<f32>,
-    /// Squared distance of each point to the nearest one taken.
+    /// The squared distance of each point to the nearest chosen one.
     distance: Vec<f32>,
 }
 
 impl FarthestPoints {
-    /// Writes the indices of up to `m` points to `out`, in the order in which
-    /// they are taken.
+    /// Writes the indices of up to `m` points to `out`, in the order of choice.
     ///
-    /// Exact: no point is left out of any comparison. Distances are squared,
-    /// in f32, of coordinates scaled by a power of two so that the largest is
-    /// between 1/2 and 1: the order is that of the unscaled ones, but nothing
-    /// overflows. A point at distance 0 from those taken is a duplicate and
-    /// never taken, so that a cloud of fewer than `m` distinct points gives as
-    /// many as it has. (Points closer than 2⁻⁷⁵ of the largest coordinate are
-    /// at distance 0 too: its square is less than f32 holds.)
+    /// The sampling is exact: every comparison includes all points. Distances are squared, in f32.
+    /// Coordinates are scaled by a power of two so that the largest is between 1/2 and 1: this
+    /// keeps the order and prevents overflow. A point at distance 0 from the chosen ones is a
+    /// duplicate and never chosen, so that a cloud of fewer than `m` distinct points yields each of
+    /// them once. (Points closer than 2⁻⁷⁵ of the largest coordinate are at distance 0 as well,
+    /// because f32 cannot hold the square.)
     ///
-    /// From [`FpsStart::First`], the lowest index wins a tie, as in NumPy.
-    /// From [`FpsStart::Farthest`], the least point by x, y, z does, and the
-    /// points taken are the same in any order of the input. Of equal points,
-    /// the first is taken.
+    /// With [`FpsStart::First`], the lowest index wins a tie, as in NumPy. With
+    /// [`FpsStart::Farthest`], the least point by x, y, z wins, and the chosen points are the same
+    /// for any order of the input. The first of equal points is chosen.
     pub fn select(
         &mut self,
         points: &[[f32; 3]],
@@ -49,6 +45,7 @@ impl FarthestPoints {
             FpsStart::Farthest => {
                 let farthest = self.step(self.centroid(), kernels);
                 let pick = self.least_as_far(farthest, points);
+                // The centroid is not a chosen point: its distances must not count.
                 self.distance.fill(f32::INFINITY);
                 pick
             }
@@ -56,9 +53,11 @@ impl FarthestPoints {
         out.push(pick as u32);
         while out.len() < m {
             pick = self.step([self.x[pick], self.y[pick], self.z[pick]], kernels);
+            // All remaining points are duplicates of chosen ones.
             if self.distance[pick] == 0.0 {
                 break;
             }
+            // Kernels return the first of equal maxima, which depends on the order of the input.
             if start == FpsStart::Farthest {
                 pick = self.least_as_far(pick, points);
             }
@@ -66,9 +65,10 @@ impl FarthestPoints {
         }
     }
 
-    /// Scales the coordinates and forgets all distances.
+    /// Scales the coordinates and resets all distances.
     fn load(&mut self, points: &[[f32; 3]]) {
         let largest = points.as_flattened().iter().fold(0.0f32, |max, x| max.max(x.abs()));
+        // A power of two scales exactly, so that ties stay ties.
         let scale = power_that_halves(largest);
         for (axis, column) in [&mut self.x, &mut self.y, &mut self.z].into_iter().enumerate() {
             column.clear();
@@ -78,21 +78,21 @@ impl FarthestPoints {
         self.distance.resize(points.len(), f32::INFINITY);
     }
 
-    /// Takes the point at `pick` and returns the first of those farthest.
+    /// Lowers the distances to those from `pick`, and returns the first of the farthest points.
     fn step(&mut self, pick: [f32; 3], kernels: &Kernels) -> usize {
         let cloud = Soa { x: &self.x, y: &self.y, z: &self.z };
         (kernels.fps_step)(cloud, pick, &mut self.distance)
     }
 
-    /// Of the points as far as `farthest`, the first of them, the least.
+    /// The least of the points that are as far as `farthest`, which is the first of them.
     fn least_as_far(&self, farthest: usize, points: &[[f32; 3]]) -> usize {
-        /// Few enough to look through where there is a tie, which is rare.
+        /// Few enough points to search one by one after a tie, which is rare.
         const CHUNK: usize = 64;
         let largest = self.distance[farthest];
         let mut least = farthest;
         let mut first = farthest + 1;
         for chunk in self.distance[first..].chunks(CHUNK) {
-            // Without a branch, so that it is vectorised.
+            // The fold has no branch, so that the compiler vectorises it.
             if chunk.iter().fold(false, |any, &distance| any | (distance == largest)) {
                 for i in first..first + chunk.len() {
                     if self.distance[i] == largest && compare(&points[i], &points[least]).is_lt() {
@@ -105,13 +105,13 @@ impl FarthestPoints {
         least
     }
 
-    /// The mean of the points, summed exactly, so in any order.
+    /// The mean of the points. The sum is exact, so that the order does not matter.
     fn centroid(&self) -> [f32; 3] {
         let n = self.x.len();
-        // Coordinates in units of 2^-bits, of which n sum to at most 2^62.
+        // Coordinates are at most 1, so n of them in units of 2^-bits sum to at most 2^62.
         let bits = 50.min(62 - n.next_power_of_two().ilog2());
-        // In f64, the last place of numbers around this one is that unit: to
-        // add it rounds a coordinate, which then stands in the bits.
+        // In f64, the last place of numbers near this one is that unit: adding it rounds the
+        // coordinate to the unit and leaves it in the low bits.
         let rounder = 1.5 * (1u64 << (52 - bits)) as f64;
         let unit = 1.0 / (1u64 << bits) as f64;
         [&self.x, &self.y, &self.z].map(|column| {
@@ -122,8 +122,8 @@ impl FarthestPoints {
     }
 }
 
-/// The power of two that brings `largest` to between 1/2 and 1; of subnormal
-/// numbers, that of the least normal one.
+/// The power of two that scales `largest` to between 1/2 and 1; for subnormal numbers, that of the
+/// least normal one.
 fn power_that_halves(largest: f32) -> f32 {
     let exponent = u64::from(largest.to_bits() >> 23);
     // Both formats' exponents are biased, by 127 and 1023.
@@ -146,8 +146,8 @@ mod tests {
         out
     }
 
-    /// Indices that NumPy took of half of ModelNet40's test clouds, from index
-    /// 0, with squared distances in f32.
+    /// The reference indices come from NumPy with squared distances in f32, for half of
+    /// ModelNet40's test clouds, from index 0.
     #[test]
     fn indices_are_those_of_numpy() {
         const N: usize = 1024;
@@ -174,9 +174,9 @@ mod tests {
     #[test]
     fn the_corners_of_a_square_come_before_its_middle() {
         let cloud = [[0.5, 0.5, 0.0], [0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]];
-        // All corners are as far from the centroid: the least by x, then y.
+        // All corners are equally far from the centroid: the least by x, then y, comes first.
         assert_eq!(select(&cloud, 5, FpsStart::Farthest), [1, 4, 3, 2, 0]);
-        // From the middle they are too: the first, and so on.
+        // They are equally far from the middle, too: the lowest index comes first.
         assert_eq!(select(&cloud, 5, FpsStart::First), [0, 1, 2, 3, 4]);
     }
 

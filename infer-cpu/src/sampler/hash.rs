@@ -1,20 +1,19 @@
-//! A hash map that is the same in every run, keeps its memory when it is cleared,
-//! and takes little time beside that of memory.
+//! A hash map with a fixed hash function, which is fast relative to memory accesses.
 
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
-/// Numbers by their keys.
+/// Maps keys to numbers.
 pub type Map<K> = HashMap<K, u32, BuildHasherDefault<Fold>>;
 
-/// Empties `map` and makes room for `n` keys.
+/// Clears `map` and allocates memory for `n` keys.
 pub fn reset<K: Eq + std::hash::Hash>(map: &mut Map<K>, n: usize) {
     map.clear();
     map.reserve(n);
 }
 
-/// Multiplies words and folds the products' halves, so that every bit of a key
-/// reaches every bit of the hash.
+/// Multiplies words and folds the halves of each product, so that every bit of a key affects every
+/// bit of the hash.
 #[derive(Default)]
 pub struct Fold(u64);
 

@@ -1,11 +1,11 @@
-//! Samplers: which points of a cloud a network looks at.
+//! Samplers, which choose the points of a cloud that a network processes.
 //!
-//! [`Sampler`] covers those that need coordinates alone. A Critical Points
-//! Layer is put together by whoever computes features: the distinct points
-//! ([`CanonicalOrder`]) go through a front end; [`CriticalPoints`] ranks what
-//! wins its maxima, and [`Resize`] makes M of them.
+//! A [`SamplerSpec`] describes a sampler. [`choose`](crate::choose) runs those that need only
+//! coordinates. A Critical Points Layer runs inside a [`Classifier`](crate::Classifier): a front end
+//! computes features of the distinct points, `CriticalPoints` ranks the points that win its maxima,
+//! and [`Resize`] brings their number to M.
 //!
-//! Nothing here allocates once its memory has grown to a cloud's size.
+//! Samplers allocate memory only for a cloud that is larger than all before.
 
 mod canonical;
 mod cpl;
@@ -23,60 +23,42 @@ use formats::rng::StreamKey;
 
 use crate::kernel::Kernels;
 
-pub use canonical::CanonicalOrder;
+pub(crate) use canonical::CanonicalOrder;
+#[doc(hidden)]
 pub use cpl::CriticalPoints;
+#[doc(hidden)]
 pub use fps::FarthestPoints;
+#[doc(hidden)]
 pub use outliers::OutlierFilter;
+#[doc(hidden)]
 pub use random::RandomSubset;
 use spec::MOST_CRITICAL;
 pub use spec::{FpsStart, FrontChoice, Resize, SamplerKind, SamplerSpec};
-pub use voxel::VoxelGrid;
+use voxel::VoxelGrid;
 
-/// Why points cannot be chosen.
+/// Errors of sampling.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SamplerError {
-    /// M is 0.
+    /// The number of points to keep is 0.
     #[error("expected a sampler that keeps 1 point or more, found 0")]
     NoPointsWanted,
-    /// M is so large that its repetitions would fill memory.
+    /// The number of points is so large that repetitions would fill memory.
     #[error("expected a Critical Points Layer of at most {MOST_CRITICAL} points, found {0}")]
     TooManyCritical(usize),
-    /// A voxel has no such edge.
+    /// The voxel size is not a positive number.
     #[error("expected a voxel size above 0, found {0}")]
     VoxelSize(f64),
-    /// A coordinate is NaN or infinite.
-    #[error("point {index}: expected finite coordinates, found ({x}, {y}, {z})")]
-    NotFinite {
-        /// The point's place in the cloud, from 0.
-        index: usize,
-        /// Its coordinates.
-        x: f32,
-        /// Its coordinates.
-        y: f32,
-        /// Its coordinates.
-        z: f32,
-    },
-    /// More points than indices can count.
+    /// More points than a 32-bit index can count.
     #[error("expected at most 4,294,967,295 points, found {0}")]
     TooManyPoints(usize),
-    /// Coordinates alone do not tell critical points.
+    /// Critical points cannot be determined from coordinates alone.
     #[error("the sampler cpl needs a model, whose features it pools")]
     NeedsFeatures,
 }
 
-/// Chooses points by their coordinates; keeps its memory from cloud to cloud.
-///
-/// ```
-/// use infer_cpu::kernel;
-/// use infer_cpu::sampler::{Sampler, SamplerKind, SamplerSpec};
-///
-/// let spec = SamplerSpec { kind: SamplerKind::Fps, points: 2, ..SamplerSpec::default() };
-/// let mut sampler = Sampler::new(spec)?;
-/// let cloud = [[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [1.0, 0.0, 0.0]];
-/// assert_eq!(sampler.select(&cloud, kernel::fastest())?, [2, 0]);
-/// # Ok::<(), infer_cpu::sampler::SamplerError>(())
-/// ```
+/// Chooses points by their coordinates, which must be finite, and reuses its memory for each cloud.
+#[doc(hidden)]
 pub struct Sampler {
     spec: SamplerSpec,
     selected: Vec<u32>,
@@ -86,10 +68,10 @@ pub struct Sampler {
 }
 
 impl Sampler {
-    /// A sampler that does what `spec` says.
+    /// A sampler with the specification `spec`.
     ///
     /// # Errors
-    /// A specification that cannot be met: [`SamplerSpec::check`].
+    /// An invalid specification: see [`SamplerSpec::check`].
     pub fn new(spec: SamplerSpec) -> Result<Self, SamplerError> {
         spec.check()?;
         Ok(Self {
@@ -101,26 +83,25 @@ impl Sampler {
         })
     }
 
-    /// What it does.
+    /// The specification.
     #[must_use]
     pub fn spec(&self) -> &SamplerSpec {
         &self.spec
     }
 
-    /// Draws by another seed from now on.
+    /// Changes the seed of random draws.
     pub fn set_seed(&mut self, seed: u64) {
         self.spec.seed = seed;
     }
 
-    /// The indices of the chosen points, each once, at most as many as there
-    /// are. Of no point none are chosen.
+    /// The indices of the chosen points, each once. An empty cloud gives none.
     ///
-    /// `all` and `first` keep the order of the cloud, `random` and `fps` give
-    /// the order in which they take points, `voxel` ascends by x, y, z.
+    /// `all` and `first` keep the order of the cloud, `random` and `fps` return points in the order
+    /// of choice, and `voxel` returns them ascending by x, y, z.
     ///
     /// # Errors
-    /// [`SamplerError::NeedsFeatures`] for `cpl`; more points than indices can
-    /// count; for `fps` and `voxel`, a coordinate that is not finite.
+    /// [`SamplerError::NeedsFeatures`] for `cpl`; more points than a 32-bit index can count; for
+    /// `fps` and `voxel`, a coordinate that is not finite.
     pub fn select(
         &mut self,
         points: &[[f32; 3]],
@@ -133,20 +114,17 @@ impl Sampler {
             SamplerKind::All => keep_first(n, selected),
             SamplerKind::First => keep_first(n.min(spec.points.try_into().unwrap_or(n)), selected),
             SamplerKind::Random => {
+                // The key does not depend on the cloud, so that equal clouds give equal subsets.
                 let key = StreamKey::new(spec.seed, "random sampler", 0);
                 random.draw(points.len(), spec.points, key, selected);
             }
             SamplerKind::Fps => {
-                check_finite(points)?;
                 fps.select(points, spec.points, spec.fps_start, kernels, selected);
             }
-            SamplerKind::Voxel => {
-                check_finite(points)?;
-                match spec.voxel_size {
-                    Some(size) => voxel.select_by_size(points, size, selected),
-                    None => voxel.select_by_count(points, spec.points, selected),
-                }
-            }
+            SamplerKind::Voxel => match spec.voxel_size {
+                Some(size) => voxel.select_by_size(points, size, selected),
+                None => voxel.select_by_count(points, spec.points, selected),
+            },
             SamplerKind::Cpl => return Err(SamplerError::NeedsFeatures),
         }
         Ok(selected)
@@ -156,17 +134,6 @@ impl Sampler {
 fn keep_first(n: u32, selected: &mut Vec<u32>) {
     selected.clear();
     selected.extend(0..n);
-}
-
-fn check_finite(points: &[[f32; 3]]) -> Result<(), SamplerError> {
-    let is_finite = |point: &[f32; 3]| point.iter().all(|x| x.is_finite());
-    match points.iter().position(|point| !is_finite(point)) {
-        Some(index) => {
-            let [x, y, z] = points[index];
-            Err(SamplerError::NotFinite { index, x, y, z })
-        }
-        None => Ok(()),
-    }
 }
 
 #[cfg(test)]
@@ -244,14 +211,7 @@ mod tests {
 
     #[test]
     fn what_cannot_be_sampled_is_an_error() {
-        let cloud = [[0.0; 3], [1.0, f32::NAN, 2.0]];
-        for kind in [SamplerKind::Fps, SamplerKind::Voxel] {
-            let error = select(&spec(kind, 1), &cloud).unwrap_err();
-            assert_eq!(
-                error.to_string(),
-                "point 1: expected finite coordinates, found (1, NaN, 2)"
-            );
-        }
+        let cloud = [[0.0; 3]];
         let error = select(&spec(SamplerKind::Cpl, 1), &cloud).unwrap_err();
         assert_eq!(error, SamplerError::NeedsFeatures);
         let error = select(&spec(SamplerKind::First, 0), &cloud).unwrap_err();

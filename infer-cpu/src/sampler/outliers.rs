@@ -1,62 +1,52 @@
-//! Points that belong to nothing: what a sensor returns beside an object.
+//! The outlier filter, which drops stray returns beside an object.
 //!
-//! Farthest point sampling takes them first, and as the largest radius they shrink
-//! everything else. A point is an outlier if its 8th neighbour is farther away than
-//! [`REACH`] times the median of that distance over the cloud. (Rusu et al. 2008
-//! compare mean distances with their mean and deviation, which the outliers themselves
-//! raise; a median stays where it is until they are half of all points.)
+//! Farthest point sampling chooses outliers first, and normalisation by the largest radius shrinks
+//! the other points. A point is an outlier if the distance of its 8th neighbour exceeds [`REACH`]
+//! times the median of that distance over the cloud. (Rusu et al. 2008 compare mean distances with
+//! their mean and deviation, which outliers raise; a median is robust until they are half of all
+//! points.)
 //!
-//! The distances of 1,024 points cost more than some networks that they are for.
-//! Therefore the median is taken over [`QUERIES`] points, whose sampling error, of a
-//! twentieth, is nothing beside [`REACH`]; and of other points it is only asked whether
-//! 8 neighbours are within the limit, which the first few answer. In clouds of more than
-//! [`REFERENCES`] points, neighbours are sought among so many, spread evenly over the
-//! sorted cloud: the time then grows with the number of points, not with its square.
+//! All distances of 1,024 points would cost more than some networks. Therefore the median is taken
+//! over [`QUERIES`] points; its sampling error of a twentieth is small beside [`REACH`]. For the
+//! other points, the filter only tests whether 8 neighbours are within the limit, which takes few
+//! comparisons. In clouds of more than [`REFERENCES`] points, it searches for neighbours among that
+//! many points at even steps through the sorted cloud: the time then grows linearly with the number
+//! of points.
 //!
-//! Repetitions count once, and the order of points does not count.
+//! Repeated points count once, and the order of points does not matter.
 
 use super::canonical::{CanonicalOrder, compare};
 
-/// The neighbour whose distance is compared.
+/// The rank of the neighbour whose distance is compared.
 const NEIGHBOUR: usize = 8;
 
-/// How much farther than the median that neighbour of an outlier is.
+/// The ratio to the median beyond which a point is an outlier.
 const REACH: f32 = 4.0;
 
-/// Points whose distances the median is of, at most.
+/// The most points over which the median is taken.
 const QUERIES: usize = 128;
 
-/// Points among which neighbours are sought, at most.
+/// The most points that are searched for neighbours.
 const REFERENCES: usize = 4096;
 
-/// Points whose distances are found at once.
+/// Points whose distances are computed together.
 const TILE: usize = 64;
 
-/// Drops outliers; keeps its memory from cloud to cloud.
-///
-/// ```
-/// use infer_cpu::sampler::OutlierFilter;
-///
-/// let mut cloud: Vec<[f32; 3]> = (0..20).map(|i| [0.01 * i as f32, 0.0, 0.0]).collect();
-/// cloud.insert(5, [1.0, 1.0, 0.0]);
-/// let mut filter = OutlierFilter::default();
-/// assert_eq!(filter.find(&cloud), 1);
-/// assert!(filter.is_outlier(&cloud[5]) && !filter.is_outlier(&cloud[6]));
-/// ```
+/// Drops outliers, and reuses its memory for each cloud.
 #[derive(Default)]
 pub struct OutlierFilter {
     cloud: CanonicalOrder,
     references: References,
     distances: Vec<f32>,
-    /// Ascending as the cloud is.
+    /// The outliers, in the order of `cloud`.
     outliers: Vec<[f32; 3]>,
     kept: Vec<u32>,
 }
 
 impl OutlierFilter {
-    /// Finds the outliers of `points`, finite and about the size of the unit sphere, so
-    /// that no square overflows; returns how many distinct ones there are. Of fewer than
-    /// 9 distinct points none has an 8th neighbour, and none is an outlier.
+    /// Finds the outliers of `points` and returns the number of distinct ones. Points must be
+    /// finite and roughly in the unit sphere, so that no square overflows. Fewer than 9 distinct
+    /// points have no 8th neighbour, and no outlier.
     pub fn find(&mut self, points: &[[f32; 3]]) -> usize {
         self.cloud.sort(points);
         self.outliers.clear();
@@ -72,9 +62,10 @@ impl OutlierFilter {
         self.distances.extend(queries.map(|i| references.squared_distance_of_neighbour(i)));
         let middle = self.distances.len() / 2;
         let (_, median, _) = self.distances.select_nth_unstable_by(middle, f32::total_cmp);
+        // Both sides are squared, which saves square roots.
         let limit = REACH * REACH * *median;
         let is_alone = |i: &usize| {
-            // The first reference that is not before the point, and perhaps the point.
+            // The first reference that does not precede the point; it may be the point itself.
             let place = (i * n_references).div_ceil(n);
             let is_reference = place < n_references && place * n / n_references == *i;
             let wanted = NEIGHBOUR + usize::from(is_reference);
@@ -84,19 +75,20 @@ impl OutlierFilter {
         self.outliers.len()
     }
 
-    /// Whether [`find`](Self::find) has found `point`, one of its cloud, to be an outlier.
+    /// Whether `point`, of the cloud of the last [`find`](Self::find), is an outlier.
     #[must_use]
     pub fn is_outlier(&self, point: &[f32; 3]) -> bool {
         self.outliers.binary_search_by(|outlier| compare(outlier, point)).is_ok()
     }
 
-    /// Drops the outliers of `points`, whose coordinates in the unit sphere are
-    /// `normalized`; returns how many points are dropped.
+    /// Drops the outliers of `points`, whose coordinates in the unit sphere are `normalized`, and
+    /// returns the number of dropped points.
     pub fn drop_outliers(&mut self, points: &mut Vec<[f64; 3]>, normalized: &[[f32; 3]]) -> usize {
         self.kept.clear();
         if self.find(normalized) == 0 {
             return 0;
         }
+        // Moved out, because `is_outlier` borrows `self`.
         let mut kept = std::mem::take(&mut self.kept);
         let stays = |&i: &u32| !self.is_outlier(&normalized[i as usize]);
         kept.extend((0..normalized.len() as u32).filter(stays));
@@ -109,15 +101,15 @@ impl OutlierFilter {
         n_before - points.len()
     }
 
-    /// Turns `places` among the points that the last
-    /// [`drop_outliers`](Self::drop_outliers) left into places in the cloud before.
+    /// Turns indices into the points that the last [`drop_outliers`](Self::drop_outliers) kept into
+    /// indices into the cloud before.
     pub fn in_whole_cloud(&self, places: &mut [u32]) {
         if !self.kept.is_empty() {
             places.iter_mut().for_each(|place| *place = self.kept[*place as usize]);
         }
     }
 
-    /// Makes room for clouds of `n` points.
+    /// Allocates memory for clouds of `n` points.
     pub fn reserve(&mut self, n: usize) {
         let all: Vec<[f32; 3]> = (0..n).map(|i| [i as f32, 0.0, 0.0]).collect();
         self.cloud.sort(&all);
@@ -128,20 +120,20 @@ impl OutlierFilter {
     }
 }
 
-/// At most `most` of `n` places, at even steps.
+/// At most `most` of `n` indices, at even steps.
 fn evenly(n: usize, most: usize) -> impl Iterator<Item = usize> {
     let taken = n.min(most);
     (0..taken).map(move |i| i * n / taken)
 }
 
-/// Points that neighbours are sought among, coordinate by coordinate, ascending by x.
+/// The points that are searched for neighbours, as one array per axis, ascending by x.
 #[derive(Default)]
 struct References {
     axes: [Vec<f32>; 3],
 }
 
 impl References {
-    /// Takes at most [`REFERENCES`] of `sorted`, at even steps.
+    /// Copies at most [`REFERENCES`] of `sorted`, at even steps.
     fn set(&mut self, sorted: &[[f32; 3]]) {
         for (k, axis) in self.axes.iter_mut().enumerate() {
             axis.clear();
@@ -174,8 +166,8 @@ impl References {
         nearest[NEIGHBOUR]
     }
 
-    /// Whether `n` points are within the squared distance `limit` of `p`, whose place
-    /// among them is `place`.
+    /// Whether `n` points are within the squared distance `limit` of `p`, whose index among them is
+    /// `place`.
     fn has_within(&self, p: [f32; 3], place: usize, limit: f32, n: usize) -> bool {
         let mut found = 0;
         self.visit(p, place, |tile| {
@@ -185,9 +177,9 @@ impl References {
         found >= n
     }
 
-    /// Calls `see` with the squared distances of `p` from tiles of points, first those
-    /// about `place`, then the nearest along x. It returns how far points may still be to
-    /// be of interest.
+    /// Calls `see` with the squared distances of `p` from tiles of points: first the tile of
+    /// `place`, then the nearest along x. `see` returns the squared distance up to which further
+    /// points matter.
     fn visit(&self, p: [f32; 3], place: usize, mut see: impl FnMut(&[f32]) -> f32) {
         let [xs, ys, zs] = &self.axes;
         let first = place / TILE * TILE;
@@ -198,6 +190,7 @@ impl References {
             let below = if low > 0 { p[0] - xs[low - 1] } else { f32::INFINITY };
             let above = if high < xs.len() { xs[high] - p[0] } else { f32::INFINITY };
             let gap = below.min(above).max(0.0);
+            // References ascend by x, so that all further ones are at least as far along x alone.
             if gap * gap > reach {
                 return;
             }
@@ -215,7 +208,7 @@ impl References {
     }
 }
 
-/// A squared distance that ends a visit.
+/// The result of `see` that ends a visit.
 const NOTHING: f32 = -1.0;
 
 #[cfg(test)]
@@ -223,7 +216,8 @@ mod tests {
     use super::super::testing::{shuffled, uniform};
     use super::*;
 
-    /// The definition, for clouds of distinct points that are all queries and references.
+    /// The definition, for clouds of distinct points that are small enough to be all queries and
+    /// references.
     fn by_definition(cloud: &[[f32; 3]]) -> Vec<[f32; 3]> {
         let eighth = |p: &[f32; 3]| {
             let squared = |q: &[f32; 3]| (0..3).map(|k| (q[k] - p[k]) * (q[k] - p[k])).sum::<f32>();
@@ -245,7 +239,8 @@ mod tests {
         found
     }
 
-    /// A tenth of the unit cube's size, beside `n_strays` points of three times its size.
+    /// `n` points in a tenth of the unit cube, and `n_strays` points in a cube three times its
+    /// size.
     fn object_among(n: usize, n_strays: usize, seed: u32) -> Vec<[f32; 3]> {
         let mut cloud: Vec<_> = uniform(n, seed).iter().map(|p| p.map(|x| 0.1 * x)).collect();
         cloud.extend(uniform(n_strays, seed + 1).iter().map(|p| p.map(|x| 3.0 * x)));
@@ -279,8 +274,8 @@ mod tests {
         expected.sort_by(compare);
         found.sort_by(compare);
         assert_eq!(found, expected);
-        // A stray that is returned ten times is a stray; so is one beside an object whose
-        // points are all there ten times.
+        // Ten times repeated, strays are still outliers, even if all other points are repeated,
+        // too.
         let mut ten_times = outliers(&cloud.repeat(10));
         ten_times.sort_by(compare);
         ten_times.dedup();
@@ -294,11 +289,11 @@ mod tests {
             ("nothing", vec![]),
             ("8 points, one far away", line(7, 0.01).chain([[1.0; 3]]).collect()),
             ("one point, often", vec![[0.5; 3]; 100]),
-            // Its ends' neighbours are all on one side, and twice as far.
+            // The neighbours of its ends are all on one side, and twice as far.
             ("a thin rod", line(200, 0.01).collect()),
             ("a sparse shape", uniform(20, 1)),
             ("a wall of one x", uniform(500, 2).iter().map(|p| [0.25, p[1], p[2]]).collect()),
-            // Squares of all distances but one are 0 in f32.
+            // All squared distances but one are 0 in f32.
             ("a speck", line(50, 1e-30).collect()),
         ];
         for (what, cloud) in clouds {
@@ -317,7 +312,7 @@ mod tests {
         let mut places = [0, 1, 2, 99];
         filter.in_whole_cloud(&mut places);
         assert_eq!(places, [0, 1, 3, 100]);
-        // Nothing is dropped of the next cloud, whose places are its own.
+        // The next cloud has no outliers, so that its indices do not change.
         assert_eq!(filter.drop_outliers(&mut points[..50].to_vec(), &cloud[3..53]), 0);
         filter.in_whole_cloud(&mut places);
         assert_eq!(places, [0, 1, 3, 100]);

@@ -13,21 +13,19 @@ pub struct RandomSubset {
 }
 
 impl RandomSubset {
-    /// Writes `m` of the indices below `n` to `out`, as `key` draws them; each
-    /// subset is as likely as any other. The order is the drawn one, so that
-    /// any first part of the result is a fair sample as well. Up to `m`
-    /// indices are all kept, ascending.
+    /// Writes `m` random indices below `n` to `out`, drawn by `key`; all subsets are equally
+    /// likely. They are in the order of drawing, so that any first part of the result is a fair
+    /// sample, too. If `n` is at most `m`, all indices are kept, ascending.
     ///
-    /// The choice is that of [`formats::cloud::resample`] under the same key.
-    /// Time and memory grow with `m` alone.
+    /// [`formats::cloud::resample`] chooses the same points under the same key. Time and memory
+    /// grow with `m` alone.
     pub fn draw(&mut self, n: usize, m: usize, key: StreamKey, out: &mut Vec<u32>) {
         out.clear();
         if n <= m {
             out.extend(0..n as u32);
             return;
         }
-        // The first m steps of a Fisher-Yates shuffle. Only the places that
-        // were swapped are remembered.
+        // The first m steps of a Fisher-Yates shuffle, which stores only the swapped positions.
         reset(&mut self.moved, m);
         for i in 0..m as u32 {
             let j = i + key.below((n - i as usize) as u64, u64::from(i)) as u32;
@@ -53,10 +51,9 @@ mod tests {
         StreamKey::new(5, "chair_0001", index)
     }
 
-    /// Each of 20 points is in 5 of 20 places with probability 1/4: over
-    /// 40,000 draws the count has mean 10,000 and sigma sqrt(40000 * 1/4 *
-    /// 3/4) = 87. Six sigma are 520; a fair draw fails once in 10 million runs,
-    /// and this one is seeded.
+    /// Each of 20 points is in 5 of 20 places with probability 1/4: over 40,000 draws the count has
+    /// mean 10,000 and sigma sqrt(40000 * 1/4 * 3/4) = 87. Six sigma are 520; a fair draw fails
+    /// once in 10 million runs, and this one is seeded.
     #[test]
     fn each_point_is_drawn_equally_often() {
         let mut subset = RandomSubset::default();
@@ -80,8 +77,7 @@ mod tests {
         drawn.sort_unstable();
         drawn.dedup();
         assert_eq!(drawn.len(), 1000);
-        // The mean of 1000 uniform draws has sigma n / sqrt(12 * 1000); six
-        // sigma are 0.055 n.
+        // The mean of 1000 uniform draws has sigma n / sqrt(12 * 1000); six sigma are 0.055 n.
         let mean = drawn.iter().map(|&i| f64::from(i)).sum::<f64>() / 1000.0;
         assert!((mean / n as f64 - 0.5).abs() < 0.055, "{mean}");
     }

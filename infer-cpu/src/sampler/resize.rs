@@ -1,16 +1,14 @@
-//! From ranked critical points to as many as are wanted.
+//! Resizes ranked critical points to M points.
 //!
-//! Ranked rows come best first, with a score each. Of no row, every rule makes
-//! none.
+//! Ranked rows come best first, with their scores. Without rows, every rule returns none.
 
 use super::Resize;
 
-/// A rule of resizing: ranked rows, their scores, M, and where M rows go.
+/// A rule of resizing: its arguments are ranked rows, their scores, M, and the output.
 type Rule = fn(&[u32], &[f64], usize, &mut Vec<u32>);
 
 impl Resize {
-    /// Writes `m` of `ranked` to `out` by this rule; fewer only where the rule
-    /// says so.
+    /// Writes `m` of `ranked` to `out` by this rule; only `truncate` may write fewer.
     pub fn apply(self, ranked: &[u32], scores: &[f64], m: usize, out: &mut Vec<u32>) {
         let rule: Rule = match self {
             Self::Truncate => truncate,
@@ -35,19 +33,19 @@ fn cyclic(ranked: &[u32], _scores: &[f64], m: usize, out: &mut Vec<u32>) {
     out.extend(ranked.iter().cycle().take(m));
 }
 
-/// Row `floor(i * n / m)` at `i`: nearest neighbours as TensorFlow resizes
-/// images, by the low edge.
+/// Row `floor(i * n / m)` at `i`: nearest neighbours by the low edge, as TensorFlow resizes images.
 fn nearest(ranked: &[u32], _scores: &[f64], m: usize, out: &mut Vec<u32>) {
     out.extend((0..m).map(|i| ranked[i * ranked.len() / m]));
 }
 
-/// The same of a ranking in which each row is repeated once for every 2⁻³² of
-/// the scores' sum that it holds, rounded, at least once.
+/// `nearest` for a ranking in which each row is repeated in proportion to its score: once for every
+/// 2⁻³² of the sum of scores, rounded, and at least once.
 fn weighted(ranked: &[u32], scores: &[f64], m: usize, out: &mut Vec<u32>) {
     let sum: f64 = scores.iter().sum();
-    // What is not a number, where all scores are 0, becomes 1.
+    // If all scores are 0, the quotient is NaN, and the count becomes 1.
     let repetitions =
         |score: f64| u128::from(((score / sum * 4_294_967_296.0).round() as u64).max(1));
+    // 128 bits, since M times this sum may exceed 64 bits.
     let length: u128 = scores.iter().map(|&score| repetitions(score)).sum();
     let mut row = 0;
     let mut end = repetitions(scores[0]);
@@ -79,7 +77,7 @@ mod tests {
             (Resize::Truncate, &[7, 2], &[7, 2, 9][..]),
             (Resize::Cyclic, &[7, 2], &[7, 2, 9, 7, 2]),
             (Resize::Nearest, &[7, 2], &[7, 7, 2, 2, 9]),
-            // As of [7, 7, 2, 9], at 0, 2 and at 0, 0.8, 1.6, 2.4, 3.2.
+            // The ranking is [7, 7, 2, 9], sampled at 0, 2 and at 0, 0.8, 1.6, 2.4, 3.2.
             (Resize::Weighted, &[7, 2], &[7, 7, 7, 2, 9]),
         ] {
             assert_eq!(resize(rule, &ranked, &scores, 2), two, "{rule}");
@@ -116,8 +114,8 @@ mod tests {
             );
         }
 
-        /// The repetitions of a row are off by at most 1/2 of 2^32, its ends by
-        /// n of them, and m places sample an interval to within one.
+        /// The repetitions of a row are off by at most 1/2 of 2^32, its ends by n of them, and m
+        /// places sample an interval to within one.
         #[test]
         fn weighted_shares_are_those_of_the_scores(
             mut scores in prop::collection::vec(0.01f64..10.0, 1..30), m in 1usize..200,

@@ -1,4 +1,4 @@
-//! What a caller can ask of a sampler.
+//! Specifications of samplers.
 
 use std::path::Path;
 
@@ -11,20 +11,20 @@ use super::SamplerError;
 pub const MOST_CRITICAL: usize = 1 << 24;
 
 formats::named! {
-    /// A way to choose points of a cloud.
+    /// A sampling method.
     #[derive(Default)]
     #[non_exhaustive]
     pub enum SamplerKind: "sampler" {
         /// Every point.
         #[default]
         All = "all",
-        /// The first M.
+        /// The first M points.
         First = "first",
-        /// M drawn at random.
+        /// M random points.
         Random = "random",
-        /// M by farthest point sampling.
+        /// M points by farthest point sampling.
         Fps = "fps",
-        /// One a cell of a grid.
+        /// One point for each cell of a grid.
         Voxel = "voxel",
         /// A Critical Points Layer.
         Cpl = "cpl",
@@ -32,21 +32,21 @@ formats::named! {
 }
 
 formats::named! {
-    /// Where farthest point sampling begins.
+    /// The first point of farthest point sampling.
     #[derive(Default)]
     #[non_exhaustive]
     pub enum FpsStart: "start of farthest point sampling" {
-        /// At the point farthest from the mean of all points, so that the result does
-        /// not depend on the order of the points.
+        /// The point farthest from the mean of all points, so that the result does not depend on
+        /// the order of the points.
         #[default]
         Farthest = "farthest",
-        /// At the first point, as reference implementations do.
+        /// The first point of the cloud, as in reference implementations.
         First = "first",
     }
 }
 
 formats::named! {
-    /// How a Critical Points Layer turns its ranked points into M.
+    /// How a Critical Points Layer resizes its ranked points to M.
     #[derive(Default)]
     #[non_exhaustive]
     pub enum Resize: "rule of resizing" {
@@ -55,11 +55,10 @@ formats::named! {
         /// The M best; all in turn, over and over, if there are fewer.
         #[default]
         Cyclic = "cyclic",
-        /// The ranking stretched or shrunk to M by nearest neighbours, as the
-        /// layer's authors do.
+        /// The ranking, stretched or shrunk to M by nearest neighbours, as the layer's authors do.
         Nearest = "nearest",
-        /// The same, once each point is repeated in proportion to its score:
-        /// the weighted layer (WCPL) of the same authors.
+        /// The same for a ranking in which each point is repeated in proportion to its score: the
+        /// weighted layer (WCPL) of the same authors.
         Weighted = "weighted",
     }
 }
@@ -69,40 +68,38 @@ formats::named! {
     #[derive(Default)]
     #[non_exhaustive]
     pub enum FrontChoice: "front end" {
-        /// The model's own front end if it brings one, else the trunk of its
-        /// input transform, else its trunk.
+        /// The model's own front end if it has one, else the trunk of its input transform, else its
+        /// trunk.
         #[default]
         Auto = "auto",
-        /// The front end that the model file brings.
+        /// The front end of the model file.
         Own = "own",
-        /// The trunk of the input transform (STN3d), whose features the
-        /// classifier needs in any case.
+        /// The trunk of the input transform (STN3d), whose features the classifier computes anyway.
         Stn = "stn",
-        /// The trunk itself.
+        /// The trunk of the network.
         Trunk = "trunk",
     }
 }
 
-/// Which points of a cloud to keep.
+/// The specification of a sampler.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SamplerSpec {
-    /// The way to choose.
+    /// The method.
     pub kind: SamplerKind,
-    /// How many points to keep, M; `all` and a given voxel size disregard it.
+    /// The number of points to keep, M; ignored by `all` and with a voxel size.
     pub points: usize,
-    /// What random draws depend on.
+    /// The seed of random draws.
     pub seed: u64,
-    /// Where `fps` begins.
+    /// The first point of `fps`.
     pub fps_start: FpsStart,
-    /// Edge of a voxel, in the units of the cloud; without it, the grid is as
-    /// fine as M allows.
+    /// The edge of a voxel in the units of the cloud; if `None`, the grid is as fine as M allows.
     pub voxel_size: Option<f64>,
-    /// How `cpl` comes to M points.
+    /// How `cpl` resizes its points to M.
     pub resize: Resize,
-    /// How often `cpl` may pool again among the points not yet chosen while
-    /// it has fewer than M; 0 is the plain layer.
+    /// How often `cpl` may pool again over the points that are not chosen yet, while it has fewer
+    /// than M; 0 is the plain layer.
     pub passes: usize,
-    /// What `cpl` pools.
+    /// The layers whose features `cpl` pools.
     pub front: FrontChoice,
 }
 
@@ -122,10 +119,10 @@ impl Default for SamplerSpec {
 }
 
 impl SamplerSpec {
-    /// The sampler that the model at `path` was trained behind, by its `card`.
+    /// The sampler of the training of the model at `path`, according to its `card`.
     ///
     /// # Errors
-    /// A card that names no sampler of ours.
+    /// A card with an unknown sampler.
     pub fn as_trained(path: &Path, card: &ModelCard) -> Result<Self, FormatError> {
         let bad = |key: &str| {
             let part = format!("metadata `{key}`");
@@ -142,10 +139,10 @@ impl SamplerSpec {
         Ok(spec)
     }
 
-    /// That the specification can be met.
+    /// Checks the specification.
     ///
     /// # Errors
-    /// M is needed but 0; a voxel size that is not above 0.
+    /// M is 0 but needed; a voxel size that is not above 0.
     pub fn check(&self) -> Result<(), SamplerError> {
         let voxel_size = self.voxel_size.filter(|_| self.kind == SamplerKind::Voxel);
         match (self.kind, voxel_size) {

@@ -3,18 +3,12 @@
 use formats::rng::StreamKey;
 use proptest::prelude::*;
 
-use super::random::RandomSubset;
-
 /// A cloud in another order.
 pub fn shuffled(cloud: &[[f32; 3]], seed: u32) -> Vec<[f32; 3]> {
-    // One point more than are drawn: the drawn order is a random one.
-    let mut order = vec![];
     let key = StreamKey::new(0, "shuffled", seed);
-    RandomSubset::default().draw(cloud.len() + 1, cloud.len(), key, &mut order);
-    let last = cloud.len() as u32;
-    let missing = (0..last).find(|index| !order.contains(index));
-    let order = order.into_iter().map(|index| if index == last { missing } else { Some(index) });
-    order.flatten().map(|index| cloud[index as usize]).collect()
+    let mut shuffled: Vec<_> = (0..).map(|i| key.unit(i)).zip(cloud.iter().copied()).collect();
+    shuffled.sort_by(|a, b| a.0.total_cmp(&b.0));
+    shuffled.into_iter().map(|(_, point)| point).collect()
 }
 
 /// `n` points, uniform in the cube from -1 to 1.
@@ -29,8 +23,8 @@ pub fn gather(cloud: &[[f32; 3]], indices: &[u32]) -> Vec<[f32; 3]> {
     indices.iter().map(|&index| cloud[index as usize]).collect()
 }
 
-/// Clouds full of ties and duplicates, on a coarse grid with zeros of both
-/// signs, and clouds of any finite numbers.
+/// Clouds full of ties and duplicates, on a coarse grid with zeros of both signs, and clouds of any
+/// finite numbers.
 pub fn any_cloud() -> impl Strategy<Value = Vec<[f32; 3]>> {
     let grid = (-2i8..=2).prop_map(|x| f32::from(x) * 0.5);
     let grid = prop_oneof![grid, Just(-0.0f32)];
@@ -42,8 +36,7 @@ pub fn any_cloud() -> impl Strategy<Value = Vec<[f32; 3]>> {
     ]
 }
 
-/// Clouds that break careless arithmetic, with the number of their distinct
-/// points.
+/// Clouds with extreme coordinates, and the number of distinct points of each.
 pub fn extremes() -> Vec<(&'static str, Vec<[f32; 3]>, usize)> {
     let outlier = [uniform(99, 1), vec![[1e9, 0.0, 0.0]]].concat();
     let scaled = |by: f32| uniform(100, 2).into_iter().map(|p| p.map(|x| x * by)).collect();
@@ -60,9 +53,8 @@ pub fn extremes() -> Vec<(&'static str, Vec<[f32; 3]>, usize)> {
     ]
 }
 
-/// What follows the header of the first NumPy array in the file at `relative`
-/// below `../shared/data`, an array or an uncompressed archive of some; an
-/// error where it is absent.
+/// The data of the first NumPy array in the file at `relative` below `../shared/data`, an array or
+/// an uncompressed archive; an error if the file is absent.
 pub fn shared_array(relative: &str, descr: &str) -> Result<Vec<u8>, String> {
     const MAGIC: &[u8] = b"\x93NUMPY\x01\0";
     let bytes = std::fs::read(test_support::shared_data(relative)?).unwrap();

@@ -1,41 +1,30 @@
-//! One point a cell of a grid of cubes.
+//! Voxel grid sampling: one point for each occupied cell of a cubic grid.
 
 use super::canonical::{compare, sort_by_geometry};
 use super::hash::Map;
 
-/// No cell is finer: each number that f32 holds has a cell of its own.
+/// The finest cell size: each f32 number then has a cell of its own.
 const FINEST: f64 = f32::from_bits(1) as f64;
 
-/// Sizes that are tried in search of a grid: each octave is divided into so
-/// many equal steps.
+/// The sizes in a search for a grid: each octave is divided into this number of equal steps.
 const STEPS_AN_OCTAVE: u32 = 32;
 
-/// From twice the cloud's extent down, beyond what f64 tells apart in it.
+/// The search covers these octaves from twice the cloud's extent down, beyond the resolution of
+/// f64.
 const OCTAVES: u32 = 63;
 
-/// Parts of a cell's edge in which points are placed for their centroid:
-/// `u32::MAX` of them sum to less than 2^64.
+/// Offsets from a cell's corner are integers in this number of parts of the edge: `u32::MAX` of
+/// them sum to less than 2^64.
 const PARTS: f64 = 4_294_967_296.0;
 
-/// Thins clouds; keeps its memory from call to call. It grows with the number
-/// of occupied cells, not of points.
-///
-/// ```
-/// use infer_cpu::sampler::VoxelGrid;
-///
-/// let cloud = [[0.9, 0.5, 0.5], [0.6, 0.5, 0.5], [0.1, 0.5, 0.5], [1.5, 0.5, 0.5]];
-/// let mut chosen = vec![];
-/// // The cell from 0 to 1 holds three points; that at 0.6 is nearest their mean.
-/// VoxelGrid::default().select_by_size(&cloud, 1.0, &mut chosen);
-/// assert_eq!(chosen, [1, 3]);
-/// ```
+/// Thins clouds, and reuses its memory for each. The memory grows with the number of occupied
+/// cells, not of points.
 #[derive(Default)]
 pub struct VoxelGrid {
     cells: Vec<Cell>,
-    /// Indices into `cells` by their places: low corners from the origin, in
-    /// edges, whose bits tell them apart.
+    /// The index in `cells` of each cell, by the bits of its low corner in units of the edge.
     index: Map<[u64; 3]>,
-    /// The points kept, as they are sorted.
+    /// Sort keys of the kept points.
     keys: Vec<u64>,
 }
 
@@ -48,7 +37,7 @@ struct Grid {
 
 /// An occupied cell.
 struct Cell {
-    /// How many points it holds.
+    /// The number of points in the cell.
     n: u32,
     /// The sum of their offsets from the low corner, in parts of the edge.
     sum: [u64; 3],
@@ -59,25 +48,24 @@ struct Cell {
 }
 
 impl VoxelGrid {
-    /// Writes one point of each cell of edge `size` (positive and finite, in
-    /// the units of the cloud) to `out`: the one nearest to the centroid of
-    /// the cell's points. Cells begin at coordinate 0, as in every cloud.
+    /// Writes one point of each cell of edge `size` (positive and finite, in the units of the
+    /// cloud) to `out`: the one nearest to the centroid of the cell's points. Cells begin at
+    /// coordinate 0 in every cloud.
     ///
-    /// Points are ascending by x, y, z. They are the same in any order of the
-    /// input: offsets are summed as integers, in 2⁻³² of the edge, the least
-    /// point wins a tie, and of equal points the first is taken.
+    /// Points are ascending by x, y, z. They are the same for any order of the input: offsets are
+    /// summed as integers in 2⁻³² of the edge, the least point wins a tie, and the first of equal
+    /// points is kept.
     pub fn select_by_size(&mut self, points: &[[f32; 3]], size: f64, out: &mut Vec<u32>) {
         self.select(points, &Grid { origin: [0.0; 3], size: size.max(FINEST) }, out);
     }
 
-    /// The same for the finest grid that has at most `m` (at least 1) occupied
-    /// cells. Cells begin at the cloud's least coordinates, in f64.
+    /// Does the same for the finest grid with at most `m` (at least 1) occupied cells. Cells begin
+    /// at the cloud's least coordinates, in f64.
     ///
-    /// A cloud of up to `m` distinct points keeps them all. For others, cells'
-    /// edges in steps of 1.6 to 3.1 % are searched by bisection, from twice
-    /// the cloud's extent down to 2⁻⁶³ of it: the edge found leaves at most
-    /// `m` cells and the next finer one more. (A much finer one may leave
-    /// fewer again, since grids of different edges are not nested.)
+    /// A cloud of up to `m` distinct points keeps all of them. For others, a bisection searches
+    /// edges in steps of 1.6 to 3.1 %, from twice the cloud's extent down to 2⁻⁶³ of it: the result
+    /// has at most `m` occupied cells, and the next finer edge has more. (A much finer edge may
+    /// have fewer again, since grids of different edges are not nested.)
     pub fn select_by_count(&mut self, points: &[[f32; 3]], m: usize, out: &mut Vec<u32>) {
         let grid = self.finest(points, m);
         self.select(points, &grid, out);
@@ -85,6 +73,7 @@ impl VoxelGrid {
 
     fn finest(&mut self, points: &[[f32; 3]], m: usize) -> Grid {
         let every_point = Grid { origin: [0.0; 3], size: FINEST };
+        // Each distinct point has a cell of its own in this grid.
         if self.occupies_at_most(m, points, &every_point) {
             return every_point;
         }
@@ -92,6 +81,8 @@ impl VoxelGrid {
         let grid = |step| Grid { origin: low, size: extent * edge(step) };
         let mut fits = 0;
         let mut too_fine = OCTAVES * STEPS_AN_OCTAVE;
+        // The count of cells need not be monotonic: the invariant is that `fits` fits and
+        // `too_fine` does not.
         while too_fine - fits > 1 {
             let middle = fits.midpoint(too_fine);
             if self.occupies_at_most(m, points, &grid(middle)) {
@@ -103,7 +94,7 @@ impl VoxelGrid {
         grid(fits)
     }
 
-    /// Whether points lie in at most `m` cells; ends with the first beyond.
+    /// Whether the points lie in at most `m` cells; stops at the first cell beyond.
     fn occupies_at_most(&mut self, m: usize, points: &[[f32; 3]], grid: &Grid) -> bool {
         self.clear();
         points.iter().all(|point| {
@@ -121,6 +112,7 @@ impl VoxelGrid {
             cell.n += 1;
             (0..3).for_each(|axis| cell.sum[axis] += offset[axis]);
         }
+        // Centroids are complete only after the first pass, so distances need a second one.
         for (i, point) in points.iter().enumerate() {
             let place = grid.place(point);
             let offset = grid.offset(point, place);
@@ -146,9 +138,10 @@ impl VoxelGrid {
         self.index.clear();
     }
 
-    /// The cell at `place`, which becomes occupied.
+    /// The cell at `place`, which is added if it is new.
     fn cell(&mut self, place: [f64; 3]) -> &mut Cell {
         let n = self.cells.len() as u32;
+        // f64 has no hash, but its bits have.
         let at = *self.index.entry(place.map(f64::to_bits)).or_insert(n);
         if at == n {
             self.cells.push(Cell { n: 0, sum: [0; 3], nearest: 0, distance: f64::INFINITY });
@@ -158,12 +151,12 @@ impl VoxelGrid {
 }
 
 impl Grid {
-    /// The cell of a point. Without the sign of zeros, which bits would tell apart.
+    /// The cell of a point. Adding 0 removes the sign of a zero, which would give other bits.
     fn place(&self, point: &[f32; 3]) -> [f64; 3] {
         [0, 1, 2].map(|axis| self.edges(point, axis).floor() + 0.0)
     }
 
-    /// How far a point is from its cell's low corner, in parts of the edge.
+    /// The offset of a point from its cell's low corner, in parts of the edge.
     fn offset(&self, point: &[f32; 3], place: [f64; 3]) -> [u64; 3] {
         [0, 1, 2].map(|axis| ((self.edges(point, axis) - place[axis]) * PARTS) as u64)
     }
@@ -197,8 +190,8 @@ fn bounds(points: &[[f32; 3]]) -> ([f64; 3], f64) {
     (low, sides.into_iter().fold(0.0, f64::max))
 }
 
-/// The edge at one step of the search, in extents of the cloud: 2 at step 0.
-/// Powers of two and their integer fractions, so the same on any machine.
+/// The edge at a step of the search, as a multiple of the cloud's extent: 2 at step 0. All are
+/// powers of two times integer fractions, and so the same on any machine.
 fn edge(step: u32) -> f64 {
     let octave = 2.0 / (1u64 << (step / STEPS_AN_OCTAVE)) as f64;
     octave * f64::from(2 * STEPS_AN_OCTAVE - step % STEPS_AN_OCTAVE)
@@ -230,12 +223,12 @@ mod tests {
         let along_x = [0.1, 0.3, 0.8, -0.1, -0.6, -0.95];
         let cloud = along_x.map(|x| [x, 0.5, 0.5]);
         assert_eq!(by_size(&cloud, 1.0), [4, 1]);
-        // Of points as near, the lesser.
+        // The lesser of two points at the same distance.
         let cloud = [0.75, 0.25].map(|x| [x, 0.5, 0.5]);
         assert_eq!(by_size(&cloud, 1.0), [1]);
     }
 
-    /// How many cells of `grid` hold points.
+    /// The number of cells of `grid` with points.
     fn n_occupied(points: &[[f32; 3]], grid: &Grid) -> usize {
         let cells = points.iter().map(|point| grid.place(point).map(f64::to_bits));
         cells.collect::<HashSet<_>>().len()
@@ -291,7 +284,7 @@ mod tests {
 
     #[test]
     fn ten_million_points_take_the_memory_of_their_cells() {
-        // A tenth of them where each instruction takes many: the cells are as many.
+        // An emulator gets a tenth of the points, which occupy as many cells.
         let n = if test_support::IS_EMULATED { 1_000_000 } else { 10_000_000 };
         let cloud = uniform(n, 5);
         let mut grid = VoxelGrid::default();

@@ -1,4 +1,4 @@
-//! `classify`: its lines, its flags and their sense.
+//! `classify`: its output and flags.
 
 use formats::model_card::{ModelCard, Normalization};
 
@@ -20,8 +20,7 @@ fn a_line_is_name_class_and_confidence() {
 
 #[test]
 fn an_object_says_all_there_is_to_say() {
-    let folder = Folder::new();
-    folder.cloud("c.xyz", &strip(50));
+    let folder = Folder::with_cloud(50);
     let found = &folder.classify_json("--sampler fps --points 20 c.xyz")[0];
     assert_eq!(found["file"], "c.xyz");
     let class = found["class"].as_u64().unwrap() as usize;
@@ -30,7 +29,7 @@ fn an_object_says_all_there_is_to_say() {
         found["logits"].as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect();
     assert!(logits.iter().all(|&logit| logit <= logits[class]));
     let sum: f64 = logits.iter().map(|logit| (logit - logits[class]).exp()).sum();
-    // Logits have 24 bits, of which the sum keeps 22.
+    // Logits have 24 bits; the sum keeps 22 of them.
     assert!((found["confidence"].as_f64().unwrap() - 1.0 / sum).abs() < 1e-6);
     assert_eq!((&found["points"], &found["used"]), (&50.into(), &20.into()));
     assert_eq!((&found["dropped"], &found["clipped"]), (&0.into(), &0.into()));
@@ -40,8 +39,7 @@ fn an_object_says_all_there_is_to_say() {
 
 #[test]
 fn unknown_is_printed_and_the_fine_class_stays_in_the_object() {
-    let folder = Folder::new();
-    folder.cloud("c.xyz", &strip(50));
+    let folder = Folder::with_cloud(50);
     let known = folder.classify_json("c.xyz")[0].clone();
     assert!(known.get("unknown").is_none(), "{known}");
     let label = known["label"].as_str().unwrap();
@@ -57,7 +55,7 @@ fn unknown_is_printed_and_the_fine_class_stays_in_the_object() {
     }
     let inspected = folder.run("inspect m.safetensors").out;
     assert!(inspected.contains(&format!("unknown         {label}\n")), "{inspected}");
-    // No cloud has as little energy.
+    // Every cloud has a larger energy.
     write(&ModelCard { unknown_energy: Some(-1e9), temperature: 2.0, ..card() });
     let found = folder.classify_json("c.xyz")[0].clone();
     assert_eq!((&found["unknown"], &found["label"]), (&true.into(), &known["label"]));
@@ -69,7 +67,7 @@ fn a_network_of_metres_sees_how_large_an_object_is_and_not_where_it_is() {
     let folder = Folder::new();
     let card = ModelCard { normalization: Normalization::Metric, ..card() };
     tiny_model::write(&folder.path("m.safetensors"), &tiny_model::tensors(4), &card);
-    // Halves and quarters, which f64 holds wherever they lie.
+    // Eighths are exact in f64 at any offset.
     let cloud: Vec<_> = strip(50).iter().map(|p| p.map(|x| (x * 8.0).round() / 8.0)).collect();
     let moved = |point: &[f64; 3]| [point[0] + 32.0, point[1] - 8.0, point[2] - 2.0];
     folder.cloud("here.xyz", &cloud);
@@ -86,7 +84,7 @@ fn a_network_of_metres_sees_how_large_an_object_is_and_not_where_it_is() {
 #[test]
 fn every_format_of_a_cloud_gives_the_same_answer() {
     let folder = Folder::new();
-    // Halves and quarters, which any format holds.
+    // Eighths are exact in all formats.
     let cloud: Vec<_> = strip(50).iter().map(|p| p.map(|x| (x * 8.0).round() / 8.0)).collect();
     let names = ["c.ply", "c.npz", "c.npy", "c.pcd", "c.xyz", "c.csv", "c.bin"];
     for name in names {
@@ -102,8 +100,7 @@ fn every_format_of_a_cloud_gives_the_same_answer() {
 
 #[test]
 fn standard_input_holds_one_cloud() {
-    let folder = Folder::new();
-    folder.cloud("c.xyz", &strip(50));
+    let folder = Folder::with_cloud(50);
     let text = std::fs::read(folder.path("c.xyz")).unwrap();
     let ran = folder.run_with("classify --json --model m.safetensors -", &text);
     assert_eq!(ran.code, 0, "{}", ran.err);
@@ -116,8 +113,7 @@ fn standard_input_holds_one_cloud() {
 
 #[test]
 fn threads_and_kernels_do_not_change_the_class() {
-    let folder = Folder::new();
-    folder.cloud("c.xyz", &strip(200));
+    let folder = Folder::with_cloud(200);
     let one = folder.run("classify --json --model m.safetensors --threads 1 c.xyz").json();
     for threads in [2, 3, 4] {
         let line = format!("classify --json --model m.safetensors --threads {threads} c.xyz");
@@ -145,8 +141,7 @@ fn the_sampler_is_the_model_s_own_but_for_what_flags_say() {
 
 #[test]
 fn every_sampler_and_precision_classifies() {
-    let folder = Folder::new();
-    folder.cloud("c.xyz", &strip(100));
+    let folder = Folder::with_cloud(100);
     for sampler in ["all", "first", "random", "fps", "voxel", "cpl"] {
         for precision in ["f32", "f32-fc16", "f16", "i8"] {
             let points = if sampler == "all" { "" } else { "--points 40" };
@@ -163,8 +158,7 @@ fn every_sampler_and_precision_classifies() {
 
 #[test]
 fn votes_are_seeded_and_need_a_sampler_that_draws() {
-    let folder = Folder::new();
-    folder.cloud("c.xyz", &strip(100));
+    let folder = Folder::with_cloud(100);
     let votes = |seed: u32| {
         let line = format!("--sampler random --points 30 --votes 5 --seed {seed} c.xyz");
         folder.classify_json(&line)[0]["logits"].clone()
@@ -175,15 +169,14 @@ fn votes_are_seeded_and_need_a_sampler_that_draws() {
         .classify("--votes 5 c.xyz")
         .assert_refused(2, "error: expected the sampler random or rotations");
     assert_eq!(folder.classify("--votes 5 --vote-rotations --up y c.xyz").code, 0);
-    // More points than there are are all of them.
+    // Requesting more points than the cloud has keeps all of them.
     let most = "--sampler random --points 2000000000000000000 c.xyz";
     assert_eq!(folder.classify(most).code, 0);
 }
 
 #[test]
 fn what_makes_no_sense_is_a_usage_error() {
-    let folder = Folder::new();
-    folder.cloud("c.xyz", &strip(9));
+    let folder = Folder::with_cloud(9);
     for (flags, start) in [
         ("", "error: the following required arguments"),
         ("--sampler fsp c.xyz", "error: invalid value 'fsp' for '--sampler"),
@@ -207,13 +200,12 @@ fn what_makes_no_sense_is_a_usage_error() {
     }
 }
 
-/// `head` that ends after a line is no failure.
+/// A reader such as `head` that ends after a line is not an error.
 #[cfg(unix)]
 #[test]
 fn a_reader_that_leaves_is_no_failure() {
     use std::process::Stdio;
-    let folder = Folder::new();
-    folder.cloud("c.xyz", &strip(9));
+    let folder = Folder::with_cloud(9);
     let files = "c.xyz ".repeat(2000);
     let mut child = folder
         .command(&format!("classify --json --model m.safetensors {files}"))
@@ -221,7 +213,7 @@ fn a_reader_that_leaves_is_no_failure() {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    // Far more than a pipe holds is still to come.
+    // The remaining output exceeds the buffer of a pipe.
     drop(child.stdout.take());
     let output = child.wait_with_output().unwrap();
     assert_eq!((output.status.code(), output.stderr.as_slice()), (Some(0), &b""[..]));

@@ -1,7 +1,6 @@
-//! What the program says of clouds and weights at the ends of what there can be.
-//! What they come to is in `tests/extremes`, case by case.
+//! Messages for extreme clouds and weights. `tests/extremes` has the expected classes.
 
-use crate::program::{Folder, card, strip};
+use crate::program::{Folder, card};
 use crate::tiny_model;
 
 #[test]
@@ -46,8 +45,7 @@ fn scaled_model(folder: &Folder, name: &str, factor: f32) {
 
 #[test]
 fn what_overflows_f16_is_computed_in_f32() {
-    let folder = Folder::new();
-    folder.cloud("c.xyz", &strip(60));
+    let folder = Folder::with_cloud(60);
     scaled_model(&folder, "feat.conv1.weight", 1e6);
     let ran = folder.classify("--precision f16 c.xyz");
     assert_eq!(ran.code, 0);
@@ -63,8 +61,7 @@ fn what_overflows_f16_is_computed_in_f32() {
 
 #[test]
 fn what_overflows_f32_has_no_class() {
-    let folder = Folder::new();
-    folder.cloud("c.xyz", &strip(60));
+    let folder = Folder::with_cloud(60);
     // Activations of trunk or T-Net reach 1e48.
     for net in ["feat", "feat.stn", "feat.fstn"] {
         let mut tensors = tiny_model::tensors(4);
@@ -83,8 +80,7 @@ fn what_overflows_f32_has_no_class() {
 
 #[test]
 fn int8_counts_what_its_calibration_clips() {
-    let folder = Folder::new();
-    folder.cloud("c.xyz", &strip(60));
+    let folder = Folder::with_cloud(60);
     let mut narrow = card();
     let layers = ["conv1", "conv2", "stn.conv1", "stn.conv2", "fstn.conv1", "fstn.conv2"];
     narrow.activation_ranges = layers.map(|layer| (format!("feat.{layer}"), 1e-3)).into();

@@ -1,4 +1,4 @@
-//! `inspect`: what a model holds and costs.
+//! `inspect`: the content and cost of a model.
 
 use test_support::{need, shared_data};
 
@@ -18,7 +18,7 @@ fn a_model_is_shown_layer_by_layer() {
         "trunk           3-8-16-64, max",
         "head            64-32-16-4",
         "front end       none of its own",
-        "int8            not calibrated: shapes made by rule are used at load",
+        "int8            not calibrated: loading uses generated shapes",
     ] {
         assert!(ran.out.lines().any(|found| found == line), "{line}: {}", ran.out);
     }
@@ -27,15 +27,15 @@ fn a_model_is_shown_layer_by_layer() {
         json["trunk"][1],
         serde_json::json!({"name": "feat.conv2", "inputs": 8, "outputs": 16})
     );
-    // 3*8 + 8*16 + 16*64 thrice, of which one begins with 8*8; 3*3; 8*8.
+    // 3*8 + 8*16 + 16*64 twice, 8*8 + 8*16 + 16*64 once; 3*3; 8*8.
     assert_eq!(json["macs_per_point"], 2 * 1176 + 1216 + 9 + 64);
-    // 64*32 + 32*16 thrice; 16*9, 16*64, 16*4.
+    // 64*32 + 32*16 three times; 16*9, 16*64, 16*4.
     assert_eq!(json["macs_per_cloud"], 3 * 2560 + 16 * (9 + 64 + 4));
     assert_eq!(json["parameters"], json["stored"]);
     assert_eq!(json["bytes"]["f32"].as_u64(), json["parameters"].as_u64().map(|n| 4 * n));
 }
 
-/// The baseline's figures as its authors' code has them.
+/// The numbers of the baseline in its authors' code.
 #[test]
 fn the_baseline_costs_what_it_is_known_to() {
     let model = need!(shared_data("parity/pointnet.safetensors"));

@@ -1,4 +1,4 @@
-//! The objects of a stream of packets: from a capture and over the network.
+//! `live`: objects from a capture and over the network.
 
 use std::io::{BufRead, BufReader, Read};
 use std::net::UdpSocket;
@@ -60,7 +60,7 @@ fn each_object_is_a_line_whose_keys_have_an_order() {
         assert!(object["latency_ms"].is_null());
     }
     assert!(ran.out.lines().count() >= 3 * 9);
-    // The same bytes, however many threads classify.
+    // The output is the same for any number of threads.
     let again =
         folder.run(&format!("{} --pcap drive.pcap", LIVE.replace("threads 1", "threads 3")));
     assert_eq!(again.out, ran.out);
@@ -73,7 +73,7 @@ fn in_real_time_a_capture_takes_its_time_and_answers_have_latencies() {
     assert!(start.elapsed() > Duration::from_millis(900));
     let latencies: Vec<_> = ran.json().iter().map(|o| o["latency_ms"].as_f64().unwrap()).collect();
     assert!(!latencies.is_empty() && latencies.iter().all(|ms| *ms > 0.0));
-    for word in ["decode", "segment", "classify", "track", "latency of answers", "0 lost"] {
+    for word in ["decode", "segment", "classify", "track", "latency, ms", "0 lost"] {
         assert!(ran.err.contains(word), "{}", ran.err);
     }
 }
@@ -101,7 +101,7 @@ pub fn free_port() -> u16 {
     UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
 }
 
-/// The program at a port of this machine, once it listens.
+/// Starts the program at a port of this machine, and waits until it listens.
 pub fn listen(folder: &Folder, port: u16, more: &str) -> Child {
     let line = format!("{LIVE} --udp {port} --interface 127.0.0.1 {more}");
     let mut command = folder.command(&line);
@@ -127,7 +127,7 @@ fn packets_over_the_network_are_answered_as_they_come_and_sigterm_ends_with_the_
     let mut child = listen(&folder, port, "--json --stats");
     let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
     let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
-    // A turn and a half: the first turn's objects are out before the stream ends.
+    // A turn and a half, so that the objects of the first turn are printed before the stream ends.
     let sent = packets(&street(), 7, 113);
     for packet in &sent {
         socket.send_to(packet, ("127.0.0.1", port)).unwrap();
@@ -141,9 +141,9 @@ fn packets_over_the_network_are_answered_as_they_come_and_sigterm_ends_with_the_
     let rest: Vec<Value> =
         lines.map(|line| serde_json::from_str(&line.unwrap()).unwrap()).collect();
     assert_eq!(code, Some(0), "{err}");
-    assert!(err.contains("113 packets; 0 lost") && err.contains("1 of something else"), "{err}");
+    assert!(err.contains("113 packets; 0 lost") && err.contains("1 foreign"), "{err}");
     assert!(err.contains("expected a data packet of 1206 bytes, found 14 bytes"), "{err}");
-    // What was open when the signal came is answered too.
+    // Clusters that were incomplete at the signal are printed, too.
     assert!(rest.iter().any(|object| object["turn"] == 1), "{rest:?}");
 }
 
@@ -158,7 +158,7 @@ fn packets_from_other_addresses_are_not_looked_at() {
     }
     thread::sleep(Duration::from_millis(300));
     let (code, err) = terminate(&mut child);
-    // Nor does a service fail whose sensor was not switched on.
+    // A service without packets of its sensor does not fail.
     assert_eq!(code, Some(0));
     assert!(err.contains("5 from other addresses"), "{err}");
     let expected =
@@ -192,7 +192,7 @@ fn what_cannot_be_listened_to_is_named() {
         "error: invalid value 'nan' for '--twist",
     );
     let address = format!("127.0.0.1:{port}");
-    // In the words of the system.
+    // The message is that of the operating system.
     let in_use = UdpSocket::bind(&address).unwrap_err();
     refused(
         &format!("--udp {port} --interface 127.0.0.1"),

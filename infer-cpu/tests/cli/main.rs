@@ -1,5 +1,4 @@
-//! The program itself, by its command line: what it prints, what it refuses
-//! and how, and which exit code it ends with.
+//! The program: its output, errors and exit codes.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 

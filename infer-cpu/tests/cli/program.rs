@@ -1,4 +1,4 @@
-//! A folder with a model and clouds, and the program run in it.
+//! Runs the program in a folder with a model and clouds.
 
 use std::fs;
 use std::io::Write;
@@ -16,10 +16,17 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// One with a model `m.safetensors` of classes a, b, c, d.
+    /// A folder with a model `m.safetensors` of classes a, b, c, d.
     pub fn new() -> Self {
         let folder = Self { folder: tempfile::tempdir().unwrap() };
         tiny_model::write(&folder.path("m.safetensors"), &tiny_model::tensors(4), &card());
+        folder
+    }
+
+    /// [`Folder::new`] with a cloud `c.xyz` of `n` points.
+    pub fn with_cloud(n: usize) -> Self {
+        let folder = Self::new();
+        folder.cloud("c.xyz", &strip(n));
         folder
     }
 
@@ -49,7 +56,7 @@ impl Folder {
 
     /// Runs the program to its end.
     pub fn run(&self, line: &str) -> Ran {
-        Ran::of(self.command(line).output().unwrap())
+        Ran::from_output(self.command(line).output().unwrap())
     }
 
     /// The same with `input` as standard input.
@@ -61,7 +68,7 @@ impl Folder {
         // A program that refuses its arguments reads nothing.
         let _ = pipe.write_all(input);
         drop(pipe);
-        Ran::of(child.wait_with_output().unwrap())
+        Ran::from_output(child.wait_with_output().unwrap())
     }
 
     /// `classify` with the folder's model and one thread.
@@ -69,13 +76,13 @@ impl Folder {
         self.run(&format!("classify --model m.safetensors --threads 1 {line}"))
     }
 
-    /// The same as JSON: an object a line.
+    /// The same as JSON: one object per line.
     pub fn classify_json(&self, line: &str) -> Vec<serde_json::Value> {
         self.classify(&format!("--json {line}")).json()
     }
 }
 
-/// What a program left.
+/// The result of a program.
 pub struct Ran {
     pub code: i32,
     pub out: String,
@@ -83,7 +90,7 @@ pub struct Ran {
 }
 
 impl Ran {
-    fn of(output: Output) -> Self {
+    fn from_output(output: Output) -> Self {
         Self {
             code: output.status.code().unwrap(),
             out: String::from_utf8(output.stdout).unwrap(),
@@ -91,13 +98,13 @@ impl Ran {
         }
     }
 
-    /// Standard output as an object a line.
+    /// Standard output as one object per line.
     pub fn json(&self) -> Vec<serde_json::Value> {
         self.out.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
     }
 
-    /// That it ended with `code`, having said nothing but errors, the first of
-    /// which begins with `start`.
+    /// Checks that it ended with `code` and printed only errors, the first of which begins with
+    /// `start`.
     pub fn assert_refused(&self, code: i32, start: &str) {
         assert_eq!((self.code, self.out.as_str()), (code, ""), "{}", self.err);
         assert!(self.err.starts_with(start), "{}", self.err);
@@ -118,7 +125,7 @@ pub fn strip(n: usize) -> Vec<[f64; 3]> {
     (0..n).map(point).collect()
 }
 
-/// The program, by the emulator that these tests run by if they do.
+/// The program, run by the emulator of these tests if there is one.
 fn program() -> Command {
     const PROGRAM: &str = env!("CARGO_BIN_EXE_infer-cpu");
     let runner = std::env::var("CARGO_TARGET_AARCH64_UNKNOWN_LINUX_MUSL_RUNNER");

@@ -1,5 +1,4 @@
-//! Recordings of a stream of packets. What is in their messages, `tests/peers/recordings.py`
-//! reads with other software.
+//! Recordings of `live`. `tests/peers/recordings.py` reads the messages with other software.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -38,18 +37,18 @@ fn a_recording_has_a_cloud_and_the_objects_of_each_turn() {
     let mut expected = BTreeMap::from(per_turn);
     expected.insert("/tf_static".to_owned(), 1);
     assert_eq!(n_messages(&folder, "run.mcap"), expected);
-    // The end is whole too, with an index.
+    // The file ends with an index.
     let bytes = fs::read(folder.path("run.mcap")).unwrap();
     let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
     assert_eq!(summary.stats.unwrap().message_count, 31);
 
-    // With the motion of the sensor, there is a pose a turn.
+    // With the motion of the sensor, there is one pose per turn.
     let ran = folder.run(&format!("{LIVE} --pcap drive.pcap --mcap w.mcap --twist 1 0 0 0 0 0"));
     assert_eq!(ran.code, 0);
     expected.insert("/tf".to_owned(), 10);
     assert_eq!(n_messages(&folder, "w.mcap"), expected);
 
-    // It changes no answer, and not by one byte from run to run.
+    // A recording does not change the lines, and is the same in every run.
     let plain = folder.run(&format!("{LIVE} --pcap drive.pcap"));
     let both = folder.run(&format!("{LIVE} --pcap drive.pcap --json --mcap again.mcap"));
     assert_eq!(both.out, plain.out);
@@ -61,7 +60,10 @@ fn a_recording_replaces_no_file_and_one_of_nothing_is_not_left() {
     let folder = folder();
     folder.write("precious.mcap", "an hour of driving");
     let ran = folder.run(&format!("{LIVE} --pcap drive.pcap --mcap precious.mcap"));
-    ran.assert_refused(1, "error: precious.mcap: expected a name that no file has, found a file");
+    ran.assert_refused(
+        1,
+        "error: precious.mcap: expected the name of a new file, found an existing file",
+    );
     assert_eq!(fs::read(folder.path("precious.mcap")).unwrap(), b"an hour of driving");
     folder
         .run(&format!("{LIVE} --pcap drive.pcap --mcap no/folder.mcap"))
@@ -73,7 +75,7 @@ fn a_recording_replaces_no_file_and_one_of_nothing_is_not_left() {
     }
 }
 
-/// A program that was sent three turns and a half, and has recorded three.
+/// Starts the program, sends 3.5 turns, and waits until it has recorded three.
 fn recorded(folder: &Folder) -> Child {
     let port = free_port();
     let mut child = listen(folder, port, "--json --mcap run.mcap");
@@ -84,7 +86,7 @@ fn recorded(folder: &Folder) -> Child {
         socket.send_to(&packet, ("127.0.0.1", port)).unwrap();
         thread::sleep(Duration::from_secs_f64(PACKET_S));
     }
-    // An emulator takes its time.
+    // An emulator is slow.
     while n_messages(folder, "run.mcap").get("/points") != Some(&3) {
         assert_eq!(child.try_wait().unwrap(), None, "it has ended");
         thread::sleep(Duration::from_millis(20));
@@ -129,13 +131,13 @@ fn a_full_disk_ends_the_recording_and_not_the_answers() {
     let err = String::from_utf8(ran.stderr).unwrap();
     assert_eq!(ran.status.code(), Some(1), "{err}");
     assert!(String::from_utf8(ran.stdout).unwrap() == plain.out);
-    let warning = "warning: the recording ends, the answers go on: run.mcap: ";
+    let warning = "warning: the recording ends, the lines continue: run.mcap: ";
     assert!(err.starts_with(warning), "{err}");
     assert!(err.lines().last().unwrap().starts_with("error: run.mcap: "), "{err}");
     let whole_turns = n_messages(&folder, "run.mcap")["/points"];
     assert!((1..10).contains(&whole_turns), "{whole_turns}");
 
-    // Where nothing but the recording is asked for, nobody waits for more.
+    // Without lines, the program ends with the recording.
     let ran = limited("--mcap only.mcap");
     let err = String::from_utf8(ran.stderr).unwrap();
     assert_eq!((ran.status.code(), err.lines().count()), (Some(1), 1), "{err}");

@@ -1,4 +1,4 @@
-//! `sample`: the points that a sampler chooses, as they were.
+//! `sample`: the chosen points, unchanged.
 
 use formats::cloud_file::{read_cloud, write_cloud};
 
@@ -7,7 +7,7 @@ use crate::program::{Folder, strip};
 #[test]
 fn points_are_chosen_and_not_changed() {
     let folder = Folder::new();
-    // Of which f32 would keep two digits: a UTM northing in millimetres.
+    // A UTM northing with millimetres, of which f32 would keep two digits.
     let cloud: Vec<_> = strip(100).iter().map(|p| [p[0] + 5.5e9, p[1], p[2]]).collect();
     write_cloud(&folder.path("in.npz"), &cloud).unwrap();
     for sampler in ["first", "random", "fps", "voxel"] {

@@ -1,16 +1,15 @@
-//! Names of files on standard input: one answer a line, as soon as it can be.
+//! File names on standard input: one line for each, at once.
 
 use std::io::{BufRead, BufReader, Write};
 use std::process::Stdio;
 
-use crate::program::{Folder, strip};
+use crate::program::Folder;
 
 const STREAM: &str = "classify --json --model m.safetensors --threads 1 --files-from -";
 
 #[test]
 fn each_name_is_answered_before_the_next_is_written() {
-    let folder = Folder::new();
-    folder.cloud("c.xyz", &strip(30));
+    let folder = Folder::with_cloud(30);
     let mut child =
         folder.command(STREAM).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
     let mut names = child.stdin.take().unwrap();
@@ -18,7 +17,7 @@ fn each_name_is_answered_before_the_next_is_written() {
     for name in ["c.xyz", "absent.xyz", "c.xyz"] {
         writeln!(names, "{name}").unwrap();
         names.flush().unwrap();
-        // Would wait for ever for an answer that is not flushed.
+        // This would wait forever for a line that is not flushed.
         let answer: serde_json::Value =
             serde_json::from_str(&answers.next().unwrap().unwrap()).unwrap();
         assert_eq!(answer["file"], name);
@@ -30,8 +29,7 @@ fn each_name_is_answered_before_the_next_is_written() {
 
 #[test]
 fn a_bad_file_is_one_line_and_the_stream_goes_on() {
-    let folder = Folder::new();
-    folder.cloud("c.xyz", &strip(30));
+    let folder = Folder::with_cloud(30);
     folder.write("text.xyz", "1 2 3\n4 five 6\n");
     folder.write("cut.npy", b"\x93NUMPY\x01\x00");
     folder.write("cut.ply", "ply\nformat ascii 1.0\nelement vertex 9\nproperty float x\n");
@@ -61,8 +59,7 @@ fn a_bad_file_is_one_line_and_the_stream_goes_on() {
 
 #[test]
 fn names_come_from_a_file_too() {
-    let folder = Folder::new();
-    folder.cloud("c.xyz", &strip(30));
+    let folder = Folder::with_cloud(30);
     folder.write("list", "c.xyz\nc.xyz");
     let ran = folder.classify("--files-from list");
     assert_eq!((ran.code, ran.out.lines().count()), (0, 2));
@@ -78,8 +75,7 @@ fn an_empty_stream_is_a_success() {
 
 #[test]
 fn files_named_as_arguments_go_on_as_well() {
-    let folder = Folder::new();
-    folder.cloud("c.xyz", &strip(30));
+    let folder = Folder::with_cloud(30);
     let ran = folder.classify("c.xyz absent.xyz c.xyz");
     assert_eq!((ran.code, ran.out.lines().count()), (1, 2));
     assert!(ran.err.starts_with("error: absent.xyz: "), "{}", ran.err);

@@ -1,4 +1,4 @@
-//! Packets of a VLP-16 in a street of boxes, whose returns follow in closed form.
+//! Packets of a VLP-16 and an Ouster in a street of boxes, with returns in closed form.
 
 use std::f64::consts::TAU;
 
@@ -9,7 +9,7 @@ const SEQUENCES: usize = 24;
 const SEQUENCE_S: f64 = 55.296e-6;
 /// The time of a packet, seconds.
 pub const PACKET_S: f64 = SEQUENCES as f64 * SEQUENCE_S;
-/// Turns a second.
+/// Turns per second.
 const TURNS_PER_S: f64 = 10.0;
 /// Packets of ten turns and a bit.
 pub const PACKETS_PER_S: usize = 754;
@@ -21,7 +21,7 @@ const HEIGHT_M: f64 = 1.2;
 /// The farthest return, metres.
 const FARTHEST_M: f64 = 60.0;
 
-/// A box that stands on the street and moves, metres and metres a second.
+/// A moving box on the street, metres and metres per second.
 #[derive(Clone, Copy, Debug)]
 pub struct Thing {
     pub at: [f64; 2],
@@ -83,7 +83,7 @@ fn packet(things: &[Thing], first_stamp_us: u32, number: usize) -> [u8; PACKET] 
     bytes
 }
 
-/// How far a beam sees at `time_s`, 0 for nothing.
+/// The range of a beam at `time_s`; 0 without a return.
 fn distance(things: &[Thing], azimuth: f64, elevation: f64, time_s: f64) -> f64 {
     let (sin, cos) = azimuth.sin_cos();
     let (up, flat) = elevation.sin_cos();
@@ -125,8 +125,8 @@ pub fn ouster_metadata() -> String {
     )
 }
 
-/// Packet number `number` of that Ouster among `things`. The beams begin at the origin, which the
-/// sensor's do not by centimetres.
+/// Packet number `number` of that Ouster among `things`. The beams begin at the origin; those of
+/// the real sensor begin a few centimetres away.
 pub fn ouster_packet(things: &[Thing], number: usize) -> Vec<u8> {
     let mut bytes = vec![0; 32];
     let per_turn = COLUMNS / COLUMNS_PER_PACKET;

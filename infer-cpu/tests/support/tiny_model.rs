@@ -1,4 +1,4 @@
-//! Small models of weights by rule.
+//! Small models with generated weights.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -7,8 +7,7 @@ use formats::model_card::ModelCard;
 use formats::rng::StreamKey;
 use formats::weights::{Tensor, write_weights};
 
-/// Layers and channels of a PointNet that is fast enough for thousands of runs
-/// and has all parts.
+/// Layers and channels of a PointNet that is fast enough for thousands of runs and has all parts.
 const TRUNK: [usize; 4] = [3, 8, 16, 64];
 const HIDDEN: [usize; 2] = [32, 16];
 
@@ -24,7 +23,7 @@ pub fn tensors(n_classes: usize) -> BTreeMap<String, Tensor> {
     add_layers(&mut tensors, "feat.fstn.fc", &fcs(TRUNK[1] * TRUNK[1]));
     add_layers(&mut tensors, "feat.conv", &TRUNK);
     add_layers(&mut tensors, "fc", &fcs(n_classes));
-    // So that both transforms stay near the identity.
+    // This keeps both transforms near the identity.
     for t_net in ["feat.stn", "feat.fstn"] {
         scale(&mut tensors, &format!("{t_net}.fc3.weight"), 0.1);
         scale(&mut tensors, &format!("{t_net}.fc3.bias"), 0.1);
@@ -43,8 +42,8 @@ pub fn write(path: &Path, tensors: &BTreeMap<String, Tensor>, card: &ModelCard) 
     path.to_path_buf()
 }
 
-/// Layers `stem1`, `stem2`, … of `widths`, uniform as He et al. 2015 have it,
-/// so that activations keep their magnitude.
+/// Layers `stem1`, `stem2`, … of `widths`, with uniform weights after He et al. 2015, so that
+/// activations keep their magnitude.
 fn add_layers(tensors: &mut BTreeMap<String, Tensor>, stem: &str, widths: &[usize]) {
     for (i, pair) in widths.windows(2).enumerate() {
         let (inputs, outputs) = (pair[0], pair[1]);

@@ -9,9 +9,9 @@ use std::process::Command;
 use formats::model_card::{ModelCard, Normalization};
 use formats::weights::{Tensor, write_weights};
 
-/// Writes a model of three classes: a cloud in the positive octant is of the
-/// axis along which it reaches farthest. A trunk that passes coordinates on,
-/// the maximum over points, a head that passes them on.
+/// Writes a model of three classes: a cloud in the positive octant is of the axis along which it
+/// reaches farthest. A trunk that passes coordinates on, the maximum over points, a head that
+/// passes them on.
 pub fn write_longest_axis_model(path: &Path) {
     let identity = Tensor { shape: vec![3, 3], values: vec![1., 0., 0., 0., 1., 0., 0., 0., 1.] };
     let zeros = Tensor { shape: vec![3], values: vec![0.0; 3] };
@@ -46,8 +46,8 @@ impl Compiler {
         Self::find("CXX", "c++", "-std=c++11")
     }
 
-    /// The compiler that environment variable `variable` names, else `default`;
-    /// an error if it is missing or makes programs for another machine.
+    /// The compiler that environment variable `variable` names, else `default`; an error if it is
+    /// missing or makes programs for another machine.
     fn find(variable: &str, default: &str, standard: &'static str) -> Result<Self, String> {
         let command = std::env::var(variable).unwrap_or_else(|_| default.to_owned());
         let machine = match Command::new(&command).arg("-dumpmachine").output() {
@@ -70,8 +70,8 @@ impl Compiler {
         self.folder.path()
     }
 
-    /// Compiles `source`, a path in this package, with all warnings as errors,
-    /// and links it as `link` says.
+    /// Compiles `source`, a path in this package, with all warnings as errors, and links it as
+    /// `link` says.
     pub fn compile(&self, source: &str, link: &[String]) -> PathBuf {
         let package = Path::new(env!("CARGO_MANIFEST_DIR"));
         let program = self.folder().join("program");
@@ -87,9 +87,9 @@ impl Compiler {
     }
 }
 
-/// Where cargo put this library for C: beside the test itself. The package's
-/// library is built as all its crate types in one go, so that the archive
-/// cannot be older than the Rust library that the test is linked with.
+/// Where cargo put this library for C: beside the test itself. The package's library is built as
+/// all its crate types in one go, so that the archive cannot be older than the Rust library that
+/// the test is linked with.
 pub fn library_folder() -> PathBuf {
     let test = std::env::current_exe().unwrap();
     test.parent().unwrap().to_path_buf()

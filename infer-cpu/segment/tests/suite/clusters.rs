@@ -1,12 +1,12 @@
-//! What is one cluster, and what are two.
+//! Which points form one cluster, and which form two.
 
 use edgepuck_segment::{Label, Segmenter, Settings, Sweep};
 
 use crate::scanner::{HEIGHT, Scan, Surface, VLP32C, block, flat, scan};
 
-/// A body with a roof on pillars; between them is glass, which returns nothing. All
-/// vehicles here are as high as the sensor: of a roof below it, which is level here, it
-/// sees lines that are too far apart to belong together.
+/// A body with a roof on pillars; between them is glass, which returns nothing. All vehicles here
+/// are as high as the sensor: its beams hit a lower level roof in lines that are too far apart to
+/// be linked.
 fn car(x: f64, y: f64) -> [Surface; 4] {
     [
         block([x, y], [4.2, 1.8], 0.2, 0.7),
@@ -87,8 +87,7 @@ fn missing_rings_and_dropped_returns_do_not_cut_a_cluster() {
     assert_clusters(&scan, &[&[1]]);
 }
 
-/// The second sensor hangs upside down 8 cm below the first; its lasers have the
-/// numbers 32 to 63.
+/// The second sensor hangs upside down 8 cm below the first; its lasers have the numbers 32 to 63.
 #[test]
 fn two_stacked_sensors_make_one_sweep() {
     let surfaces = [flat(), block([10.0, 3.0], [2.0, 4.0], 0.0, 1.5)];

@@ -53,8 +53,8 @@ fn components_are_those_of_all_pairs() {
     }
 }
 
-/// Steps of a power of two are exact: points a radius apart are linked, and points
-/// the next float farther are not.
+/// Steps of a power of two are exact: points a radius apart are linked, and points the next float
+/// farther are not.
 #[test]
 fn the_radius_itself_links() {
     let line: Vec<_> = (0..50).map(|i| [0.25 * i as f32 - 5.0, -0.0, 0.0]).collect();

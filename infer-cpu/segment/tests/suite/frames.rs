@@ -3,8 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use edgepuck_segment::{Label, Segmentation};
-
-use crate::npz::Array;
+use formats::labelled_sweep::{LabelledBox, read_labelled_sweep};
 
 /// All archives in `folder`.
 pub fn paths(folder: &Path) -> Vec<PathBuf> {
@@ -14,11 +13,11 @@ pub fn paths(folder: &Path) -> Vec<PathBuf> {
 }
 
 /// Points lower above a box's bottom than this may be ground.
-const FEET_M: f32 = 0.25;
-/// Points this far outside of a box may be the object's: boxes are drawn tightly and at one
-/// time, and a car that drives 6 m/s moves by this in the half of a revolution.
-const MARGIN_M: f32 = 0.3;
-const FARTHEST_M: f32 = 40.0;
+const FEET_M: f64 = 0.25;
+/// Points this far outside of a box may be the object's: boxes are drawn tightly and at one time,
+/// and a car that drives 6 m/s moves by this in the half of a revolution.
+const MARGIN_M: f64 = 0.3;
+const FARTHEST_M: f64 = 40.0;
 const FEWEST_POINTS: usize = 30;
 
 /// A labelled sweep, in the sensor's frame.
@@ -26,28 +25,7 @@ pub struct Frame {
     pub name: String,
     pub points: Vec<[f32; 3]>,
     pub lasers: Option<Vec<u16>>,
-    objects: Vec<Object>,
-}
-
-/// A labelled box.
-pub struct Object {
-    pub class: String,
-    /// Centre, length, width, height, yaw.
-    pub of: [f32; 7],
-}
-
-impl Object {
-    /// Whether the box, `margin_m` wider on all sides and without its lowest
-    /// `feet_m`, holds a point.
-    fn holds(&self, point: [f32; 3], margin_m: f32, feet_m: f32) -> bool {
-        let [x, y, z, length, width, height, yaw] = self.of;
-        let (sin, cos) = yaw.sin_cos();
-        let (dx, dy, dz) = (point[0] - x, point[1] - y, point[2] - z);
-        let (along, across) = (cos * dx + sin * dy, cos * dy - sin * dx);
-        along.abs() <= length / 2.0 + margin_m
-            && across.abs() <= width / 2.0 + margin_m
-            && (feet_m - height / 2.0..=height / 2.0 + margin_m).contains(&dz)
-    }
+    boxes: Vec<LabelledBox>,
 }
 
 impl Frame {
@@ -56,41 +34,39 @@ impl Frame {
         let name = path.file_stem().unwrap().to_string_lossy().into_owned();
         // The mean of the two sensors over the rear axle (the data set's calibration).
         let sensor = if name.starts_with("argoverse") { [1.35, 0.0, 1.6] } else { [0.0; 3] };
-        let from_sensor = |at: [f32; 3]| [0, 1, 2].map(|axis| at[axis] - sensor[axis]);
-        let array = |key| Array::read(path, key);
-        let metres = array("xyz_mm").unwrap().elements(|b| i32::from_le_bytes(b) as f32 / 1000.0);
-        let boxes = array("boxes").unwrap().elements(f32::from_le_bytes);
-        let classes = array("classes").unwrap().text();
-        let boxes = boxes.as_chunks::<7>().0.iter().zip(classes);
-        let objects = boxes.map(|(&[x, y, z, length, width, height, yaw], class)| {
-            let [x, y, z] = from_sensor([x, y, z]);
-            Object { class, of: [x, y, z, length, width, height, yaw] }
-        });
-        Self {
-            name,
-            points: metres.as_chunks::<3>().0.iter().map(|&at| from_sensor(at)).collect(),
-            lasers: array("laser").map(|lasers| lasers.elements(|[laser]: [u8; 1]| laser.into())),
-            objects: objects.collect(),
-        }
+        let from_sensor = |at: [f64; 3]| [0, 1, 2].map(|axis| at[axis] - sensor[axis]);
+        let mut sweep = read_labelled_sweep(path).unwrap();
+        sweep.boxes.iter_mut().for_each(|object| object.centre_m = from_sensor(object.centre_m));
+        let points = sweep.points.iter().map(|&at| from_sensor(at).map(|x| x as f32)).collect();
+        Self { name, points, lasers: sweep.lasers, boxes: sweep.boxes }
     }
 
-    /// The cars and persons that count.
-    pub fn objects(&self) -> impl Iterator<Item = (&Object, Vec<usize>)> {
+    /// The cars and persons that count, each with the indices of its points.
+    pub fn objects(&self) -> impl Iterator<Item = (&LabelledBox, Vec<usize>)> {
         const CLASSES: [&str; 4] = ["Car", "Pedestrian", "REGULAR_VEHICLE", "PEDESTRIAN"];
-        let wanted = self.objects.iter().filter(|object| CLASSES.contains(&&*object.class));
-        let near = wanted.filter(|object| object.of[0].hypot(object.of[1]) <= FARTHEST_M);
+        let wanted = self.boxes.iter().filter(|object| CLASSES.contains(&&*object.class));
+        let near = wanted.filter(|object| range_m(object) <= FARTHEST_M);
         let with_points = near.map(|object| (object, self.inside(object)));
         with_points.filter(|(_, inside)| inside.len() >= FEWEST_POINTS)
     }
 
-    fn inside(&self, object: &Object) -> Vec<usize> {
-        let holds = |i: &usize| object.holds(self.points[*i], 0.0, FEET_M);
-        (0..self.points.len()).filter(holds).collect()
+    fn inside(&self, object: &LabelledBox) -> Vec<usize> {
+        let feet_m = object.centre_m[2] - object.size_m[2] / 2.0 + FEET_M;
+        let is_inside = |i: &usize| {
+            let point = self.points[*i].map(f64::from);
+            object.contains(point, 0.0) && point[2] >= feet_m
+        };
+        (0..self.points.len()).filter(is_inside).collect()
     }
 
-    /// Of an object's points, the largest share that one cluster holds, and of that
-    /// cluster, the share of points that are not the object's.
-    pub fn shares(&self, object: &Object, inside: &[usize], found: &Segmentation) -> (f64, f64) {
+    /// Of an object's points, the largest share that one cluster holds, and of that cluster, the
+    /// share of points that are not the object's.
+    pub fn shares(
+        &self,
+        object: &LabelledBox,
+        inside: &[usize],
+        found: &Segmentation,
+    ) -> (f64, f64) {
         let mut counts = vec![0; found.clusters().len()];
         for &point in inside {
             if let Label::Cluster(number) = found.labels()[point] {
@@ -102,8 +78,14 @@ impl Frame {
             return (0.0, 0.0);
         };
         let cluster = found.clusters().nth(number).unwrap().points;
-        let is_other = |&&point: &&u32| !object.holds(self.points[point as usize], MARGIN_M, -1.0);
+        let is_other =
+            |&&point: &&u32| !object.contains(self.points[point as usize].map(f64::from), MARGIN_M);
         let others = cluster.iter().filter(is_other).count();
         (count as f64 / inside.len() as f64, others as f64 / cluster.len() as f64)
     }
+}
+
+/// The horizontal distance of a box from the sensor.
+pub fn range_m(object: &LabelledBox) -> f64 {
+    object.centre_m[0].hypot(object.centre_m[1])
 }

@@ -1,4 +1,4 @@
-//! What is ground, and how high it is.
+//! Which points are ground, and the height of the ground.
 
 use edgepuck_segment::{Label, Segmenter, Settings, Sweep};
 
@@ -100,7 +100,7 @@ fn a_sensor_tilted_by_5_degrees_sees_the_same_ground() {
     });
 }
 
-/// What hangs over the ground, such as a bridge, is no ground.
+/// A surface above the ground, such as a bridge, is not ground.
 #[test]
 fn a_deck_above_the_street_is_no_ground() {
     let scan = scan(&VLP32C, &[flat(), block([20.0, 0.0], [8.0, 60.0], 4.0, 1.0)]);
@@ -110,8 +110,7 @@ fn a_deck_above_the_street_is_no_ground() {
     });
 }
 
-/// A sensor that was put below the ground, by a wrong frame, finds none or all of
-/// it, and does not fail.
+/// A sensor that a wrong frame puts below the ground finds none or all of it, and does not fail.
 #[test]
 fn a_sensor_below_the_ground_is_no_error() {
     let mut scan = scan(&VLP32C, &[flat()]);

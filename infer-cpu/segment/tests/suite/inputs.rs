@@ -1,4 +1,4 @@
-//! Unusual input: it is answered or refused, never a panic.
+//! Unusual input gives a result or an error, never a panic.
 
 use edgepuck_segment::{Label, SegmentError, Segmenter, Settings, Sweep};
 
@@ -76,7 +76,7 @@ fn a_sweep_leaves_no_trace_in_the_next() {
     }
 }
 
-/// A million points in one direction take no time that grows with their square.
+/// The time for a million points in one direction does not grow with their square.
 #[test]
 fn all_points_may_lie_in_one_cell() {
     let points: Vec<_> = (0..1_000_000).map(|i| [1.5 + i as f32 * 9e-5, 1e-3, 0.0]).collect();

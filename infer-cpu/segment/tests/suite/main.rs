@@ -1,5 +1,5 @@
-//! What a segmentation must be, on scenes of which each point's surface is known, on
-//! unusual input, and on real sweeps.
+//! Segmentations of scenes with a known surface for each point, of unusual input, and of real
+//! sweeps.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -8,7 +8,6 @@ mod components;
 mod frames;
 mod ground;
 mod inputs;
-mod npz;
 mod real_frames;
 mod scanner;
 mod stream;

@@ -1,12 +1,12 @@
-//! Real sweeps with labelled cars and persons: how many come out whole and alone.
+//! Real sweeps with labelled cars and persons: how many are clusters of their own.
 
 use edgepuck_segment::{Label, Segmenter, Settings, Sweep};
 use test_support::{need, shared_data};
 
-use crate::frames::{Frame, paths};
+use crate::frames::{Frame, paths, range_m};
 
-/// At least 85 % of the cars and persons come out as one cluster that holds 80 % of
-/// their points and at most 20 % of others, and their points are not ground.
+/// At least 85 % of the cars and persons come out as one cluster that holds 80 % of their points
+/// and at most 20 % of others, and their points are not ground.
 #[test]
 fn cars_and_persons_are_clusters_of_their_own() {
     let folder = need!(shared_data("real_frames"));
@@ -28,7 +28,7 @@ fn cars_and_persons_are_clusters_of_their_own() {
                 "{} {:15} {:5.1} m, {:4} points: {:3.0} % held, {:3.0} % others{}",
                 frame.name,
                 object.class,
-                object.of[0].hypot(object.of[1]),
+                range_m(object),
                 inside.len(),
                 100.0 * held,
                 100.0 * others,

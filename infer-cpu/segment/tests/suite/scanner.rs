@@ -15,8 +15,8 @@ pub const HEIGHT: f64 = 1.8;
 /// The distance along a beam's direction to a surface.
 pub type Surface = Box<dyn Fn([f64; 3]) -> Option<f64>>;
 
-/// Ground through `(0, 0, -HEIGHT)` that climbs by `slope` along x, where `is_there`
-/// says so of x and y; `step` higher than that.
+/// Ground through `(0, 0, -HEIGHT)` that climbs by `slope` along x, where `is_there` accepts x and
+/// y; `step` higher than that.
 pub fn ground(slope: f64, step: f64, is_there: impl Fn(f64, f64) -> bool + 'static) -> Surface {
     Box::new(move |[x, y, z]| {
         let distance = (step - HEIGHT) / (z - slope * x);
@@ -30,8 +30,7 @@ pub fn flat() -> Surface {
     ground(0.0, 0.0, |_, _| true)
 }
 
-/// A box that stands `above` the flat ground, given by its middle, its size and its
-/// height.
+/// A box that stands `above` the flat ground, given by its middle, its size and its height.
 pub fn block(middle: [f64; 2], size: [f64; 2], above: f64, height: f64) -> Surface {
     let low = [middle[0] - size[0] / 2.0, middle[1] - size[1] / 2.0, above - HEIGHT];
     let high = [middle[0] + size[0] / 2.0, middle[1] + size[1] / 2.0, above + height - HEIGHT];
@@ -53,8 +52,7 @@ pub struct Scan {
     pub surfaces: Vec<usize>,
 }
 
-/// What a sensor of rings at `elevations_deg` and steps of 0.2 degrees in azimuth
-/// sees of `surfaces`, up to 100 m.
+/// Scans `surfaces` up to 100 m with rings at `elevations_deg` and azimuth steps of 0.2 degrees.
 pub fn scan(elevations_deg: &[f64], surfaces: &[Surface]) -> Scan {
     let mut scan = Scan { points: vec![], rings: vec![], surfaces: vec![] };
     for step in 0..1800 {
@@ -77,8 +75,8 @@ pub fn scan(elevations_deg: &[f64], surfaces: &[Surface]) -> Scan {
 }
 
 impl Scan {
-    /// Segments the scan by the default settings, with its rings and without, and
-    /// hands both results to `check`.
+    /// Segments the scan by the default settings, with its rings and without, and hands both
+    /// results to `check`.
     pub fn check(&self, check: impl Fn(&Segmentation)) {
         for rings in [Some(&self.rings[..]), None] {
             let mut segmenter = Segmenter::new(Settings::default()).unwrap();
@@ -86,7 +84,7 @@ impl Scan {
         }
     }
 
-    /// Which share of the points of `surface` has a label of which `is_it` is true.
+    /// The share of the points of `surface` whose label `is_it` accepts.
     pub fn share(
         &self,
         segmentation: &Segmentation,

@@ -9,7 +9,7 @@ use test_support::{need, shared_data};
 use crate::frames::{Frame, paths};
 use crate::scanner::{Scan, VLP32C, block, flat, scan};
 
-/// A VLP-32C's beams are off the encoder's azimuth by up to so many degrees.
+/// The offsets of a VLP-32C's beams from the encoder's azimuth, degrees.
 const OFFSETS_DEG: [f32; 4] = [-4.2, -1.4, 1.4, 4.2];
 
 /// Points of a sweep in the order in which a sensor that turns clockwise sends them, with the
@@ -20,8 +20,8 @@ struct Turn {
     encoder_rad: Vec<f32>,
 }
 
-/// The turn and the place of each point of a cluster, and the encoder's azimuth at which it was
-/// handed out, all turns together.
+/// The turn and index of each point of a cluster, and the encoder's azimuth, summed over turns, at
+/// which the cluster was reported.
 type HandedOut = (Vec<(u32, u32)>, f32);
 
 impl Turn {
@@ -94,12 +94,12 @@ fn settings(elevations_deg: impl Iterator<Item = f64>) -> Settings {
     settings
 }
 
-/// The stream hands out each cluster of the sweep once a turn, to the point, but for what the
-/// first and the last turn cut in two.
+/// The stream reports each cluster of the sweep once a turn, with the same points, except for
+/// clusters that the start or the end of the stream divides.
 fn assert_same(turn: &Turn, settings: &Settings) {
     let expected = turn.whole(settings);
     assert!(!expected.is_empty());
-    // Of the first turn the first beams are missing, so that the second one's ground is another.
+    // The first turn lacks its first beams, so that the ground of the second turn differs.
     let (found, dropped) = turn.stream(settings, 5);
     for begun_in in 2..=3 {
         let begun: Vec<_> = found.iter().filter(|(tags, _)| tags[0].0 == begun_in).collect();
@@ -167,7 +167,7 @@ fn a_cluster_is_handed_out_when_the_beams_have_passed_it() {
         let waited_deg = (at_rad - last_rad).to_degrees();
         assert!((0.0..=4.2 + 4.2 + 1.8).contains(&waited_deg), "{waited_deg}");
     }
-    // That of the first turn waits for the ground.
+    // The cluster of the first turn waits for the ground.
     assert!(found[0].1 > TAU);
 }
 

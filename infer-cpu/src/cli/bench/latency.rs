@@ -1,4 +1,4 @@
-//! How long a classification takes.
+//! Measures the latency of classifications.
 
 use std::collections::BTreeMap;
 use std::hint::black_box;
@@ -14,27 +14,27 @@ use serde::Serialize;
 
 use super::machine::Machine;
 use super::variant::Variant;
-use super::{Args, table};
+use super::{BenchArgs, table};
 
-/// Everything that a run measured.
+/// All measurements of a run.
 #[derive(Serialize)]
 struct Record {
     machine: Machine,
     model: String,
-    rows: Vec<Row>,
+    rows: Vec<Timing>,
 }
 
-/// One setting's samples.
+/// The measurements of one setting.
 #[derive(Serialize)]
-struct Row {
+struct Timing {
     sampler: String,
     t_nets: &'static str,
     points: usize,
-    /// Points of the clouds that were classified.
+    /// The number of points of the classified clouds.
     from: usize,
     precision: &'static str,
     threads: usize,
-    /// Clouds that were classified together; times are of all of them.
+    /// The number of clouds that were classified together; times are totals.
     clouds: usize,
     kernel: &'static str,
     p50_ms: f64,
@@ -42,24 +42,24 @@ struct Row {
     samples_ms: Vec<f64>,
 }
 
-/// What a measurement is of.
+/// A setting to measure.
 struct Setting<'a> {
-    /// How the points are chosen.
+    /// The sampler.
     sampler: &'a Variant,
     t_nets: TNets,
-    /// Points that the network sees.
+    /// The number of points that the network processes.
     points: usize,
     threads: usize,
     precision: Precision,
 }
 
-/// Measures every setting that `args` name and prints it.
+/// Measures and prints every setting that `args` name.
 ///
 /// # Errors
-/// A model or a set that cannot be read, a cloud that cannot be classified.
-pub fn run(args: &Args, model: &Path) -> anyhow::Result<()> {
+/// A model or a set that cannot be read; a cloud that cannot be classified.
+pub fn run(args: &BenchArgs, model: &Path) -> anyhow::Result<()> {
     let ranges = super::calibration(args, model)?;
-    // fp32 comes first, since the others are compared with it.
+    // fp32 comes first, as the baseline of the others.
     let mut precisions = args.precision.clone();
     precisions.sort_unstable();
     let mut rows = Vec::new();
@@ -80,45 +80,33 @@ pub fn run(args: &Args, model: &Path) -> anyhow::Result<()> {
         writeln!(stdout(), "{}", serde_json::to_string(&record)?)?;
         return Ok(());
     }
-    let header = [
-        "sampler",
-        "T-Nets",
-        "precision",
-        "kernel",
-        "from",
-        "points",
-        "threads",
-        "clouds",
-        "p50 ms",
-        "p99 ms",
-    ];
-    let cells = |row: &Row| {
+    let cells = |row: &Timing| {
         vec![
-            row.sampler.clone(),
-            row.t_nets.to_owned(),
-            row.precision.to_owned(),
-            row.kernel.to_owned(),
-            row.from.to_string(),
-            row.points.to_string(),
-            row.threads.to_string(),
-            row.clouds.to_string(),
-            format!("{:.3}", row.p50_ms),
-            format!("{:.3}", row.p99_ms),
+            ("sampler", row.sampler.clone()),
+            ("T-Nets", row.t_nets.to_owned()),
+            ("precision", row.precision.to_owned()),
+            ("kernel", row.kernel.to_owned()),
+            ("from", row.from.to_string()),
+            ("points", row.points.to_string()),
+            ("threads", row.threads.to_string()),
+            ("clouds", row.clouds.to_string()),
+            ("p50 ms", format!("{:.3}", row.p50_ms)),
+            ("p99 ms", format!("{:.3}", row.p99_ms)),
         ]
     };
     let card = ModelCard::read(model)?;
     let untrained = if card.trained { "" } else { ", untrained: its weights are random" };
     writeln!(stdout(), "{}{untrained}", record.model)?;
-    table::print(&header, 4, &record.rows.iter().map(cells).collect::<Vec<_>>())?;
+    table::print(4, &record.rows.iter().map(cells).collect::<Vec<_>>())?;
     Ok(())
 }
 
 fn measure(
-    args: &Args,
+    args: &BenchArgs,
     model: &Path,
     setting: &Setting<'_>,
     ranges: &Option<BTreeMap<String, f32>>,
-) -> anyhow::Result<Row> {
+) -> anyhow::Result<Timing> {
     let &Setting { sampler, t_nets, points, threads, precision } = setting;
     let from = if sampler.takes_all() { points } else { args.from };
     let mut options = Options {
@@ -134,7 +122,7 @@ fn measure(
     let mut classifier = Classifier::load(model, &options)?;
     let kernel = classifier.kernel().name();
     let cloud = cloud(from);
-    // Once for caches, pages and sleeping threads.
+    // The first run warms up caches, pages and threads.
     classifier.classify(&cloud).context("classifying a random cloud")?;
     let samples_ms = if args.clouds == 1 {
         samples_ms(args.repeats, || Ok(black_box(classifier.classify(&cloud)).map(drop)?))?
@@ -151,7 +139,7 @@ fn measure(
             all
         })?
     };
-    Ok(Row {
+    Ok(Timing {
         sampler: sampler.to_string(),
         t_nets: t_nets.name(),
         points,
@@ -166,7 +154,7 @@ fn measure(
     })
 }
 
-/// How long each of so many calls of `classify` takes.
+/// The durations of `repeats` calls of `classify`.
 fn samples_ms(
     repeats: u32,
     mut classify: impl FnMut() -> anyhow::Result<()>,
@@ -180,14 +168,14 @@ fn samples_ms(
     Ok(samples_ms)
 }
 
-/// Points all over a cube, the same in every run.
+/// Random points in a cube, the same in every run.
 fn cloud(n: usize) -> Vec<[f32; 3]> {
     let key = StreamKey::new(0, "benchmark cloud", 0);
     let unit = |i: usize| (2.0 * key.unit(i as u64) - 1.0) as f32;
     (0..n).map(|i| [unit(3 * i), unit(3 * i + 1), unit(3 * i + 2)]).collect()
 }
 
-/// The `q` quantile of `samples` by the nearest rank; NaN of none.
+/// The `q` quantile of `samples` by the nearest rank; NaN without samples.
 fn quantile(samples: &[f64], q: f64) -> f64 {
     let mut sorted = samples.to_vec();
     sorted.sort_by(f64::total_cmp);

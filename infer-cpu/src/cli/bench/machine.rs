@@ -1,11 +1,11 @@
-//! The machine that figures belong to.
+//! The machine of a measurement.
 
 use serde::Serialize;
 
-/// What a record of figures says about where they were measured.
+/// A description of the machine.
 #[derive(Serialize)]
 pub struct Machine {
-    /// The processor's name, as the system has it.
+    /// The name of the processor or board.
     processor: String,
     /// Its architecture.
     architecture: &'static str,
@@ -27,7 +27,7 @@ impl Machine {
     }
 }
 
-/// A board's name from its device tree, else the processor's from `cpuinfo`.
+/// The name of the board from its device tree, else of the processor from `cpuinfo`.
 fn processor() -> Option<String> {
     if let Ok(board) = std::fs::read_to_string("/proc/device-tree/model") {
         return Some(board.trim_end_matches('\0').to_owned());

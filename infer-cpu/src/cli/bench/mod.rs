@@ -1,4 +1,4 @@
-//! `infer-cpu bench`: how fast this machine is.
+//! `infer-cpu bench`: measures the latency on this machine.
 
 mod latency;
 mod machine;
@@ -26,7 +26,7 @@ Examples:
 The latency is that of a whole classification, from coordinates to class. Options
 of a sampler follow its name, separated by colons: `fps`, `cpl`, `cpl:stn`,
 `cpl:trunk`, `random:votes5`, `random:votes5:turned` (with rotations).")]
-pub struct Args {
+pub struct BenchArgs {
     /// Model file [default: the bundled model]
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
@@ -40,8 +40,7 @@ pub struct Args {
     #[arg(long, value_delimiter = ',', default_value = "f32,f32-fc16,f16,i8")]
     precision: Vec<Precision>,
 
-    /// Samplers to measure; for `all`, the clouds have as many points as the
-    /// network sees
+    /// Samplers to measure; for `all`, the clouds have as many points as the network sees
     #[arg(long, value_delimiter = ',', default_value = "all")]
     sampler: Vec<Variant>,
 
@@ -53,8 +52,7 @@ pub struct Args {
     #[arg(long, value_delimiter = ',', default_value = "1,2,4")]
     threads: Vec<usize>,
 
-    /// Kernels to use: scalar, avx2, avx512, neon, neon_f16, neon_dot
-    /// [default: the fastest]
+    /// Kernels to use: scalar, avx2, avx512, neon, neon_f16, neon_dot [default: the fastest]
     #[arg(long)]
     kernel: Option<infer_cpu::kernel::KernelName>,
 
@@ -62,8 +60,8 @@ pub struct Args {
     #[arg(long, default_value_t = 1024, value_name = "N")]
     from: usize,
 
-    /// Number of clouds that are classified together, a thread a cloud; the time is that of
-    /// all of them. A single one is shared out among the threads
+    /// Number of clouds that are classified together, a thread a cloud; the time is that of all of
+    /// them. A single one is shared out among the threads
     #[arg(long, default_value = "1", value_parser = at_least_one, value_name = "N")]
     clouds: usize,
 
@@ -76,21 +74,21 @@ pub struct Args {
     json: bool,
 
     #[cfg(feature = "npz")]
-    /// Packed NPZ file of clouds to calibrate int8 with [default: the model's
-    /// own calibration, else built-in procedural shapes]
+    /// Packed NPZ file of clouds to calibrate int8 with [default: the model's own calibration, else
+    /// built-in procedural shapes]
     #[arg(long, value_name = "NPZ")]
     calibrate: Option<PathBuf>,
 }
 
-/// The largest activations on the clouds of `--calibrate`: none can be read.
+/// Without the feature `npz`, there is no flag `--calibrate`.
 #[cfg(not(feature = "npz"))]
-fn calibration(_: &Args, _: &Path) -> anyhow::Result<Option<BTreeMap<String, f32>>> {
+fn calibration(_: &BenchArgs, _: &Path) -> anyhow::Result<Option<BTreeMap<String, f32>>> {
     Ok(None)
 }
 
-/// The largest activations on the clouds of `--calibrate`, if there are any.
+/// The largest activations on the clouds of `--calibrate`, if given.
 #[cfg(feature = "npz")]
-fn calibration(args: &Args, model: &Path) -> anyhow::Result<Option<BTreeMap<String, f32>>> {
+fn calibration(args: &BenchArgs, model: &Path) -> anyhow::Result<Option<BTreeMap<String, f32>>> {
     let Some(path) = &args.calibrate else { return Ok(None) };
     Ok(Some(infer_cpu::activation_ranges_of_set(model, &read_labelled(path)?)?))
 }

@@ -1,19 +1,17 @@
-//! Rows of text, aligned.
+//! Aligned tables of text.
 
-/// Prints `rows` under `header`: the first columns to the left, figures to the
-/// right.
-pub fn print(header: &[&str], n_left: usize, rows: &[Vec<String>]) -> std::io::Result<()> {
-    use std::io::Write;
-    let widths: Vec<usize> = (0..header.len())
-        .map(|column| {
-            let cells = rows.iter().map(|row| row[column].chars().count());
-            cells.chain([header[column].len()]).max().unwrap_or(0)
-        })
-        .collect();
+use std::io::Write;
+
+/// Prints rows of cells with the names of their columns, with the first `n_left` columns aligned to
+/// the left and the others to the right.
+pub fn print(n_left: usize, rows: &[Vec<(&str, String)>]) -> std::io::Result<()> {
+    let header = rows.first().into_iter().map(|row| row.iter().map(|(name, _)| *name).collect());
+    let cells = rows.iter().map(|row| row.iter().map(|(_, cell)| &**cell).collect());
+    let lines: Vec<Vec<&str>> = header.chain(cells).collect();
     let mut out = std::io::stdout().lock();
-    let header: Vec<String> = header.iter().map(ToString::to_string).collect();
-    for row in std::iter::once(&header).chain(rows) {
-        let cells = row.iter().zip(&widths).enumerate().map(|(column, (cell, &width))| {
+    for line in &lines {
+        let cells = line.iter().enumerate().map(|(column, cell)| {
+            let width = lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0);
             if column < n_left { format!("{cell:<width$}") } else { format!("{cell:>width$}") }
         });
         writeln!(out, "{}", cells.collect::<Vec<_>>().join("  ").trim_end())?;

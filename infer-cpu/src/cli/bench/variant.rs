@@ -1,4 +1,4 @@
-//! Samplers as benchmarks name them: `cpl:stn`, `random:votes5`.
+//! Samplers with options in one word, such as `cpl:stn` or `random:votes5`.
 
 use std::fmt;
 use std::str::FromStr;
@@ -7,7 +7,7 @@ use formats::FormatError;
 use infer_cpu::Options;
 use infer_cpu::sampler::{SamplerKind, SamplerSpec};
 
-/// A sampler and how it is used.
+/// A sampler and its options.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Variant {
     name: String,
@@ -17,7 +17,7 @@ pub struct Variant {
 }
 
 impl Variant {
-    /// Whether the network sees every point of a cloud.
+    /// Whether the network processes every point of a cloud.
     pub fn takes_all(&self) -> bool {
         self.spec.kind == SamplerKind::All
     }

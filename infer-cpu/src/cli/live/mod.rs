@@ -1,4 +1,4 @@
-//! `infer-cpu live`: the objects that a LiDAR sees, as they come.
+//! `infer-cpu live`: classifies and tracks the objects that a LiDAR detects.
 
 mod notify;
 mod outputs;
@@ -9,7 +9,6 @@ use std::net::{IpAddr, Ipv4Addr};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::available_parallelism;
 use std::time::Instant;
 
 use formats::ouster::Metadata;
@@ -19,16 +18,13 @@ use infer_cpu::{Classifier, Options, Precision};
 use signal_hook::consts::{SIGINT, SIGTERM};
 
 use super::model::ModelArgs;
-use super::{Outcome, Usage, of_setup};
+use super::{Outcome, Usage, n_threads, of_setup};
 use notify::Notifier;
 use outputs::Outputs;
 use source::{Source, Tick};
 
 /// The bundled weights for objects of streets.
 const MODELS: [&str; 1] = ["street-128.safetensors"];
-
-/// More threads than a Raspberry Pi has cores were never measured to help.
-const MOST_THREADS: usize = 4;
 
 /// Flags of `live`.
 #[derive(clap::Args)]
@@ -41,23 +37,22 @@ Examples:
   infer-cpu live --pcap drive.pcap --poses drive.tum > objects.jsonl
   infer-cpu live --udp 2368 --mcap drive.mcap
 
-The sensor is a Velodyne VLP-32C or VLP-16, as its first packet tells, or with --metadata an
-Ouster. One line of JSON is
-printed for each object and turn, as soon as the beams have passed the object. The
-keys, in this order: version (1), turn, track (a number that stays with the object), class (of
-the track, by all that was seen of it, or `unknown`; null while no cluster of it had
---min-points), resembles (the same, also where that is none that the model is to tell
-apart), confidence (the probability of `resembles` by this cluster alone, or null), probability
-(the same by all clusters of the track), frame (sensor, or world with --poses or --twist: of
-position, yaw and velocity), position_m (the middle of the box around the points), size_m
-(length, width, height), yaw_deg (direction of the length, -90 to 90), velocity_m_s (null
-at first; relative to the sensor in its frame), points, range_m, first_s and last_s (Unix time
-of the first and the last point by the sensor's clock), latency_ms (from the arrival of the
-packet with the last point to this line; null without --udp or --realtime).
+The sensor is a Velodyne VLP-32C or VLP-16, which the first packet determines, or an Ouster with
+--metadata. One line of JSON is printed for each object and turn, as soon as the beams have passed
+the object. The keys are, in this order: version (1), turn, track (a number that stays with the
+object), class (of the track, from all of its clusters, or `unknown`; null while no cluster of it
+had --min-points), resembles (the most similar class, even if class is `unknown`), confidence (the
+probability of `resembles` from this cluster alone, or null), probability (the same from all
+clusters of the track), frame (of position, yaw and velocity: sensor, or world with --poses or
+--twist), position_m (the middle of the box around the points), size_m (length, width, height),
+yaw_deg (direction of the length, -90 to 90), velocity_m_s (null at first; relative to the sensor in
+its frame), points, range_m, first_s and last_s (Unix time of the first and the last point by the
+sensor's clock), latency_ms (from the arrival of the packet with the last point to this line; null
+without --udp or --realtime).
 
 SIGTERM and Ctrl-C end the program after the last objects, with exit status 0. As a service of
-systemd (Type=notify), it tells when it receives packets, and the watchdog that it is alive.")]
-pub struct Args {
+systemd (Type=notify), it reports when it receives packets, and serves the watchdog.")]
+pub struct LiveArgs {
     /// Receive packets on this UDP port; a Velodyne's is 2368, an Ouster's 7502
     #[arg(long, value_name = "PORT", required_unless_present = "pcap", conflicts_with = "pcap")]
     udp: Option<u16>,
@@ -66,8 +61,8 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     pcap: Option<PathBuf>,
 
-    /// Take packets of the capture at the times at which they were captured, instead of as fast
-    /// as possible
+    /// Take packets of the capture at the times at which they were captured, instead of as fast as
+    /// possible
     #[arg(long, requires = "pcap")]
     realtime: bool,
 
@@ -97,7 +92,7 @@ pub struct Args {
     #[arg(long, value_name = "IP", requires = "udp", default_value = "0.0.0.0")]
     interface: Ipv4Addr,
 
-    /// The sensor is an Ouster OS0, OS1 or OS2, of which this is the metadata file (JSON)
+    /// Metadata file (JSON) of the sensor, if it is an Ouster OS0, OS1 or OS2
     #[arg(long, value_name = "FILE")]
     metadata: Option<PathBuf>,
 
@@ -106,7 +101,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE", conflicts_with = "twist")]
     poses: Option<PathBuf>,
 
-    /// Steady motion of the sensor in its own frame, in place of poses: metres and degrees a
+    /// Steady motion of the sensor in its own frame, in place of poses: metres and degrees per
     /// second
     #[arg(long, num_args = 6, value_names = ["VX", "VY", "VZ", "WX", "WY", "WZ"])]
     #[arg(allow_negative_numbers = true, value_parser = rate)]
@@ -128,18 +123,18 @@ pub struct Args {
     threads: Option<u16>,
 }
 
-/// A velocity of a vehicle, or a rate at which it turns.
+/// Parses a velocity or an angular rate of a vehicle.
 fn rate(word: &str) -> Result<f64, String> {
     let rate = word.parse().ok().filter(|rate: &f64| rate.abs() <= 1000.0);
     rate.ok_or_else(|| format!("expected a number from -1000 to 1000, found {word:?}"))
 }
 
-/// Answers until the packets end or a signal comes.
+/// Runs the pipeline until the packets end or a signal comes.
 ///
 /// # Errors
-/// Options that cannot be met; a model, poses or a capture that cannot be read; a port that is
-/// taken; an output that cannot be written to.
-pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+/// Invalid options; a model, poses or a capture that cannot be read; a port in use; an output that
+/// cannot be written to.
+pub fn run(args: &LiveArgs) -> anyhow::Result<Outcome> {
     let mut pipeline = args.pipeline()?;
     let is_over = Arc::new(AtomicBool::new(false));
     for signal in [SIGTERM, SIGINT] {
@@ -161,7 +156,9 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         pipeline.answer(|object| outputs.object(object));
         outputs.packet(&pipeline);
         for flaw in pipeline.new_flaws() {
-            eprintln!("warning: a packet was passed over, and so are others like it: {flaw}");
+            eprintln!(
+                "warning: ignored a packet, and will ignore others with the same flaw: {flaw}"
+            );
         }
         notifier.alive(pipeline.counts(), Instant::now());
         !is_over.load(Ordering::Relaxed) && outputs.are_wanted()
@@ -187,11 +184,10 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-impl Args {
+impl LiveArgs {
     fn pipeline(&self) -> anyhow::Result<Pipeline> {
         let (model, _) = self.model.open_or(&MODELS)?;
-        let cores = || available_parallelism().map_or(1, usize::from);
-        let threads = self.threads.map_or_else(|| cores().min(MOST_THREADS), usize::from);
+        let threads = n_threads(self.threads);
         let options = Options { precision: self.precision, threads, ..Options::default() };
         let classifier = Classifier::load(&model, &options).map_err(of_setup)?;
         let mut options = LiveOptions::default();

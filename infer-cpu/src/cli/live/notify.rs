@@ -1,5 +1,5 @@
-//! What systemd is told of a service of `Type=notify`: that it is ready, that it is alive, what
-//! it does, that it ends. The protocol: sd_notify(3) and sd_watchdog_enabled(3).
+//! Notifies systemd about a service of `Type=notify`: that it is ready, alive, its status, and that
+//! it stops. The protocol is sd_notify(3) and sd_watchdog_enabled(3).
 
 use std::env;
 use std::ffi::{OsStr, OsString};
@@ -12,23 +12,23 @@ use infer_cpu::live::Counts;
 
 use manager::Manager;
 
-/// How often the status is told where systemd has no watchdog.
+/// The interval of status messages without a watchdog.
 const STATUS_PERIOD: Duration = Duration::from_secs(5);
 
-/// Tells systemd, if it listens.
+/// Sends messages to systemd, if it listens.
 pub struct Notifier {
     manager: Option<Manager>,
-    /// How long the manager waits for a sign of life.
+    /// The timeout of the watchdog.
     watchdog: Option<Duration>,
-    /// When the next sign of life is due.
+    /// When the next keep-alive message is due.
     due: Instant,
 }
 
 impl Notifier {
-    /// As the variables of the environment ask for that systemd sets.
+    /// A notifier for the environment variables that systemd sets.
     ///
     /// # Errors
-    /// They are not what systemd sets.
+    /// A variable has an invalid value.
     pub fn of_environment() -> anyhow::Result<Self> {
         Self::new(|name| env::var_os(name))
     }
@@ -40,39 +40,39 @@ impl Notifier {
         };
         let manager =
             Manager::at(&name).with_context(|| format!("NOTIFY_SOCKET={}", name.display()))?;
-        // A process that this program's parent watches is not this one.
+        // The watchdog may be for another process.
         let is_ours = variable("WATCHDOG_PID").is_none_or(|id| id == *process::id().to_string());
         let watchdog = variable("WATCHDOG_USEC").filter(|_| is_ours);
         let watchdog = watchdog.map(|time| microseconds(&time)).transpose()?;
         Ok(Self { manager: Some(manager), watchdog, due })
     }
 
-    /// Tells that packets are received and the model is loaded.
+    /// Reports that the model is loaded and packets are received.
     ///
     /// # Errors
-    /// The manager cannot be told, and would wait for it in vain.
+    /// The message cannot be sent, and systemd would wait for it in vain.
     pub fn ready(&self) -> anyhow::Result<()> {
         let Some(manager) = &self.manager else { return Ok(()) };
         manager.tell("READY=1\nSTATUS=Waiting for packets").context("telling NOTIFY_SOCKET")
     }
 
-    /// Gives a sign of life if one is due. Whoever handles packets calls this, so that the
-    /// watchdog sees when that stops.
+    /// Sends a keep-alive message if one is due. The loop over packets calls this, so that the
+    /// watchdog detects if the loop hangs.
     pub fn alive(&mut self, counts: &Counts, now: Instant) {
         let Some(manager) = self.manager.as_ref().filter(|_| now >= self.due) else { return };
         let Counts { packets, clusters, .. } = counts;
         let sign = if self.watchdog.is_some() { "WATCHDOG=1\n" } else { "" };
-        // What the manager has no room for now is told with the next packet.
+        // If the socket is full, the next packet tries again.
         if manager.tell(&format!("{sign}STATUS={packets} packets, {clusters} objects")).is_ok() {
             // sd_watchdog_enabled(3) recommends half of the time.
             self.due = now + self.watchdog.map_or(STATUS_PERIOD, |time| time / 2);
         }
     }
 
-    /// Tells that the program ends; nothing is told after it.
+    /// Reports that the program stops; later messages are not sent.
     pub fn stopping(&mut self) {
         if let Some(manager) = self.manager.take() {
-            // A manager that does not hear this sees the process end.
+            // If this fails, systemd still sees the process end.
             let _ = manager.tell("STOPPING=1");
         }
     }
@@ -92,14 +92,14 @@ mod manager {
     use std::os::unix::ffi::OsStrExt;
     use std::os::unix::net::{SocketAddr, UnixDatagram};
 
-    /// Where the manager listens.
+    /// The socket of systemd.
     pub struct Manager {
         socket: UnixDatagram,
         address: SocketAddr,
     }
 
     impl Manager {
-        /// The one at a path, or at the abstract name that follows an `@`.
+        /// Connects to a path, or to the abstract name after an `@`.
         pub fn at(name: &OsStr) -> io::Result<Self> {
             let address = match name.as_bytes() {
                 [b'@', name @ ..] => SocketAddr::from_abstract_name(name)?,
@@ -107,7 +107,7 @@ mod manager {
                 _ => return Err(io::Error::other("expected a path or an abstract name: /… or @…")),
             };
             let socket = UnixDatagram::unbound()?;
-            // Packets must not wait for a manager that is busy.
+            // Packets must not wait for a busy manager.
             socket.set_nonblocking(true)?;
             Ok(Self { socket, address })
         }
@@ -118,7 +118,7 @@ mod manager {
     }
 }
 
-/// systemd is a manager of Linux only.
+/// systemd exists on Linux only.
 #[cfg(not(target_os = "linux"))]
 mod manager {
     use super::{OsStr, io};
@@ -147,7 +147,7 @@ mod tests {
         Counts { packets: 754, clusters: 30, ..Counts::default() }
     }
 
-    /// A manager's socket at an abstract name of this test's own, and what names it.
+    /// A manager's socket at an abstract name for this test, and the value of NOTIFY_SOCKET for it.
     fn manager(test: &str) -> (UnixDatagram, String) {
         let name = format!("edgepuck-{test}-{}", process::id());
         let address = SocketAddr::from_abstract_name(&name).unwrap();
@@ -166,7 +166,7 @@ mod tests {
         })
     }
 
-    /// What was told since the last call.
+    /// The messages since the last call.
     fn told(manager: &UnixDatagram) -> Vec<String> {
         let mut buffer = [0; 256];
         let mut next = || manager.recv(&mut buffer).ok().map(|n| buffer[..n].to_vec());

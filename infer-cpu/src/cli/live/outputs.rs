@@ -1,26 +1,26 @@
-//! Where objects go: lines on standard output, and a recording.
+//! The outputs of objects: lines on standard output, and a recording.
 
 use std::io::{self, BufWriter, ErrorKind, StdoutLock, Write};
 
 use infer_cpu::live::{Object, Pipeline, RecordError, Recorder};
 
-/// What is asked for, and what has become of it.
+/// The requested outputs and their failures.
 pub struct Outputs {
     lines: Option<BufWriter<StdoutLock<'static>>>,
     recorder: Option<Recorder>,
-    /// Why lines or the recording ended before the packets did.
+    /// Why the lines or the recording ended early.
     lines_failure: Option<io::Error>,
     recorder_failure: Option<RecordError>,
 }
 
 impl Outputs {
-    /// Lines if it `prints`, and what the recorder makes.
+    /// Lines, if `prints`, and a recording, if there is a recorder.
     pub fn new(prints: bool, recorder: Option<Recorder>) -> Self {
         let lines = prints.then(|| BufWriter::new(io::stdout().lock()));
         Self { lines, recorder, lines_failure: None, recorder_failure: None }
     }
 
-    /// Writes an object, and lets nobody wait for it.
+    /// Writes an object, and flushes its line.
     pub fn object(&mut self, object: &Object) {
         if let Some(lines) = &mut self.lines {
             let line = serde_json::to_writer(&mut *lines, object).map_err(io::Error::from);
@@ -34,20 +34,20 @@ impl Outputs {
         }
     }
 
-    /// Records the packet that `pipeline` has taken, after its objects. A robot needs its answers
-    /// also when its disk is full: if there are lines, they go on.
+    /// Records the last packet of `pipeline`, after its objects. A robot needs its results even if
+    /// its disk is full: lines continue if the recording fails.
     pub fn packet(&mut self, pipeline: &Pipeline) {
         let Some(recorder) = &mut self.recorder else { return };
         if let Err(failure) = recorder.packet(pipeline) {
             if self.lines.is_some() {
                 let cause = &failure.source;
-                eprintln!("warning: the recording ends, the answers go on: {failure}: {cause}");
+                eprintln!("warning: the recording ends, the lines continue: {failure}: {cause}");
             }
             (self.recorder, self.recorder_failure) = (None, Some(failure));
         }
     }
 
-    /// Whether somebody waits for more.
+    /// Whether an output still works.
     pub fn are_wanted(&self) -> bool {
         self.lines_failure.is_none() && (self.lines.is_some() || self.recorder_failure.is_none())
     }
@@ -55,8 +55,7 @@ impl Outputs {
     /// Ends the recording.
     ///
     /// # Errors
-    /// Lines or a recording that could not be written to their end. Whoever closes the pipe of the
-    /// lines has seen enough: that is no error.
+    /// Lines or a recording that could not be written completely. A closed pipe is not an error.
     pub fn end(self, pipeline: &Pipeline) -> anyhow::Result<()> {
         let recorded = self.recorder.map_or(Ok(()), |recorder| recorder.finish(pipeline));
         if let Some(failure) = self.lines_failure.filter(|f| f.kind() != ErrorKind::BrokenPipe) {

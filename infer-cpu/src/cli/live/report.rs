@@ -1,4 +1,4 @@
-//! What `--stats` says at the end.
+//! The report of `--stats`.
 
 use infer_cpu::live::{Pipeline, Stage};
 
@@ -17,7 +17,7 @@ pub fn print(pipeline: &Pipeline, read: &Read) {
     }
     if let [Some(p50), Some(p90), Some(p99)] = [0.5, 0.9, 0.99].map(|share| stats.latency_ms(share))
     {
-        eprintln!("{:<22} {:>8} {p50:>8.3} {p90:>8.3} {p99:>8.3}", "latency of answers, ms", "");
+        eprintln!("{:<22} {:>8} {p50:>8.3} {p90:>8.3} {p99:>8.3}", "latency, ms", "");
     }
     let n_turns = stats.n_turns().max(1) as f64;
     eprintln!(
@@ -27,8 +27,8 @@ pub fn print(pipeline: &Pipeline, read: &Read) {
         counts.clusters as f64 / n_turns
     );
     eprintln!(
-        "{} packets; {} lost, {} late, {} twice, {} of something else, {} from other addresses, \
-         {} overrun, {} restarts",
+        "{} packets; {} lost, {} late, {} duplicate, {} foreign, {} from other addresses, {} overrun, \
+         {} restarts",
         counts.packets,
         counts.lost,
         counts.late,
@@ -47,12 +47,12 @@ pub fn print(pipeline: &Pipeline, read: &Read) {
     }
 }
 
-/// Resident memory now and at most, MiB, where the system tells.
+/// The current and the largest resident memory, MiB, if the system reports them.
 fn resident_mib() -> Option<[f64; 2]> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let of = |key: &str| {
+    let mib = |key: &str| {
         let line = status.lines().find_map(|line| line.strip_prefix(key))?;
         line.trim_end_matches(" kB").trim().parse::<f64>().ok().map(|kib| kib / 1024.0)
     };
-    Some([of("VmRSS:")?, of("VmHWM:")?])
+    Some([mib("VmRSS:")?, mib("VmHWM:")?])
 }

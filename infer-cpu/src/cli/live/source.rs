@@ -1,4 +1,4 @@
-//! Where packets come from: a socket or a capture.
+//! The sources of packets: a socket or a capture.
 
 use std::io;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
@@ -17,27 +17,27 @@ use formats::pcap;
 use infer_cpu::live::Arrival;
 use socket2::{Domain, Protocol, Socket, Type};
 
-/// Packets that wait at most: two thirds of a second of a VLP-32C's.
+/// The most packets in the queue: two thirds of a second of a VLP-32C.
 const RING: usize = 1024;
-/// The longest packet that is looked at; a sensor's are shorter.
+/// The longest UDP packet.
 const MOST_BYTES: usize = 65_535;
-/// The kernel's buffer that is asked for: some seconds.
+/// The requested size of the kernel's buffer: a few seconds of packets.
 const KERNEL_BUFFER: usize = 8 << 20;
-/// How often a quiet socket is left, to see whether the program is to end and to show that it is
-/// alive.
+/// The timeout of receiving, after which the program checks for signals and sends keep-alive
+/// messages.
 const PATIENCE: Duration = Duration::from_millis(100);
 
-/// What a source tells.
+/// An event of a source.
 pub enum Tick<'a> {
     /// A packet has come.
     Packet(&'a [u8], Arrival),
-    /// None has come for a while.
+    /// No packet has come for a while.
     Quiet,
     /// No more will come.
     End,
 }
 
-/// Where packets come from.
+/// A source of packets.
 pub enum Source {
     /// A capture.
     Capture { file: PathBuf, from: Option<IpAddr>, realtime: bool },
@@ -45,18 +45,18 @@ pub enum Source {
     Udp(Box<Listener>),
 }
 
-/// What was read.
+/// The counters of a source.
 #[derive(Default)]
 pub struct Read {
-    /// UDP packets of all kinds.
+    /// All UDP packets.
     pub n_packets: u64,
-    /// Packets from other addresses, which were not looked at.
+    /// Packets from other addresses, which were dropped.
     pub n_from_others: u64,
-    /// Packets that found the ring full, because answers took too long.
+    /// Packets that were dropped because the queue was full.
     pub n_overrun: u64,
 }
 
-/// A thread that receives packets, and the ring that they wait in.
+/// A thread that receives packets, and their queue.
 pub struct Listener {
     thread: JoinHandle<io::Result<()>>,
     filled: Receiver<Slot>,
@@ -72,7 +72,7 @@ struct ListenerCounts {
     overrun: AtomicU64,
 }
 
-/// A place for a packet.
+/// Memory for a packet.
 struct Slot {
     bytes: Box<[u8]>,
     n_bytes: usize,
@@ -80,12 +80,12 @@ struct Slot {
 }
 
 impl Source {
-    /// Packets of the capture at `file`, by the address they come `from`.
+    /// The packets of the capture at `file`: those `from` an address, or all.
     pub fn capture(file: &Path, from: Option<IpAddr>, realtime: bool) -> Self {
         Self::Capture { file: file.to_path_buf(), from, realtime }
     }
 
-    /// Packets that come to `address`, received from now on until `is_over`.
+    /// The packets to `address`, which are received from now on until `is_over`.
     pub fn udp(
         address: SocketAddr,
         multicast: Option<Ipv4Addr>,
@@ -97,7 +97,7 @@ impl Source {
         let (empty, empties) = sync_channel(RING);
         for _ in 0..RING {
             let bytes = vec![0; MOST_BYTES].into_boxed_slice();
-            // There is room for all of them.
+            // The channel has room for all slots.
             let _ = empty.send(Slot { bytes, n_bytes: 0, arrival: Arrival::now() });
         }
         let counts = Arc::new(ListenerCounts::default());
@@ -109,7 +109,8 @@ impl Source {
         Ok(Self::Udp(Box::new(Listener { thread, filled, empty, counts, is_over })))
     }
 
-    /// Gives every packet to `take`, until there are no more or that is false; then the end.
+    /// Passes every packet to `take`, until there are no more or it returns false, and then the
+    /// end.
     pub fn run(self, mut take: impl FnMut(Tick<'_>) -> bool) -> anyhow::Result<Read> {
         let read = match self {
             Self::Udp(listener) => listener.run(&mut take)?,
@@ -122,7 +123,7 @@ impl Source {
 
 fn bind(address: SocketAddr, multicast: Option<Ipv4Addr>) -> io::Result<UdpSocket> {
     let socket = Socket::new(Domain::IPV4, Type::DGRAM, Some(Protocol::UDP))?;
-    // What the kernel grants may be less; it does not fail.
+    // The kernel may grant less without an error.
     socket.set_recv_buffer_size(KERNEL_BUFFER)?;
     let interface = match address.ip() {
         IpAddr::V4(interface) => interface,
@@ -141,7 +142,7 @@ fn bind(address: SocketAddr, multicast: Option<Ipv4Addr>) -> io::Result<UdpSocke
     Ok(socket.into())
 }
 
-/// Receives packets into empty slots until it is over.
+/// Receives packets into empty slots until `is_over`.
 fn receive(
     socket: &UdpSocket,
     from: Option<IpAddr>,
@@ -181,7 +182,7 @@ fn receive(
         };
         (slot.n_bytes, slot.arrival) = (n_bytes, Arrival::now());
         match fill.try_send(slot) {
-            // Slots are as many as have room.
+            // It cannot be full: there are only as many slots as it has room for.
             Ok(()) | Err(TrySendError::Full(_)) => {}
             Err(TrySendError::Disconnected(_)) => return Ok(()),
         }
@@ -189,7 +190,7 @@ fn receive(
     Ok(())
 }
 
-/// Whether nothing has come yet.
+/// Whether the socket has no packet yet.
 fn is_only_late(error: &io::Error) -> bool {
     use io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
     matches!(error.kind(), Interrupted | TimedOut | WouldBlock)
@@ -201,7 +202,7 @@ impl Listener {
             match self.filled.recv_timeout(PATIENCE) {
                 Ok(slot) => {
                     let goes_on = take(Tick::Packet(&slot.bytes[..slot.n_bytes], slot.arrival));
-                    // There is room for all slots.
+                    // The channel has room for all slots.
                     let _ = self.empty.send(slot);
                     if !goes_on {
                         break;
@@ -215,16 +216,16 @@ impl Listener {
         self.is_over.store(true, Ordering::Relaxed);
         let ended = self.thread.join().map_err(|_| anyhow::anyhow!("the receiver panicked"))?;
         ended.context("receiving packets")?;
-        let of = |count: &AtomicU64| count.load(Ordering::Relaxed);
+        let value = |count: &AtomicU64| count.load(Ordering::Relaxed);
         Ok(Read {
-            n_packets: of(&self.counts.packets),
-            n_from_others: of(&self.counts.from_others),
-            n_overrun: of(&self.counts.overrun),
+            n_packets: value(&self.counts.packets),
+            n_from_others: value(&self.counts.from_others),
+            n_overrun: value(&self.counts.overrun),
         })
     }
 }
 
-/// Gives the packets of a capture to `take`, at their times if it is to be `realtime`.
+/// Passes the packets of a capture to `take`, at their times if `realtime`.
 fn replay(
     file: &Path,
     from: Option<IpAddr>,

@@ -1,7 +1,7 @@
-//! A step of farthest point sampling.
+//! One step of farthest point sampling.
 //!
-//! Distances are lowered four at a time, and only a running maximum is kept;
-//! where it is, is first known to a block of 64 points, then found within.
+//! Distances are lowered four at a time with a running maximum. Its position is tracked as a block
+//! of 64 points, which is then searched.
 
 use std::arch::aarch64::*;
 
@@ -24,7 +24,7 @@ pub fn step(cloud: Soa<'_>, pick: [f32; 3], distance: &mut [f32]) -> usize {
         farthest.take(block, lower([x, y, z], pick, distance));
     }
     if !rest.is_empty() {
-        // Less than every distance, so that padding is never the farthest.
+        // Padding has a distance below all others, so that it is never the farthest.
         let mut last = filled(rest, -1.0);
         let [x, y, z] = [x_rest, y_rest, z_rest].map(|axis| filled(axis, 0.0));
         farthest.take(n_blocks, lower([&x, &y, &z], pick, &mut last));
@@ -33,15 +33,14 @@ pub fn step(cloud: Soa<'_>, pick: [f32; 3], distance: &mut [f32]) -> usize {
     farthest.find(distance)
 }
 
-/// A last block, padded.
+/// The last block, padded.
 fn filled(rest: &[f32], padding: f32) -> [f32; BLOCK] {
     let mut block = [padding; BLOCK];
     block[..rest.len()].copy_from_slice(rest);
     block
 }
 
-/// Lowers a block's distances to those from `pick` and returns their maximum,
-/// of every fourth.
+/// Lowers a block's distances to those from `pick` and returns the maximum of each lane.
 #[inline(always)]
 fn lower(
     points: [&[f32; BLOCK]; 3],
@@ -68,7 +67,7 @@ fn lower(
     largest
 }
 
-/// The farthest of every fourth point, and its block.
+/// The farthest distance in each lane, and its block.
 struct Farthest {
     distance: float32x4_t,
     block: uint32x4_t,

@@ -1,9 +1,8 @@
-//! Sparse vector times matrix, in fp32 whatever the weights are stored as.
+//! A sparse vector times a matrix, in fp32 for every type of stored weights.
 //!
-//! The 64 sums of a panel are 16 registers. The column of each input that is
-//! not 0 is widened in parts of 16 weights and added. Columns come from main
-//! memory, and the gaps of those left out confuse the machine's prefetcher: so
-//! the columns to come are asked for in advance.
+//! The 64 sums of a panel are 16 registers. The column of each nonzero input is widened in parts of
+//! 16 weights and added. Columns come from main memory, and the gaps of skipped ones defeat the
+//! hardware prefetcher, so the code prefetches the next columns itself.
 
 use std::arch::aarch64::*;
 use std::arch::asm;
@@ -17,8 +16,8 @@ use super::lanes::{Lanes, load, store};
 
 const CACHE_LINE_BYTES: usize = 64;
 
-/// How far ahead columns are asked for: a core's share of 10 GB/s times some
-/// 150 ns until memory answers, and as much again.
+/// How far ahead columns are prefetched: twice a core's share of 10 GB/s times a latency of about
+/// 150 ns.
 const AHEAD_BYTES: usize = 2048;
 
 /// [`Gemv`](super::super::Gemv) of weights stored as `W`.
@@ -47,6 +46,7 @@ fn dot_products<W: Weight>(nonzero: &[(u32, f32)], columns: &[W]) -> [[float32x4
     let ahead = AHEAD_BYTES / size_of::<[W; GEMV_NR]>();
     let mut sums = [[float32x4_t::splat(0.0); 4]; 4];
     for (i, &(input, value)) in nonzero.iter().enumerate() {
+        // The next columns are known by their indices, so skipped ones cost nothing.
         if let Some(&(later, _)) = nonzero.get(i + ahead) {
             prefetch(columns.as_ptr().wrapping_add(later as usize));
         }
@@ -62,21 +62,21 @@ fn dot_products<W: Weight>(nonzero: &[(u32, f32)], columns: &[W]) -> [[float32x4
     sums
 }
 
-/// Asks for one column to be brought into the first-level cache.
+/// Prefetches one column into the first-level cache.
 #[inline(always)]
 fn prefetch<C>(column: *const C) {
     for line in (0..size_of::<C>()).step_by(CACHE_LINE_BYTES) {
         let address = column.wrapping_byte_add(line);
-        // SAFETY: a hint; no address can make it fault.
+        // SAFETY: a prefetch is a hint and faults on no address.
         unsafe {
             asm!("prfm pldl1keep, [{}]", in(reg) address, options(nostack, preserves_flags, readonly));
         }
     }
 }
 
-/// A number that weights are stored as.
+/// A number type of stored weights.
 pub trait Weight: Copy + Default {
-    /// Sixteen of them in fp32, exactly.
+    /// Converts sixteen weights to fp32, exactly.
     fn widen(weights: &[Self; 16]) -> [float32x4_t; 4];
 }
 
@@ -92,7 +92,7 @@ impl Weight for f16 {
     #[inline(always)]
     fn widen(weights: &[f16; 16]) -> [float32x4_t; 4] {
         let bits = weights.as_ptr().cast::<u16>();
-        // SAFETY: 16 numbers are there, and an `f16` is its bits. NEON and its
+        // SAFETY: the array has 16 numbers, and `f16` is a transparent `u16`. NEON and its
         // conversions of fp16 are on every aarch64.
         unsafe {
             let low = vreinterpretq_f16_u16(vld1q_u16(bits));
@@ -108,11 +108,11 @@ impl Weight for f16 {
 }
 
 impl Weight for i8 {
-    /// Bytes are brought to the tops of lanes by zipping with zeros, for which
-    /// there are two pipes, and the conversion divides by 2²⁴.
+    /// Zipping with zeros, for which there are two pipes, moves bytes to the tops of lanes; the
+    /// conversion divides by 2²⁴.
     #[inline(always)]
     fn widen(weights: &[i8; 16]) -> [float32x4_t; 4] {
-        // SAFETY: 16 numbers are there. NEON is on every aarch64.
+        // SAFETY: the array has 16 numbers. NEON is on every aarch64.
         unsafe {
             let bytes = vld1q_s8(weights.as_ptr());
             let (zeros, zero_halves) = (vdupq_n_s8(0), vdupq_n_s16(0));

@@ -1,14 +1,13 @@
-//! Vectors of four, so that what is not arithmetic of one format is written
-//! once and without `unsafe`.
+//! Safe vectors of four lanes, for code that several formats share.
 
 use std::arch::aarch64::*;
 use std::array::from_fn;
 
 /// Four numbers in a register.
 pub trait Lanes: Copy {
-    /// One of them.
+    /// The number in a lane.
     type Element: Copy;
-    /// Four times the same.
+    /// Copies a number to all lanes.
     fn splat(value: Self::Element) -> Self;
     /// Reads four.
     fn load(from: &[Self::Element; 4]) -> Self;
@@ -20,11 +19,11 @@ pub trait Lanes: Copy {
 
 /// Four sums in a register.
 pub trait Sums: Lanes {
-    /// Lane by lane the larger number; of a number and NaN the number.
+    /// The larger number of each lane; NaN does not count.
     fn larger(self, than: Self) -> Self;
-    /// All ones where this is larger than `other`.
+    /// All ones in lanes where `self` is larger than `other`.
     fn exceeds(self, other: Self) -> uint32x4_t;
-    /// The nearest numbers of fp32.
+    /// Rounds to fp32.
     fn to_f32(self) -> float32x4_t;
 }
 
@@ -41,13 +40,13 @@ macro_rules! lanes {
 
             #[inline(always)]
             fn load(from: &[$element; 4]) -> Self {
-                // SAFETY: four elements are there.
+                // SAFETY: the array has four elements. NEON is on every aarch64.
                 unsafe { $load(from.as_ptr()) }
             }
 
             #[inline(always)]
             fn store(self, to: &mut [$element; 4]) {
-                // SAFETY: there is room for four elements.
+                // SAFETY: the array has four elements. NEON is on every aarch64.
                 unsafe { $store(to.as_mut_ptr(), self) }
             }
 
@@ -64,44 +63,32 @@ lanes!(float32x4_t, f32, vdupq_n_f32, vld1q_f32, vst1q_f32, vbslq_f32);
 lanes!(int32x4_t, i32, vdupq_n_s32, vld1q_s32, vst1q_s32, vbslq_s32);
 lanes!(uint32x4_t, u32, vdupq_n_u32, vld1q_u32, vst1q_u32, vbslq_u32);
 
-impl Sums for float32x4_t {
-    #[inline(always)]
-    fn larger(self, than: Self) -> Self {
-        // SAFETY: NEON is on every aarch64.
-        unsafe { vmaxnmq_f32(self, than) }
-    }
+macro_rules! sums {
+    ($vector:ty, $larger:ident, $exceeds:ident, $to_f32:expr) => {
+        impl Sums for $vector {
+            #[inline(always)]
+            fn larger(self, than: Self) -> Self {
+                // SAFETY: NEON is on every aarch64.
+                unsafe { $larger(self, than) }
+            }
 
-    #[inline(always)]
-    fn exceeds(self, other: Self) -> uint32x4_t {
-        // SAFETY: NEON is on every aarch64.
-        unsafe { vcgtq_f32(self, other) }
-    }
+            #[inline(always)]
+            fn exceeds(self, other: Self) -> uint32x4_t {
+                // SAFETY: NEON is on every aarch64.
+                unsafe { $exceeds(self, other) }
+            }
 
-    #[inline(always)]
-    fn to_f32(self) -> float32x4_t {
-        self
-    }
+            #[inline(always)]
+            fn to_f32(self) -> float32x4_t {
+                $to_f32(self)
+            }
+        }
+    };
 }
 
-impl Sums for int32x4_t {
-    #[inline(always)]
-    fn larger(self, than: Self) -> Self {
-        // SAFETY: NEON is on every aarch64.
-        unsafe { vmaxq_s32(self, than) }
-    }
-
-    #[inline(always)]
-    fn exceeds(self, other: Self) -> uint32x4_t {
-        // SAFETY: NEON is on every aarch64.
-        unsafe { vcgtq_s32(self, other) }
-    }
-
-    #[inline(always)]
-    fn to_f32(self) -> float32x4_t {
-        // SAFETY: NEON is on every aarch64.
-        unsafe { vcvtq_f32_s32(self) }
-    }
-}
+sums!(float32x4_t, vmaxnmq_f32, vcgtq_f32, std::convert::identity);
+// SAFETY: NEON is on every aarch64.
+sums!(int32x4_t, vmaxq_s32, vcgtq_s32, |sums| unsafe { vcvtq_f32_s32(sums) });
 
 /// The first `V` vectors of a slice.
 #[inline(always)]

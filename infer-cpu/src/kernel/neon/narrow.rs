@@ -7,7 +7,7 @@ use half::f16;
 use super::super::I8_LARGEST;
 use super::lanes::Lanes;
 
-/// Numbers rounded at a time.
+/// Numbers in a batch.
 const BATCH: usize = 16;
 
 /// [`Kernels::narrow_f16`](super::super::Kernels::narrow_f16).
@@ -28,8 +28,8 @@ pub fn to_i8(values: &[f32], per_unit: f32, out: &mut [u8]) -> u64 {
     unsafe { vaddlvq_u32(n_clipped) }
 }
 
-/// Calls `round` with a batch of values and room for as many at a time; zeros
-/// fill up the last.
+/// Calls `round` with batches of values and room for the results; the last batch is padded with
+/// zeros.
 #[inline(always)]
 fn for_each_batch<T: Copy + Default>(
     values: &[f32],
@@ -49,7 +49,7 @@ fn for_each_batch<T: Copy + Default>(
     }
 }
 
-/// Returns `largest` raised to the magnitudes.
+/// Returns `largest`, raised to the magnitudes of the values.
 #[inline(always)]
 fn round_to_f16(
     values: &[f32; BATCH],
@@ -59,8 +59,8 @@ fn round_to_f16(
     let (values, (out, _)) = (values.as_chunks().0, out.as_chunks_mut::<8>());
     for (pair, out) in values.chunks_exact(2).zip(out) {
         let (low, high) = (float32x4_t::load(&pair[0]), float32x4_t::load(&pair[1]));
-        // SAFETY: there is room for eight, and an `f16` is its bits. NEON and
-        // its conversions of fp16 are on every aarch64.
+        // SAFETY: the array has eight elements, and `f16` is a transparent `u16`. NEON and its
+        // conversions of fp16 are on every aarch64.
         unsafe {
             let rounded = vcvt_high_f16_f32(vcvt_f16_f32(low), high);
             vst1q_u16(out.as_mut_ptr().cast(), vreinterpretq_u16_f16(rounded));
@@ -70,7 +70,7 @@ fn round_to_f16(
     largest
 }
 
-/// Returns `n_clipped` and how many were clipped at the top.
+/// Returns `n_clipped` plus the number of values that were clipped at the top.
 #[inline(always)]
 fn round_to_i8(
     values: &[f32; BATCH],
@@ -79,9 +79,9 @@ fn round_to_i8(
     n_clipped: uint32x4_t,
 ) -> uint32x4_t {
     let (values, _) = values.as_chunks();
-    // SAFETY: there is room for sixteen. NEON is on every aarch64.
+    // SAFETY: the array has sixteen elements. NEON is on every aarch64.
     unsafe {
-        // To nearest, ties to even; what exceeds i32 saturates, NaN is 0.
+        // Rounds to nearest, ties to even; saturates beyond i32; NaN becomes 0.
         let level = |v: usize| vcvtnq_s32_f32(vmulq_n_f32(Lanes::load(&values[v]), per_unit));
         // Saturate at 0 and 65535, then at 255.
         let low = vqmovun_high_s32(vqmovun_s32(level(0)), level(1));

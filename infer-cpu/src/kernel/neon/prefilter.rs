@@ -1,14 +1,14 @@
-//! What the int8 prefilter takes: candidates found among estimates, and their products.
+//! The kernels of the int8 prefilter: candidates among estimates, and their products.
 
 use std::arch::aarch64::*;
 
 use super::super::{Candidate, I8_LARGEST, LevelSums, PrefilterKernels, Rows, WIDTH_STEP};
 use super::lanes::{Lanes, Sums};
 
-/// Estimates looked at together: candidates are few.
+/// Estimates that are compared together, since candidates are few.
 const BATCH: usize = 16;
 
-/// All of it.
+/// The table of these kernels.
 pub const PREFILTER: PrefilterKernels = PrefilterKernels { levels, peaks, above_floors, dots };
 
 /// [`PrefilterKernels::levels`].
@@ -19,11 +19,11 @@ fn levels(row: &[f32], per_unit: f32, out: &mut [u8]) -> LevelSums {
     let (mut lost, mut squares) = (float32x4_t::splat(0.0), float32x4_t::splat(0.0));
     for (batch, out) in batches.iter().zip(out) {
         let (values, _) = batch.as_chunks();
-        // SAFETY: there is room for sixteen. NEON is on every aarch64.
+        // SAFETY: the array has sixteen elements. NEON is on every aarch64.
         unsafe {
             let most = vdupq_n_s32(i32::from(I8_LARGEST));
             let exact = [0, 1, 2, 3].map(|v| vmulq_n_f32(Lanes::load(&values[v]), per_unit));
-            // To nearest, ties to even.
+            // Rounds to nearest, ties to even.
             let level =
                 exact.map(|x| vminq_s32(vmaxq_s32(vcvtnq_s32_f32(x), vdupq_n_s32(0)), most));
             for (exact, level) in exact.into_iter().zip(level) {
@@ -47,11 +47,13 @@ fn peaks(values: &[f32], peaks: &mut [f32], rows: &mut [u32]) {
     assert!(rows.len() == width && width.is_multiple_of(WIDTH_STEP));
     let columns = peaks.as_chunks_mut::<4>().0.iter_mut().zip(rows.as_chunks_mut::<4>().0);
     for (at, (peaks, rows)) in (0..).step_by(4).zip(columns) {
+        // Rows are the inner loop, so that four peaks stay in registers.
         let mut peak = float32x4_t::splat(f32::NEG_INFINITY);
         let mut who = uint32x4_t::splat(0);
         for (row, values) in (0..).zip(values.chunks_exact(width)) {
             let four = values[at..].first_chunk().expect("invariant: whole vectors");
             let value = float32x4_t::load(four);
+            // Strictly greater, so that the first of equal rows wins.
             let higher = value.exceeds(peak);
             peak = peak.replaced(higher, value);
             who = who.replaced(higher, uint32x4_t::splat(row));
@@ -69,6 +71,7 @@ fn above_floors(values: &[f32], floors: &[f32], found: &mut [Candidate]) -> Opti
     for (row, values) in values.chunks_exact(width).enumerate() {
         let batches = values.as_chunks::<BATCH>().0.iter().zip(floors.as_chunks::<BATCH>().0);
         for (batch, (values, floors)) in batches.enumerate() {
+            // Candidates are rare, so one branch passes over most batches.
             if !any_above(values, floors) {
                 continue;
             }
@@ -93,8 +96,7 @@ fn any_above(values: &[f32; BATCH], floors: &[f32; BATCH]) -> bool {
     }
 }
 
-/// [`PrefilterKernels::dots`]: four sums of every fourth vector each, as many
-/// as hide the latency of FMLA.
+/// [`PrefilterKernels::dots`]: four sums, of every fourth vector each, hide the latency of FMLA.
 fn dots(rows: &Rows<'_, f32>, weights: &[f32], candidates: &[Candidate], out: &mut [f32]) {
     let width = rows.stride;
     assert!(width.is_multiple_of(WIDTH_STEP));

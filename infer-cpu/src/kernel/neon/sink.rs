@@ -1,5 +1,5 @@
-//! What becomes of a tile's sums while they are in registers: outputs, or
-//! maxima over rows, so that the widest features are never stored.
+//! Consumers of a tile's sums in registers: outputs, or maxima over rows, so that the widest
+//! features are never stored.
 
 use std::arch::aarch64::*;
 use std::array::from_fn;
@@ -7,28 +7,28 @@ use std::array::from_fn;
 use super::super::{Panels, holds_rows};
 use super::lanes::{Lanes, Sums, load};
 
-/// Takes the sums of one panel's channels, from the first row to the last.
+/// Consumes the sums of one panel's channels, from the first row to the last.
 pub trait Sink<L, const V: usize> {
     /// Takes the next `R` rows.
     ///
     /// # Safety
-    /// They are no more than the sink was made for.
+    /// In total, they are at most as many as the sink was made for.
     unsafe fn take<const R: usize>(&mut self, sums: [[L; V]; R]);
 }
 
-/// Writes scaled sums with bias and ReLU.
+/// Applies scale, bias and ReLU, and writes the results.
 pub struct Finish<const V: usize> {
     scale: [float32x4_t; V],
     bias: [float32x4_t; V],
-    /// What outputs are raised to: 0, or NaN, which FMAXNM ignores.
+    /// The lower limit of outputs: 0, or NaN, which FMAXNM ignores.
     floor: float32x4_t,
-    /// Where the next row goes.
+    /// The first output of the next row.
     out: *mut f32,
     out_stride: usize,
 }
 
 impl<const V: usize> Finish<V> {
-    /// For so many rows.
+    /// A sink for `n_rows` rows.
     pub fn new<W: Copy + Default>(
         weights: &Panels<W>,
         panel: usize,
@@ -44,7 +44,8 @@ impl<const V: usize> Finish<V> {
                 scale => load(&scale[channels.clone()]),
             },
             bias: load(&weights.biases()[channels.clone()]),
-            floor: Lanes::splat(if weights.relu() { 0.0 } else { f32::NAN }),
+            // A floor of NaN makes the loop the same with and without a ReLU.
+            floor: Lanes::splat(if weights.relu { 0.0 } else { f32::NAN }),
             out: out.as_mut_ptr().wrapping_add(channels.start),
             out_stride,
         }
@@ -56,8 +57,8 @@ impl<L: Sums, const V: usize> Sink<L, V> for Finish<V> {
     unsafe fn take<const R: usize>(&mut self, sums: [[L; V]; R]) {
         for sums in sums {
             for (v, sums) in sums.into_iter().enumerate() {
-                // SAFETY: `new` found room for as many rows as the caller, by the
-                // contract of `take`, gives.
+                // SAFETY: `Finish::new` asserted room for `n_rows` rows, and `tile::multiply` feeds
+                // the rows of the `Rows` that has this `n`.
                 unsafe {
                     let finished = vfmaq_f32(self.bias[v], sums.to_f32(), self.scale[v]);
                     vst1q_f32(self.out.add(4 * v), vmaxnmq_f32(finished, self.floor));
@@ -70,7 +71,7 @@ impl<L: Sums, const V: usize> Sink<L, V> for Finish<V> {
 
 /// Keeps the largest sums.
 pub struct Max<L, const V: usize> {
-    /// One a channel.
+    /// The largest sum of each channel.
     pub largest: [L; V],
 }
 
@@ -83,19 +84,19 @@ impl<L: Sums, const V: usize> Sink<L, V> for Max<L, V> {
     }
 }
 
-/// Keeps the largest sums and whose they are.
+/// Keeps the largest sums and their rows.
 pub struct ArgMax<L, const V: usize> {
-    /// One a channel.
+    /// The largest sum of each channel.
     pub largest: [L; V],
     /// The first row that has it.
     pub winners: [uint32x4_t; V],
-    /// What the next row counts as.
+    /// The number of the next row.
     pub next_row: uint32x4_t,
 }
 
 impl<L: Sums, const V: usize> ArgMax<L, V> {
-    /// Takes the largest sums of `n_rows` rows and the first rows that have
-    /// them, counted from `next_row`.
+    /// Merges the largest sums of the next `n_rows` rows, with the first rows that have them,
+    /// counted from `next_row`.
     #[inline(always)]
     pub fn merge(&mut self, sums: [L; V], rows: [uint32x4_t; V], n_rows: usize) {
         for v in 0..V {

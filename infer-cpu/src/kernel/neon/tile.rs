@@ -1,4 +1,4 @@
-//! Matrix products by register tiles: what is the same in every number format.
+//! Matrix products by register tiles: the parts that all number formats share.
 
 use std::arch::asm;
 use std::array::from_fn;
@@ -11,43 +11,43 @@ use super::sink::{ArgMax, Finish, Max};
 /// Rows of the tallest tile.
 const TALLEST: usize = 8;
 
-/// How far an inner loop goes along rows at a time.
+/// The bytes of a row that one round of an inner loop processes.
 pub const VECTOR_BYTES: usize = 16;
 
 /// A register tile of rows by `V` vectors of four sums, in one number format.
 pub trait Tile<const V: usize> {
-    /// What rows hold.
+    /// An element of rows.
     type Activation;
-    /// What panels hold.
+    /// An element of panels.
     type Weight: Copy + Default;
     /// A vector of sums.
     type Sums: Sums;
-    /// Inputs of one round of its inner loop.
+    /// The inputs of one round of the inner loop.
     const STEP: usize = VECTOR_BYTES / size_of::<Self::Activation>();
 }
 
-/// A tile whose sums go to `S`.
+/// A tile that feeds its sums to `S`.
 pub trait Feed<S, const V: usize>: Tile<V> {
-    /// Gives `sink` the products of a strip by tiles of `R` rows. The order in
-    /// which a sum is formed does not depend on `R`.
+    /// Feeds the products of a strip to `sink` in tiles of `R` rows. The order of summation does
+    /// not depend on `R`.
     ///
     /// # Safety
-    /// The machine has the tile's instructions, the strip is as it says, and
-    /// `sink` has room for its rows.
+    /// The machine has the tile's instructions, the strip consists of `n_tiles * R` rows of
+    /// `inputs` activations and `4 * V` weights for each input, and `sink` has room for these rows.
     unsafe fn feed<const R: usize>(strip: &Strip<Self::Activation, Self::Weight>, sink: &mut S);
 }
 
-/// Rows by one panel.
+/// Rows and one panel.
 pub struct Strip<A, W> {
     /// The first activation of the first row.
     pub rows: *const A,
-    /// From one row to the next.
+    /// The distance from one row to the next.
     pub stride: usize,
-    /// How often the rows of a tile are there.
+    /// The number of tiles.
     pub n_tiles: usize,
     /// `4 * V` weights for each input.
     pub weights: *const W,
-    /// Inputs of every row, a multiple of the tile's step.
+    /// The inputs of every row, a multiple of the tile's step.
     pub inputs: usize,
 }
 
@@ -60,15 +60,14 @@ impl<A, W> Strip<A, W> {
 
     /// The first `R` rows.
     ///
-    /// In inner loops an activation is at its row's pointer plus an offset that
-    /// all rows share, which costs nothing but the load. A compiler that knew
-    /// the rows to be a stride apart would go from one to the next by
-    /// additions; an empty instruction hides it.
+    /// In inner loops an activation is at its row's pointer plus an offset that all rows share,
+    /// which costs only the load. If the compiler knew that rows are a stride apart, it would
+    /// compute the pointers by additions in the loop; an empty instruction hides it.
     #[inline(always)]
     pub fn first_rows<const R: usize>(&self) -> [*const A; R] {
         from_fn(|r| {
             let mut offset = r * self.stride;
-            // SAFETY: no instruction.
+            // SAFETY: the assembly has no instruction.
             unsafe {
                 asm!("/* {0} */", inout(reg) offset, options(pure, nomem, nostack, preserves_flags));
             }
@@ -83,13 +82,91 @@ impl<A, W> Strip<A, W> {
     }
 }
 
-/// A tile's vector of sums.
+/// Defines a format with tiles of 8 rows by 8 channels: `[activation; weight] -> vector of sums`.
+///
+/// `$multiply_add` reads one of the four lanes of a vector of activations; a lane holds one input, or
+/// a group of inputs for int8.
+macro_rules! tile_8x8 {
+    (
+        $format:ident: [$activation:ty; $weight:ty] -> $sums:ty, $features:literal, fn $tile:ident,
+        zero: $zero:expr, load: $load:ident -> $vector:ty, multiply_add: $multiply_add:ident
+    ) => {
+        struct $format;
+
+        impl Tile<2> for $format {
+            type Activation = $activation;
+            type Weight = $weight;
+            type Sums = $sums;
+        }
+
+        impl<S: Sink<$sums, 2>> Feed<S, 2> for $format {
+            unsafe fn feed<const R: usize>(strip: &Strip<$activation, $weight>, sink: &mut S) {
+                // SAFETY: `multiply` made the strip of `Rows` and `Panels` that it checked, and
+                // `kernels()` gives out the table only where the instructions exist.
+                unsafe { $tile::<S, R>(strip, sink) }
+            }
+        }
+
+        /// # Safety
+        /// As for [`Feed::feed`].
+        #[inline(never)]
+        #[target_feature(enable = $features)]
+        unsafe fn $tile<S: Sink<$sums, 2>, const R: usize>(
+            strip: &Strip<$activation, $weight>,
+            sink: &mut S,
+        ) {
+            let mut rows: [*const $activation; R] = strip.first_rows();
+            for _ in 0..strip.n_tiles {
+                let mut sums = [[$zero; 2]; R];
+                let (mut weights, mut at) = (strip.weights, 0);
+                while at < strip.row_bytes() {
+                    // SAFETY: a `Strip` has R rows of whole STEPs, here one vector, and two vectors
+                    // of weights for each of its four lanes.
+                    unsafe {
+                        let a = rows.map(|row| $load(row.byte_add(at).cast()));
+                        add_lane::<0, R>(&mut sums, &a, weights);
+                        add_lane::<1, R>(&mut sums, &a, weights.byte_add(2 * VECTOR_BYTES));
+                        add_lane::<2, R>(&mut sums, &a, weights.byte_add(4 * VECTOR_BYTES));
+                        add_lane::<3, R>(&mut sums, &a, weights.byte_add(6 * VECTOR_BYTES));
+                        weights = weights.byte_add(8 * VECTOR_BYTES);
+                    }
+                    at += VECTOR_BYTES;
+                }
+                // SAFETY: `multiply` feeds a sink the rows that it was made for.
+                unsafe { sink.take(sums) };
+                rows = strip.next_rows(rows);
+            }
+        }
+
+        /// Adds the products of lane `LANE` of the activations.
+        ///
+        /// # Safety
+        /// `weights` points at two vectors.
+        #[inline]
+        #[target_feature(enable = $features)]
+        unsafe fn add_lane<const LANE: i32, const R: usize>(
+            sums: &mut [[$sums; 2]; R],
+            a: &[$vector; R],
+            weights: *const $weight,
+        ) {
+            // SAFETY: `Panels` has `nr` = 8 weights for each input: two vectors for each lane.
+            let w = unsafe { [$load(weights), $load(weights.byte_add(VECTOR_BYTES))] };
+            for (sums, &a) in sums.iter_mut().zip(a) {
+                sums[0] = $multiply_add::<LANE>(sums[0], w[0], a);
+                sums[1] = $multiply_add::<LANE>(sums[1], w[1], a);
+            }
+        }
+    };
+}
+pub(in crate::kernel) use tile_8x8;
+
+/// The vector of sums of a tile.
 type Four<T, const V: usize> = <T as Tile<V>>::Sums;
 
-/// One of them.
+/// A sum of a tile.
 type Sum<T, const V: usize> = <Four<T, V> as Lanes>::Element;
 
-/// The products of one format.
+/// The matrix products of one format.
 pub const fn gemm<T, const V: usize>() -> Gemm<T::Activation, T::Weight, Sum<T, V>>
 where
     T: Tile<V> + Feed<Finish<V>, V> + Feed<Max<Four<T, V>, V>, V> + Feed<ArgMax<Four<T, V>, V>, V>,
@@ -150,14 +227,15 @@ fn argmax<T: Tile<V> + Feed<ArgMax<Four<T, V>, V>, V>, const V: usize>(
     }
 }
 
-/// Gives `sink` the products of `rows` and one panel, which stays in the
-/// first-level cache while the rows pass.
+/// Feeds the products of `rows` and one panel to `sink`. The panel stays in the first-level cache
+/// while the rows pass.
 fn multiply<T: Feed<S, V>, S, const V: usize>(
     rows: &Rows<'_, T::Activation>,
     weights: &Panels<T::Weight>,
     panel: usize,
     sink: &mut S,
 ) {
+    // Inner loops have no remainder: rows are read up to the padding of the panels.
     let inputs = weights.padded_inputs();
     rows.check(inputs);
     assert!(
@@ -173,14 +251,15 @@ fn multiply<T: Feed<S, V>, S, const V: usize>(
         inputs,
     };
     let n_tiles = rows.n / TALLEST;
-    // SAFETY: `kernels()` gives out a table where its instructions are; `check`
-    // found `inputs` activations in each row, and `Panels` keeps as many weights
-    // for each channel of a panel; sinks are made for `rows.n` rows.
+    // SAFETY: `kernels()` gives out a table only where its instructions exist; `Rows::check` found
+    // `inputs` activations in each row, and `Panels` has as many weights for each channel of a
+    // panel; every sink is made for `rows.n` rows.
     unsafe {
         T::feed::<TALLEST>(&strip(0, n_tiles), sink);
         if rows.n.is_multiple_of(TALLEST) {
             return;
         }
+        // A constant number of rows keeps the sums in registers for every remainder.
         let rest = strip(n_tiles * TALLEST, 1);
         match rows.n % TALLEST {
             1 => T::feed::<1>(&rest, sink),

@@ -1,15 +1,15 @@
-//! What becomes of sums that are still fp16.
+//! Sinks of sums that are still fp16.
 
 use std::arch::aarch64::*;
 
 use super::super::neon::sink::{ArgMax, Finish, Max, Sink};
 
-/// Takes sums that are still fp16: of several rows the largest goes on alone.
+/// Takes sums that are still fp16. A maximum over rows promotes only the largest.
 pub trait HalfSink {
-    /// As [`Sink::take`].
+    /// Takes the next `R` rows.
     ///
     /// # Safety
-    /// As [`Sink::take`]; the machine has FEAT_FP16.
+    /// As for [`Sink::take`]; the machine has FEAT_FP16.
     unsafe fn take_half<const R: usize>(&mut self, sums: &[[float16x8_t; 2]; R]);
 }
 
@@ -18,7 +18,7 @@ impl HalfSink for Finish<4> {
     #[target_feature(enable = "neon,fp16")]
     unsafe fn take_half<const R: usize>(&mut self, sums: &[[float16x8_t; 2]; R]) {
         for sums in sums {
-            // SAFETY: this function's contract.
+            // SAFETY: `Finish::new` asserted room for all rows of the `Strip`, of which this is one.
             unsafe { self.take([promoted(sums)]) };
         }
     }
@@ -28,7 +28,7 @@ impl HalfSink for Max<float32x4_t, 4> {
     #[inline]
     #[target_feature(enable = "neon,fp16")]
     unsafe fn take_half<const R: usize>(&mut self, sums: &[[float16x8_t; 2]; R]) {
-        // SAFETY: this function's contract.
+        // SAFETY: `Max` writes only to itself, so that any number of rows is allowed.
         unsafe { self.take([promoted(&largest(sums))]) }
     }
 }
@@ -56,9 +56,9 @@ impl HalfSink for ArgMax<float32x4_t, 4> {
     }
 }
 
-/// Sums of a tile's blocks.
+/// Adds up the sums of a tile's blocks.
 pub struct Blocks<const ROWS: usize> {
-    /// So far.
+    /// The sums so far.
     pub sums: [[float32x4_t; 4]; ROWS],
 }
 
@@ -75,7 +75,7 @@ impl<const ROWS: usize> HalfSink for Blocks<ROWS> {
     }
 }
 
-/// The largest of each column, NaN of none but NaN.
+/// The largest of each column; NaN only if all are NaN.
 #[inline]
 #[target_feature(enable = "neon,fp16")]
 fn largest<const R: usize>(sums: &[[float16x8_t; 2]; R]) -> [float16x8_t; 2] {

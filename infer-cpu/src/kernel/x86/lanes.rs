@@ -1,45 +1,42 @@
-//! What the loops need of an instruction set's vectors.
+//! The vector operations of an instruction set.
 
 use half::f16;
 
 /// A vector of numbers.
 ///
 /// # Safety
-/// This is the contract of every function: the machine has the instruction set
-/// of the implementor, and at a pointer are [`Lanes::N`] elements. The first
-/// holds because only the functions that [`super::enable`] makes call into
-/// this module, and a table of them is given out where the machine was found to
-/// have the instructions. The second holds by the invariants of `Rows` and
-/// `Panels`, which the loops check or cite.
+/// For every function, the machine has the instruction set of the implementor, and a pointer points
+/// at [`Lanes::N`] elements. The first holds because only functions of [`super::enable`] call into
+/// this module, and `kernels()` gives out their table only where the machine has the instructions.
+/// The second follows from the invariants of `Rows` and `Panels`, which the loops check.
 pub(in crate::kernel) trait Vector: Copy {
-    /// What is in a lane.
+    /// The number in a lane.
     type Element: Copy;
-    /// As many lanes of f32.
+    /// The vector of f32 with as many lanes.
     type Float;
-    /// As many lanes of i32.
+    /// The vector of i32 with as many lanes.
     type Int: Vector<Element = i32, Float = Self::Float, Int = Self::Int>;
 
     unsafe fn splat(value: Self::Element) -> Self;
     unsafe fn load(from: *const Self::Element) -> Self;
     unsafe fn store(self, to: *mut Self::Element);
     unsafe fn add(self, other: Self) -> Self;
-    /// The larger; `other` if either is NaN.
+    /// The larger number of each lane; `other` if either is NaN.
     unsafe fn max(self, other: Self) -> Self;
-    /// Where `self` is greater than `best`: puts it there, and `index` into
-    /// `who`.
+    /// Where `self` is greater than `best`, sets `best` to it and `who` to `index`.
     unsafe fn keep_greater(self, best: &mut Self, who: &mut Self::Int, index: Self::Int);
-    /// The nearest numbers of f32.
+    /// Rounds to f32.
     unsafe fn to_float(self) -> Self::Float;
 }
 
 /// A vector of f32.
 ///
 /// # Safety
-/// The contract of [`Vector`].
+/// As for [`Vector`].
 pub(in crate::kernel) trait Lanes: Vector<Element = f32, Float = Self> {
-    /// How many lanes.
+    /// The number of lanes.
     const N: usize;
-    /// Rows of a tile.
+    /// The rows of a tile.
     const ROWS: usize;
 
     unsafe fn load_f16(from: *const f16) -> Self;
@@ -51,24 +48,24 @@ pub(in crate::kernel) trait Lanes: Vector<Element = f32, Float = Self> {
     unsafe fn fma(self, factor: Self, term: Self) -> Self;
     unsafe fn mul(self, other: Self) -> Self;
     unsafe fn sub(self, other: Self) -> Self;
-    /// The smaller; `other` if either is NaN.
+    /// The smaller number of each lane; `other` if either is NaN.
     unsafe fn min(self, other: Self) -> Self;
     unsafe fn abs(self) -> Self;
-    /// To the nearest integer, ties to even.
+    /// Rounds to the nearest integer, ties to even.
     unsafe fn round(self) -> Self;
-    /// Which lanes are greater than those of `other`, a bit each.
+    /// The lanes that are greater than those of `other`, one bit each.
     unsafe fn greater(self, other: Self) -> u32;
     /// The sum of all lanes, in a fixed order.
     unsafe fn total(self) -> f32;
-    /// Adds to each lane of `sum` the products of four unsigned bytes (at most
-    /// 127) and four signed ones.
+    /// Adds to each lane of `sum` the products of four unsigned bytes (at most 127) and four signed
+    /// ones.
     unsafe fn dot4(sum: Self::Int, a: Self::Int, w: Self::Int) -> Self::Int;
 }
 
 /// A weight that a kernel reads as f32.
 ///
 /// # Safety
-/// The contract of [`Vector`].
+/// As for [`Vector`].
 pub(in crate::kernel) trait Weight: Copy + Default {
     unsafe fn lanes<L: Lanes>(from: *const Self) -> L;
 }
@@ -78,7 +75,7 @@ macro_rules! weight {
         impl Weight for $number {
             #[inline(always)]
             unsafe fn lanes<L: Lanes>(from: *const $number) -> L {
-                // SAFETY: the contract of `Vector`.
+                // SAFETY: as for `Vector`; `Panels` has whole vectors of weights.
                 unsafe { L::$load(from) }
             }
         }
@@ -89,8 +86,7 @@ weight!(f32, load);
 weight!(f16, load_f16);
 weight!(i8, load_i8);
 
-/// Implements [`Vector`] or [`Lanes`]: a function a line, each of which is one
-/// expression of intrinsics.
+/// Implements [`Vector`] or [`Lanes`] from one expression of intrinsics for each function.
 macro_rules! implement {
     ($trait:ident for $vector:ty {
         $(type $type:ident = $is:ty;)*
@@ -104,8 +100,8 @@ macro_rules! implement {
                 #[inline(always)]
                 #[allow(unused_unsafe, reason = "floats are their own `to_float`")]
                 unsafe fn $name($($arguments)*) $(-> $out)? {
-                    // SAFETY: the contract of `Vector`: the machine has the instructions,
-                    // and a whole vector lies at a pointer.
+                    // SAFETY: `kernels()` gives out these functions only where the machine has the
+                    // instructions; `Rows` and `Panels` have whole vectors at the pointers.
                     unsafe { $body }
                 }
             )*

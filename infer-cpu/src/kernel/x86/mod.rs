@@ -1,6 +1,5 @@
-//! What AVX2 and AVX-512 kernels share: the same loops over vectors of another
-//! length. Everything here is inlined into functions that enable the
-//! instructions, in [`super::avx2`] and [`super::avx512`].
+//! The loops of the AVX2 and AVX-512 kernels, generic over the vector. Everything here is inlined
+//! into functions that enable the instructions, in [`super::avx2`] and [`super::avx512`].
 
 mod lanes;
 mod products;
@@ -46,27 +45,7 @@ macro_rules! declare {
             edge_features,
         });
 
-        fn edge_features(
-            edges: &EdgeConv,
-            rows: (&mut [f32], usize),
-            cloud: &Neighborhood,
-            scratch: &mut EdgeScratch,
-        ) {
-            #[target_feature(enable = $features)]
-            fn run(
-                edges: &EdgeConv,
-                rows: (&mut [f32], usize),
-                cloud: &Neighborhood,
-                scratch: &mut EdgeScratch,
-            ) {
-                edges.features::<true>(rows, cloud, scratch);
-            }
-            // SAFETY: `kernels()` gives out the table of these functions where the
-            // machine was found to have the features.
-            unsafe { run(edges, rows, cloud, scratch) }
-        }
-
-        /// The products of one format.
+        /// The matrix products of one format.
         const fn gemm<T: Tile<$lanes>>()
         -> Gemm<T::Activation, T::Weight, <T::Sums as x86::Vector>::Element> {
             Gemm {
@@ -135,15 +114,22 @@ macro_rules! declare {
 
             fn fps_step(cloud: Soa<'_>, pick: [f32; 3], distance: &mut [f32]) -> usize =
                 x86::fps_step::<$lanes>;
+
+            fn edge_features(
+                edges: &EdgeConv,
+                rows: (&mut [f32], usize),
+                cloud: &Neighborhood,
+                scratch: &mut EdgeScratch,
+            ) = EdgeConv::features::<true>;
         }
     };
 }
 pub(super) use declare;
 
-/// Makes a safe function of each loop, compiled with `$features`.
+/// Defines a safe function for each loop, compiled with `$features`.
 ///
-/// It enables them without looking: the table that holds it is given out only
-/// where the machine has been found to have them.
+/// It does not check for the features: `kernels()` gives out the table only where the machine has
+/// them.
 macro_rules! enable {
     ($features:literal; $(
         fn $name:ident $(<$t:ident: $bound:path>)? (
@@ -152,12 +138,13 @@ macro_rules! enable {
     )*) => {$(
         fn $name $(<$t: $bound>)? ($($argument: $type),*) $(-> $out)? {
             #[target_feature(enable = $features)]
+            #[allow(unused_unsafe, reason = "the loop of `edge_features` is safe")]
             unsafe fn run $(<$t: $bound>)? ($($argument: $type),*) $(-> $out)? {
-                // SAFETY: `run` enables the features.
+                // SAFETY: `run` enables the features; the loops check their operands.
                 unsafe { $call($($argument),*) }
             }
-            // SAFETY: `kernels()` gives out the table of these functions where the
-            // machine was found to have the features.
+            // SAFETY: `kernels()` gives out the table of these functions only where the machine has
+            // the features.
             unsafe { run $(::<$t>)? ($($argument),*) }
         }
     )*};

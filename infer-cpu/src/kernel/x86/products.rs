@@ -1,4 +1,4 @@
-//! Matrix products, kept or pooled.
+//! Matrix products, stored or pooled.
 
 use std::ops::Range;
 
@@ -6,8 +6,7 @@ use super::tile::Tile;
 use super::{Lanes, V, Vector};
 use crate::kernel::{Panels, Rows, holds_rows};
 
-/// Runs `$body` with `$r` rows known when compiling: a full tile, or what is
-/// left.
+/// Runs `$body` for each tile, with `$r` rows as a constant: a full tile, or the remaining rows.
 macro_rules! for_tiles {
     ($lanes:ty, $n:expr, |$row:ident, $r:ident| $body:expr) => {{
         let mut $row = 0;
@@ -53,14 +52,14 @@ pub(in crate::kernel) unsafe fn rows<L: Lanes, T: Tile<L>>(
     check::<L, T>(rows, weights, &panels);
     let width = weights.channels(&panels).end;
     assert!(holds_rows(out.len(), rows.n, out_stride, width), "no room for the outputs");
-    // Panels outside, rows inside: a panel stays in the first-level cache while
-    // the rows, which are fewer bytes, stream by.
+    // The outer loop is over panels: a panel stays in the first-level cache while the rows, which
+    // are fewer bytes, stream by.
     for panel in panels {
         let first = panel * weights.nr();
         let data = weights.panel(panel);
         for_tiles!(L, rows.n, |row, R| {
-            // SAFETY: `check` found `padded_inputs` activations in each row, and
-            // `holds_rows` room for the channels of each row up to `width`.
+            // SAFETY: `check` found `padded_inputs` activations in each row, and `holds_rows` room
+            // for the channels of each row up to `width`.
             unsafe {
                 let from = rows.data.as_ptr().add(row * rows.stride);
                 let sums = T::sums::<R>(from, rows.stride, data);
@@ -76,9 +75,8 @@ pub(in crate::kernel) unsafe fn rows<L: Lanes, T: Tile<L>>(
     }
 }
 
-/// Asserts what unsafe loops rely on beyond the invariants of [`Rows`] and
-/// [`Panels`]: rows as wide as the panels, panels packed for this tile, and a
-/// range of panels that are there.
+/// Asserts the conditions of the unsafe loops beyond the invariants of [`Rows`] and [`Panels`]:
+/// rows are as wide as the panels, panels are packed for this tile, and the range of panels exists.
 #[inline(always)]
 fn check<L: Lanes, T: Tile<L>>(
     rows: &Rows<'_, T::Activation>,
@@ -93,7 +91,7 @@ fn check<L: Lanes, T: Tile<L>>(
     assert!(panels.end <= weights.n_panels(), "panels that are not there");
 }
 
-/// Scale, bias and ReLU of the channels from `channel`.
+/// Applies scale, bias and ReLU of the channels from `channel` on.
 ///
 /// # Safety
 /// The instruction set of `L`; `channel` begins a vector of one of the panels.
@@ -103,8 +101,8 @@ pub(super) unsafe fn finish<L: Lanes, W: Copy + Default>(
     weights: &Panels<W>,
     channel: usize,
 ) -> L {
-    // SAFETY: `Panels` keeps biases, and scales where there are any, as long as
-    // all panels are wide, so that a whole vector begins at `channel`.
+    // SAFETY: `Panels` has `padded_outputs` biases, and as many scales if there are any, so that a
+    // whole vector begins at `channel`.
     unsafe {
         let bias = L::load(weights.biases().as_ptr().add(channel));
         let value = if weights.scales().is_empty() {
@@ -112,7 +110,7 @@ pub(super) unsafe fn finish<L: Lanes, W: Copy + Default>(
         } else {
             value.fma(L::load(weights.scales().as_ptr().add(channel)), bias)
         };
-        if weights.relu() { value.max(L::splat(0.0)) } else { value }
+        if weights.relu { value.max(L::splat(0.0)) } else { value }
     }
 }
 
@@ -131,15 +129,14 @@ pub(in crate::kernel) unsafe fn max<L: Lanes, T: Tile<L>>(
     assert!(maxima.len() == panels.len() * weights.nr(), "expected a maximum for each channel");
     for (panel, maxima) in panels.zip(maxima.chunks_exact_mut(V * L::N)) {
         let data = weights.panel(panel);
-        // SAFETY: a chunk has V vectors, and `check` found `padded_inputs` activations
-        // in each row.
+        // SAFETY: a chunk has V vectors, and `check` found `padded_inputs` activations in each row.
         unsafe {
             let mut best: [T::Sums; V] =
                 std::array::from_fn(|v| T::Sums::load(maxima.as_ptr().add(v * L::N)));
             for_tiles!(L, rows.n, |row, R| {
                 let from = rows.data.as_ptr().add(row * rows.stride);
-                // Maxima stay in registers over all rows: the products, a thousand a
-                // point, are never stored.
+                // Maxima stay in registers over all rows: the products, a thousand a point, are
+                // never stored.
                 for sums in T::sums::<R>(from, rows.stride, data) {
                     for v in 0..V {
                         best[v] = sums[v].max(best[v]);
@@ -175,8 +172,7 @@ pub(in crate::kernel) unsafe fn argmax<L: Lanes, T: Tile<L>>(
     for (panel, (maxima, winners)) in panels.zip(chunks) {
         let data = weights.panel(panel);
         let winners = winners.as_mut_ptr().cast::<i32>();
-        // SAFETY: a chunk has V vectors, and `check` found `padded_inputs` activations
-        // in each row.
+        // SAFETY: a chunk has V vectors, and `check` found `padded_inputs` activations in each row.
         unsafe {
             let mut best: [T::Sums; V] =
                 std::array::from_fn(|v| T::Sums::load(maxima.as_ptr().add(v * L::N)));

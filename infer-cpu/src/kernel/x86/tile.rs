@@ -1,5 +1,4 @@
-//! The register tile of R rows and V vectors of output channels, lanes along
-//! channels:
+//! The register tile of R rows and V vectors of output channels, lanes along channels:
 //!
 //! ```text
 //!              w[k, 0..n]   w[k, n..2n]     one panel, V = 2
@@ -12,7 +11,7 @@ use half::f16;
 
 use super::{Lanes, V, Vector, Weight};
 
-/// Inputs of fp16 rows that are widened at a time.
+/// The inputs of fp16 rows that are widened at a time.
 const WIDENED: usize = 128;
 
 /// One format's tile of `R` rows.
@@ -21,15 +20,14 @@ pub(in crate::kernel) trait Tile<L: Lanes> {
     type Weight: Copy + Default;
     /// A vector of sums.
     type Sums: Vector<Float = L, Int = L::Int>;
-    /// Inputs that the loop takes at a time: a panel has a multiple of them.
+    /// The inputs of one round of the loop; a panel has a multiple of it.
     const STEP: usize;
 
     /// The sums of `R` rows and one panel.
     ///
     /// # Safety
-    /// The instruction set of `L`; at `rows` are `R` rows of `panel.len() / (V *
-    /// L::N)` activations, `stride` apart, and that number is a multiple of
-    /// [`Tile::STEP`].
+    /// The instruction set of `L`; at `rows` are `R` rows of `panel.len() / (V * L::N)`
+    /// activations, `stride` apart, and that number is a multiple of [`Tile::STEP`].
     unsafe fn sums<const R: usize>(
         rows: *const Self::Activation,
         stride: usize,
@@ -44,11 +42,10 @@ pub(in crate::kernel) struct Half;
 /// Byte rows and weights.
 pub(in crate::kernel) struct Byte;
 
-/// Adds the products of the first `k` inputs.
+/// Accumulates the products of the first `k` inputs.
 ///
 /// # Safety
-/// The instruction set of `L`; `k` inputs of a panel and of `R` rows, `stride`
-/// apart.
+/// The instruction set of `L`; `k` inputs of a panel and of `R` rows, `stride` apart.
 #[inline(always)]
 unsafe fn accumulate<L: Lanes, W: Weight, const R: usize>(
     acc: &mut [[L; V]; R],
@@ -58,12 +55,12 @@ unsafe fn accumulate<L: Lanes, W: Weight, const R: usize>(
     k: usize,
 ) {
     for k in 0..k {
-        // SAFETY: panel and rows have more than `k` inputs, by this function's contract.
+        // SAFETY: `Tile::sums` passes the inputs of a panel of `Panels`, which `check` found in
+        // each row of `Rows` too.
         unsafe {
             let w: [L; V] = std::array::from_fn(|v| W::lanes(panel.add((k * V + v) * L::N)));
             for (r, acc) in acc.iter_mut().enumerate() {
-                // One load broadcasts an activation to all lanes, so that rows need
-                // no packing.
+                // One load broadcasts an activation to all lanes, so that rows need no packing.
                 let a = L::splat(*rows.add(r * stride + k));
                 for v in 0..V {
                     acc[v] = a.fma(w[v], acc[v]);
@@ -81,7 +78,7 @@ impl<L: Lanes> Tile<L> for Single {
 
     #[inline(always)]
     unsafe fn sums<const R: usize>(rows: *const f32, stride: usize, panel: &[f32]) -> [[L; V]; R] {
-        // SAFETY: by the contract of `Tile::sums`, rows have as many inputs as the panel.
+        // SAFETY: `check` found as many inputs in each row of `Rows` as in the panel.
         unsafe {
             let mut acc = [[L::splat(0.0); V]; R];
             accumulate(&mut acc, rows, stride, panel.as_ptr(), panel.len() / (V * L::N));
@@ -98,14 +95,14 @@ impl<L: Lanes> Tile<L> for Half {
 
     #[inline(always)]
     unsafe fn sums<const R: usize>(rows: *const f16, stride: usize, panel: &[f16]) -> [[L; V]; R] {
-        // SAFETY: by the contract of `Tile::sums`, rows have as many inputs as the panel,
-        // and those are whole vectors, since STEP is a vector's length.
+        // SAFETY: `check` found as many inputs in each row of `Rows` as in the panel, and a
+        // multiple of STEP, which is a whole vector.
         unsafe {
             let mut acc = [[L::splat(0.0); V]; R];
             let mut wide = [[0.0f32; WIDENED]; R];
             for (chunk, panel) in panel.chunks(WIDENED * V * L::N).enumerate() {
                 let k = panel.len() / (V * L::N);
-                // Widened once here, not for each panel's vector in the loop below.
+                // Widening here happens once per tile instead of once per vector of the panel.
                 for (r, wide) in wide.iter_mut().enumerate() {
                     let row = rows.add(r * stride + chunk * WIDENED);
                     for at in (0..k).step_by(L::N) {
@@ -131,8 +128,8 @@ impl<L: Lanes> Tile<L> for Byte {
         stride: usize,
         panel: &[i8],
     ) -> [[L::Int; V]; R] {
-        // SAFETY: by the contract of `Tile::sums`, rows have as many inputs as the panel,
-        // and those are whole groups of STEP.
+        // SAFETY: `check` found as many inputs in each row of `Rows` as in the panel, and a
+        // multiple of STEP, which is a whole group.
         unsafe {
             let mut acc = [[L::Int::splat(0); V]; R];
             let panel_start = panel.as_ptr().cast::<i32>();

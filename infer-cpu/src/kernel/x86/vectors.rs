@@ -1,4 +1,4 @@
-//! What works on vectors: products with columns, rounding, distances.
+//! Kernels on vectors: products with columns, rounding, distances.
 
 #![expect(clippy::needless_range_loop, reason = "vectors and points go by their number")]
 
@@ -12,8 +12,8 @@ use crate::kernel::{
     Candidate, GEMV_NR, I8_LARGEST, LevelSums, Panels, Rows, Soa, WIDTH_STEP, scalar,
 };
 
-/// [`crate::kernel::Gemv`]: a panel's sums stay in `B` vectors while its columns
-/// stream by, even and odd inputs apart for the sake of latency.
+/// [`crate::kernel::Gemv`]: the sums of a panel stay in `B` vectors while its columns stream by,
+/// separately for even and odd inputs to hide latency.
 ///
 /// # Safety
 /// The instruction set of `L`.
@@ -25,11 +25,12 @@ pub(in crate::kernel) unsafe fn gemv<L: Lanes, W: Weight, const B: usize>(
     out: &mut [f32],
 ) {
     assert!(B * L::N == GEMV_NR && weights.nr() == GEMV_NR && panels.end <= weights.n_panels());
+    // The loop addresses columns without bounds checks.
     assert!(nonzero.iter().all(|&(j, _)| (j as usize) < weights.inputs()));
     for (panel, out) in panels.zip(out.chunks_exact_mut(GEMV_NR)) {
         let columns = weights.panel(panel).as_ptr();
-        // SAFETY: inputs were checked above; a panel has a column of GEMV_NR weights
-        // for each of them, and as many biases, and scales where there are any.
+        // SAFETY: all inputs are below `inputs`, and `Panels` has a column of GEMV_NR weights for
+        // each, as many biases, and as many scales if there are any.
         unsafe {
             let mut sums = [[L::splat(0.0); B]; 2];
             let pairs = nonzero.chunks_exact(2);
@@ -62,7 +63,7 @@ unsafe fn add_column<L: Lanes, W: Weight, const B: usize>(
     value: f32,
 ) {
     for (v, sum) in sums.iter_mut().enumerate() {
-        // SAFETY: this function's contract.
+        // SAFETY: `Panels` has GEMV_NR = B * N weights in each column.
         unsafe { *sum = W::lanes::<L>(column.add(v * L::N)).fma(L::splat(value), *sum) };
     }
 }
@@ -75,12 +76,13 @@ unsafe fn add_column<L: Lanes, W: Weight, const B: usize>(
 pub(in crate::kernel) unsafe fn narrow_f16<L: Lanes>(values: &[f32], out: &mut [f16]) -> f32 {
     let whole = values.len().min(out.len()) / L::N * L::N;
     let mut lanes = [0.0f32; 16];
-    // SAFETY: whole vectors of both; 16 lanes at most.
+    // SAFETY: `whole` covers whole vectors of both slices; a vector has at most 16 lanes.
     unsafe {
         let mut largest = L::splat(0.0);
         for at in (0..whole).step_by(L::N) {
             let value = L::load(values.as_ptr().add(at));
             value.store_f16(out.as_mut_ptr().add(at));
+            // `max` returns its second operand if either is NaN, so NaN does not count.
             largest = value.abs().max(largest);
         }
         largest.store(lanes.as_mut_ptr());
@@ -101,7 +103,7 @@ pub(in crate::kernel) unsafe fn narrow_i8<L: Lanes>(
 ) -> u64 {
     let whole = values.len().min(out.len()) / L::N * L::N;
     let mut clipped = 0;
-    // SAFETY: whole vectors of both.
+    // SAFETY: the loop covers whole vectors of both slices.
     unsafe {
         let most = L::splat(f32::from(I8_LARGEST));
         for at in (0..whole).step_by(L::N) {
@@ -124,7 +126,7 @@ pub(in crate::kernel) unsafe fn levels<L: Lanes>(
     out: &mut [u8],
 ) -> LevelSums {
     assert!(row.len().is_multiple_of(WIDTH_STEP) && out.len() == row.len());
-    // SAFETY: whole vectors of both.
+    // SAFETY: the loop covers whole vectors of both slices.
     unsafe {
         let most = L::splat(f32::from(I8_LARGEST));
         let (mut lost, mut squares) = (L::splat(0.0), L::splat(0.0));
@@ -155,6 +157,7 @@ pub(in crate::kernel) unsafe fn peaks<L: Lanes>(
     // SAFETY: rows and results are `width` long, whole vectors.
     unsafe {
         for at in (0..width).step_by(L::N) {
+            // Rows are the inner loop, so that peaks stay in registers.
             let (mut peak, mut who) = (L::splat(f32::NEG_INFINITY), L::Int::splat(0));
             for (row, values) in values.chunks_exact(width).enumerate() {
                 let value = L::load(values.as_ptr().add(at));
@@ -185,6 +188,7 @@ pub(in crate::kernel) unsafe fn above_floors<L: Lanes>(
             let mut above = unsafe {
                 L::load(values.as_ptr().add(at)).greater(L::load(floors.as_ptr().add(at)))
             };
+            // Candidates are rare: most masks are 0.
             while above != 0 {
                 let channel = (at + above.trailing_zeros() as usize) as u16;
                 *found.get_mut(n)? = Candidate { row: row as u16, channel };
@@ -196,8 +200,7 @@ pub(in crate::kernel) unsafe fn above_floors<L: Lanes>(
     Some(n)
 }
 
-/// [`crate::kernel::PrefilterKernels::dots`]: four sums of every fourth vector each,
-/// for the sake of latency.
+/// [`crate::kernel::PrefilterKernels::dots`]: four sums, of every fourth vector each, hide latency.
 ///
 /// # Safety
 /// The instruction set of `L`.
@@ -243,9 +246,10 @@ pub(in crate::kernel) unsafe fn fps_step<L: Lanes>(
     let whole = n / L::N * L::N;
     let mut best = [-1.0f32; 16];
     let mut who = [i32::MAX; 16];
-    // SAFETY: whole vectors of all; 16 lanes at most.
+    // SAFETY: `whole` covers whole vectors of all slices; a vector has at most 16 lanes.
     unsafe {
         let (mut most, mut at_most) = (L::splat(-1.0), L::Int::splat(0));
+        // The number of the point in each lane, which `keep_greater` stores.
         let mut index =
             L::Int::load([0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15].as_ptr());
         let from = |axis: &[f32], at, pick| L::load(axis.as_ptr().add(at)).sub(L::splat(pick));
@@ -266,11 +270,13 @@ pub(in crate::kernel) unsafe fn fps_step<L: Lanes>(
     }
     let lanes = best.into_iter().zip(who);
     let (largest, first) = lanes.fold((-1.0, i32::MAX), |found, lane| {
+        // Lanes are not in the order of points: of equal distances, the lowest number wins.
         let better = lane.0 > found.0 || (lane.0 == found.0 && lane.1 < found.1);
         if better { lane } else { found }
     });
     let rest = Soa { x: &cloud.x[whole..], y: &cloud.y[whole..], z: &cloud.z[whole..] };
     let rest = whole + scalar::fps_step(rest, pick, &mut distance[whole..]);
     let is_farther = distance.get(rest).is_some_and(|&distance| distance > largest);
+    // Of equal distances, the point in a whole vector comes first.
     if is_farther || whole == 0 { rest } else { first as usize }
 }
