@@ -1,8 +1,8 @@
 #!/bin/sh
 # Makes FOLDER an environment of a CPython for aarch64 which EMULATOR runs:
 #     sh emulated-python.sh FOLDER EMULATOR...
-# The CPython is Debian's. apt and dpkg fetch and unpack it into FOLDER alone: nobody need be root,
-# and the system's own packages and architectures stay as they are.
+# The CPython is Debian's. apt and dpkg download and unpack it into FOLDER only, without root, and
+# do not change the packages and architectures of the system.
 set -eu
 
 folder="$1"

@@ -19,8 +19,8 @@ if command -v rustup >/dev/null 2>&1; then
     for target in $targets; do
         rustup target list --installed | grep -qx "$target" ||
             rustup target add "$target" ||
-            echo "Cannot fetch Rust's standard library for $target:" \
-                "checks of the code for it need it." >&2
+            echo "Cannot download Rust's standard library for $target:" \
+                "checks of the code for that target need it." >&2
     done
 else
     echo "No rustup here: install Rust's standard libraries for $targets yourself." >&2
@@ -57,7 +57,7 @@ has_llvm_mca || missing="$missing llvm"
 has_browser || missing="$missing chromium"
 has_pytorch || missing="$missing python3-torch"
 if [ -z "$missing" ]; then
-    echo "All packages are there: $backported $plain llvm chromium python3-torch"
+    echo "All packages are installed: $backported $plain llvm chromium python3-torch"
     exit 0
 fi
 if ! command -v apt-get >/dev/null 2>&1; then
@@ -120,7 +120,7 @@ if ! has_llvm_mca; then
         fi
     done
 fi
-# Where there is none to be had, what needs it says that it is skipped.
+# Tests that need one of these are skipped where it cannot be installed.
 if ! has_browser && apt-cache show chromium >/dev/null 2>&1; then
     missing_plain="$missing_plain chromium"
 fi

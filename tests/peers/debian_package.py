@@ -70,7 +70,7 @@ def packages():
         fetched = subprocess.run(
             ["cargo", "install", f"cargo-deb@{CARGO_DEB}", "--locked", "--debug",
              "--no-default-features", "--root", tools, "--target-dir", tools / "target"],
-            check=False)
+            check=False, env={**os.environ, "CARGO_PROFILE_DEV_DEBUG": "0"})
         if fetched.returncode != 0:
             skip("cargo-deb cannot be fetched")
         shutil.rmtree(tools / "target")

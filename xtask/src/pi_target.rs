@@ -1,5 +1,5 @@
-//! The Raspberry Pi as a compilation target: how programs for it are linked
-//! without a C compiler, and how they run here.
+//! The Raspberry Pi as a compilation target: its programs are linked without a C compiler, and run
+//! here in an emulator.
 
 use crate::workspace;
 use std::process::Command;
@@ -7,17 +7,17 @@ use std::process::Command;
 /// Static binaries that run on any 64-bit Raspberry Pi, whatever its system.
 pub const TRIPLE: &str = "aarch64-unknown-linux-musl";
 
-/// What to do about a missing emulator.
+/// The message about a missing emulator.
 pub const NO_EMULATOR: &str =
     "no qemu-aarch64 here knows the Cortex-A76: install qemu-user, QEMU 7.1 or newer";
 
 /// QEMU for one program.
 const EMULATOR: &str = "qemu-aarch64";
 /// The core of a Raspberry Pi 5. It has fp16 and dot products and no newer
-/// extension, so that a kernel which strays beyond traps.
+/// extension, so that a kernel that uses one traps.
 const CORE: &str = "cortex-a76";
 
-/// Runs a program for the Pi on this machine; `None` where nothing can.
+/// The emulator of the Pi on this machine; `None` if there is none.
 pub fn emulator() -> Option<Command> {
     let mut emulator = Command::new(EMULATOR);
     emulator.args(["-cpu", CORE]);

@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
 
-/// What the binary may weigh at most, so that it suits the smallest boards.
+/// The largest size of the binary, which suits the smallest boards.
 const MOST_BYTES: u64 = 4 << 20;
 
 /// Flags of `build-pi`.
@@ -19,7 +19,7 @@ pub struct Args {
     out: Option<PathBuf>,
 }
 
-/// Builds, checks and, where QEMU is there, tries the binary.
+/// Builds and checks the binary, and runs it in QEMU if that is installed.
 pub fn run(args: &Args) -> anyhow::Result<()> {
     workspace::need_standard_library(pi_target::TRIPLE)?;
     let built = build(&[])?;
@@ -40,9 +40,9 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     match pi_target::emulator() {
         Some(mut emulator) => {
             let version = workspace::output(emulator.arg(binary).arg("--version"))?;
-            println!("on an emulated Cortex-A76 it says: {}", version.trim());
+            println!("on an emulated Cortex-A76, --version prints: {}", version.trim());
         }
-        None => println!("not tried: {}", pi_target::NO_EMULATOR),
+        None => println!("not run: {}", pi_target::NO_EMULATOR),
     }
     println!("Copy it to a Raspberry Pi (64-bit system) and measure there:");
     println!("    scp {shown} pi@raspberrypi.local:infer-cpu");
@@ -51,11 +51,10 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Builds infer-cpu for the Pi, with these words for rustc besides, and returns
-/// where Cargo put it.
+/// Builds infer-cpu for the Pi, with more arguments for rustc, and returns its path.
 ///
 /// # Errors
-/// If it fails; Cargo has said why on the terminal.
+/// Cargo fails, and has printed the reason.
 pub fn build(for_rustc: &[&str]) -> anyhow::Result<PathBuf> {
     let words = ["rustc", "--package", "infer-cpu", "--bin", "infer-cpu", "--profile", "pi"];
     let mut cargo = pi_target::cargo(&words);
@@ -64,7 +63,7 @@ pub fn build(for_rustc: &[&str]) -> anyhow::Result<PathBuf> {
     workspace::executable(&messages, "infer-cpu")
 }
 
-/// Copies the program, its permissions as well; appears whole or not at all.
+/// Copies the program and its permissions. The copy is complete or absent.
 fn copy<'a>(from: &Path, to: &'a Path) -> anyhow::Result<&'a Path> {
     let mut source =
         fs::File::open(from).with_context(|| format!("cannot read {}", from.display()))?;

@@ -1,4 +1,4 @@
-//! Runs test programs through Cargo and counts their tests.
+//! Runs test programs and counts their tests.
 
 use crate::summary::{Counts, Summary};
 use anyhow::Context;
@@ -8,11 +8,10 @@ use std::process::{Command, Stdio};
 use test_support::SKIPPED_TESTS;
 use xtask::workspace::{root, words};
 
-/// Runs `cargo`, a `cargo test`, and shows what it prints.
+/// Runs `cargo`, which is `cargo test` or a test program, prints its output, and counts its tests.
 ///
 /// # Errors
-/// If it cannot be run, or fails without naming a test that failed: then
-/// something was not built, or a program was killed.
+/// The command cannot run.
 pub fn run(summary: &mut Summary, cargo: &mut Command) -> anyhow::Result<Counts> {
     let skipped_tests = root().join("target/skipped-tests.txt");
     fs::create_dir_all(root().join("target"))?;
