@@ -1,7 +1,7 @@
 //! Makes a dataset of files: begins or resumes it, scans its meshes, packs the clouds and writes
 //! the manifest.
 
-use crate::config::{DatasetConfig, Layout};
+use crate::config::Layout;
 use crate::difference::difference;
 use crate::error::DatasetError;
 use crate::export_layouts::check_layouts;
@@ -10,58 +10,19 @@ use crate::journal::{Journal, Terms};
 use crate::layout;
 use crate::manifest::{Manifest, is_plain};
 use crate::pipeline::scan_all;
+use crate::plan::{Begin, Plan};
 use crate::progress::{Progress, Stage};
-use crate::publish::retract;
+use crate::retract::retract;
 use formats::atomic;
 use sim_gpu::internals::caster::OpenCaster;
-use sim_gpu::internals::job::Culling;
 use sim_gpu::internals::mesh::tree::MeshEntry;
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::atomic::Ordering::SeqCst;
 
-/// A dataset, or a part of one, to be made.
-#[derive(Clone, Copy)]
-pub struct Plan<'a> {
-    /// The folder of the dataset.
-    pub out: &'a Path,
-    /// The settings of the dataset.
-    pub config: &'a DatasetConfig,
-    /// All meshes of the dataset.
-    pub meshes: &'a [MeshEntry],
-    /// The part to make: (number from 0, number of parts). By default it is the whole dataset.
-    pub part: Option<(u32, u32)>,
-    /// How a dataset that is in the folder already is treated. It is refused by default.
-    pub begin: Begin,
-    /// Whether beams that cannot hit a mesh are cast as well. They are not by default; the bytes
-    /// are the same.
-    pub culling: Culling,
-}
-
-/// How a dataset that is in the folder already is treated.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Begin {
-    /// It is refused.
-    #[default]
-    Fresh,
-    /// It is continued.
-    Resume,
-    /// It is removed first.
-    Overwrite,
-}
-
-impl<'a> Plan<'a> {
-    /// The whole dataset of `meshes` with the settings `config` in the folder `out`, which must
-    /// not hold a dataset yet.
-    #[must_use]
-    pub fn new(out: &'a Path, config: &'a DatasetConfig, meshes: &'a [MeshEntry]) -> Self {
-        Self { out, config, meshes, part: None, begin: Begin::Fresh, culling: Culling::On }
-    }
-}
-
 /// Makes the dataset of `plan` and returns its manifest. A part has every N-th mesh of the plan;
 /// [`merge()`](crate::merge()) makes one dataset of all parts. `caster` models
-/// [`DatasetConfig::cast_effects`].
+/// [`DatasetConfig::cast_effects`](crate::DatasetConfig::cast_effects).
 ///
 /// The same settings, meshes and adapter give the same bytes, however often the run was
 /// interrupted. A mesh that cannot be scanned is no error, but a failure that the manifest lists.

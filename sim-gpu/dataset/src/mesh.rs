@@ -5,7 +5,7 @@ use crate::clouds::Source;
 use crate::config::{DatasetConfig, SetConfig};
 use crate::error::DatasetError;
 use crate::layout;
-use crate::make::Plan;
+use crate::plan::Plan;
 use crate::progress::{Progress, Stage};
 use crate::record::{Cloud, FileRecord, MeshFailure, MeshRecord, ScanRecord, VariantRecord};
 use crate::view::{Rig, View};

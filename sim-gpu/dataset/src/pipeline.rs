@@ -5,8 +5,8 @@
 use crate::budget::{Budget, Share};
 use crate::error::DatasetError;
 use crate::journal::Journal;
-use crate::make::Plan;
 use crate::mesh::{Prepared, Run, prepare, write};
+use crate::plan::Plan;
 use crate::progress::{Progress, Stage};
 use crate::record::{Entry, MeshFailure, MeshRecord};
 use crate::view::{Rig, patterns};

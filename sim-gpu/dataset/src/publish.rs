@@ -9,6 +9,7 @@ use crate::error::DatasetError;
 use crate::journal::{read_json, write_json};
 use crate::layout;
 use crate::manifest::Manifest;
+use crate::retract::FILES;
 use crate::tars::{Cut, PartManifest, PartRecord, RootManifest, Sample, root_file};
 use crate::verify::is_unfinished;
 use formats::hash::Hashing;
@@ -50,9 +51,6 @@ enum Form {
     Tars { cut: Cut, splits: Vec<(Split, u64, u64)> },
 }
 
-/// The card and the metadata.
-const FILES: [&str; 2] = ["README.md", "croissant.json"];
-
 /// Writes the card and the metadata of the finished dataset in `out`, and returns their paths.
 ///
 /// # Errors
@@ -74,23 +72,6 @@ pub fn publish(
     write_json(&files[1], &metadata)?;
     atomic::write_bytes(&files[0], card)?;
     Ok(files)
-}
-
-/// Removes the card and the metadata from `out`, since they do not describe the dataset that will
-/// replace this one. A `README.md` that [`publish`] did not write stays.
-///
-/// # Errors
-/// A file that cannot be read or removed.
-pub fn retract(out: &Path) -> Result<(), DatasetError> {
-    let [card, metadata] = FILES.map(|name| out.join(name));
-    if !metadata.exists() {
-        return Ok(());
-    }
-    layout::remove(&metadata)?;
-    match std::fs::read_to_string(&card) {
-        Ok(text) if text.ends_with(card::CLOSE) => layout::remove(&card),
-        _ => Ok(()),
-    }
 }
 
 impl Facts {

@@ -3,6 +3,7 @@
 
 use super::{Facts, Form, Publication};
 use crate::config::{SetConfig, Viewpoints};
+use crate::retract::CLOSE;
 use crate::tars::Sample;
 use formats::hash::Hashing;
 use sim_gpu::internals::sensor::Views;
@@ -10,9 +11,6 @@ use std::fmt::Write;
 
 /// The tags by which such datasets are found.
 pub const TAGS: [&str; 4] = ["lidar", "point-cloud", "simulation", "synthetic"];
-
-/// The end of a card, by which [`retract`](super::retract) recognises it.
-pub const CLOSE: &str = "<!-- Written by `edgepuck card`. -->\n";
 
 /// Hugging Face's size categories: the least number of samples, and the name.
 const SIZES: [(u64, &str); 10] = [
