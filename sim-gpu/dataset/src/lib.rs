@@ -7,20 +7,20 @@
 //!
 //! ```
 //! use edgepuck_dataset::{DatasetConfig, Plan, Progress, SetConfig, Viewpoints, make, verify};
-//! use sim_gpu::{caster::Caster, mesh::tree::discover, sensor::Sensor};
+//! use sim_gpu::internals::{caster::OpenCaster, mesh::tree::discover, sensor::SensorProfile};
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let folder = std::env::temp_dir().join(format!("edgepuck-dataset-{}", std::process::id()));
 //! # std::fs::create_dir_all(folder.join("meshes/cup/train"))?;
 //! # let cup = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 1\n3 0 1 2\n";
 //! # std::fs::write(folder.join("meshes/cup/train/cup_1.off"), cup)?;
 //!
-//! let sensor = Sensor::builtin("generic-static").ok_or("no such sensor")?;
+//! let sensor = SensorProfile::builtin("generic-static").ok_or("no such sensor")?;
 //! let viewpoints = Viewpoints::Views(sensor.default_views());
 //! let set = SetConfig { name: "static".to_owned(), sensor, viewpoints };
 //! let config = DatasetConfig::new(vec![set]);
 //!
 //! let meshes = discover(&folder.join("meshes"), config.seed)?;
-//! let caster = Caster::Cpu(config.cast_effects());
+//! let caster = OpenCaster::Cpu(config.cast_effects());
 //! let out = folder.join("dataset");
 //! let plan = Plan::new(&out, &config, &meshes);
 //! let manifest = make(&plan, &caster, &Progress::default())?;
