@@ -25,8 +25,11 @@ pub struct Sensor {
     profile: Arc<SensorProfile>,
     pattern: Arc<OnceLock<Arc<BeamPattern>>>,
     /// The rays of its beams for the footprint that was asked for last.
-    widened: Arc<Mutex<Option<(Footprint, Arc<BeamPattern>)>>>,
+    widened: Arc<Mutex<Option<Widened>>>,
 }
+
+/// A footprint, and the rays that it makes of the beams.
+type Widened = (Footprint, Arc<BeamPattern>);
 
 impl Sensor {
     /// The built-in sensor of this name; [`Sensor::names`] lists them.
