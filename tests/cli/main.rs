@@ -14,6 +14,7 @@ mod end_to_end;
 #[cfg(unix)]
 mod exit_codes;
 mod export_onnx;
+mod golden;
 mod import_weights;
 mod interrupted;
 mod meshes;
