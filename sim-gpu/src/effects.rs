@@ -113,6 +113,7 @@ pub struct Intensity;
 ///
 /// [`Effects::per_ray`] lists them in the order of their outputs. The composition of the shader,
 /// the outputs of the CPU and the scans that read them all follow that list.
+#[doc(hidden)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum RayEffect {
@@ -127,6 +128,7 @@ pub enum RayEffect {
 }
 
 /// The input of an effect besides the ray and the triangle that it hits.
+#[doc(hidden)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RayInput {
     /// The ray's random bits, `streams` in the shader.
@@ -184,6 +186,7 @@ impl RayEffect {
 impl Effects {
     /// The effects that casters compute for each ray, in the order of their outputs. The other
     /// effects need the range, which is computed once all rays are cast.
+    #[doc(hidden)]
     pub fn per_ray(&self) -> impl Iterator<Item = RayEffect> + use<> {
         let noise = self.noise.map(|noise| match noise.model {
             NoiseModel::Range => RayEffect::NoiseRange(noise),
@@ -195,6 +198,7 @@ impl Effects {
     }
 
     /// The number of outputs of all effects for each ray.
+    #[doc(hidden)]
     #[must_use]
     pub fn outputs_per_ray(&self) -> usize {
         self.per_ray().map(|effect| effect.width()).sum()
@@ -217,6 +221,7 @@ impl Effects {
     /// # Errors
     /// If they refer to a quantum, a detection limit or a beam shape that the sensor does not
     /// state.
+    #[doc(hidden)]
     pub fn for_sensor(&self, sensor: &SensorProfile) -> Result<Self, InvalidValue> {
         let mut resolved = self.clone();
         if let Some(quantum) = &mut resolved.quantum
@@ -253,6 +258,7 @@ impl Effects {
     /// # Errors
     /// If neither the footprint nor the sensor states the width of beams; if there would be more
     /// than [`MAX_RAYS`](crate::sensor::MAX_RAYS) rays.
+    #[doc(hidden)]
     pub fn widen(
         &self,
         pattern: BeamPattern,
