@@ -19,7 +19,11 @@ fn what_cannot_be_exported_is_named_and_nothing_is_written() {
     for (code, words, cause) in [
         (1, "missing", "missing"),
         (1, "cut.safetensors", "too short for safetensors"),
-        (2, "untrained-test --critical-points", "name a number by --points"),
+        (
+            2,
+            "untrained-test --critical-points",
+            "does not state its number of points: give --points",
+        ),
         (2, "edge-64 --points 16", "--critical-points"),
         (2, "edge-64 --critical-points --points 0", "--points"),
     ] {

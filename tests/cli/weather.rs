@@ -264,7 +264,10 @@ fn a_sensor_moves_evenly_where_its_effects_say_so() {
     );
     folder.refuses(
         1,
-        &[("gen-drive street.toml --out a.pcap", "effects.motion: expected none in a drive")],
+        &[(
+            "gen-drive street.toml --out a.pcap",
+            "effects.motion: expected no motion, because a drive moves the sensor itself",
+        )],
     );
     let said =
         folder.edgepuck("gen-dataset meshes --out bad --effects fast.toml").output().unwrap();
