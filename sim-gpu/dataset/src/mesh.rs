@@ -8,11 +8,12 @@ use crate::layout;
 use crate::plan::Plan;
 use crate::progress::{Progress, Stage};
 use crate::record::{Cloud, FileRecord, MeshFailure, MeshRecord, ScanRecord, VariantRecord};
-use crate::view::{Rig, View};
+use crate::view::{self, Rig, View};
 use formats::hash::Hashing;
 use formats::scan_file::{ScanFormat, write_scan};
 use formats::vlp32c;
 use glam::DAffine3;
+use sim_gpu::Scene;
 use sim_gpu::internals::bvh::Builder;
 use sim_gpu::internals::job::{Cast, CastJob};
 use sim_gpu::internals::material::{Material, MaterialChoice, MaterialError, Materials};
@@ -43,8 +44,8 @@ pub(crate) struct Prepared<'a> {
     pub views: Vec<View<'a>>,
     /// The rays of each view.
     pub jobs: Vec<CastJob>,
-    /// The materials of the mesh, if the settings ask for them.
-    pub materials: Option<Materials>,
+    /// The mesh, where the views see it.
+    pub scene: Scene,
 }
 
 /// Reads the mesh of `entry` and aims every beam that may hit it.
@@ -75,14 +76,14 @@ pub(crate) fn prepare<'a>(run: &Run<'a>, entry: &MeshEntry) -> Result<Prepared<'
     };
     let builder = Builder::for_rays(surface.len(), views.iter().map(rays_of).sum());
     let target = progress.time(Stage::Build, || Target::new(surface, builder));
-    let jobs: Vec<CastJob> = progress.time(Stage::Aim, || {
-        views.iter().map(|view| view.aim(&target, materials.as_ref())).collect()
-    });
+    let scene = view::scene(config, target, materials);
+    let jobs: Vec<CastJob> =
+        progress.time(Stage::Aim, || views.iter().map(|view| view.aim(&scene)).collect());
     let cast: usize = jobs.iter().map(|job| job.beams.len()).sum();
     let beams: usize = views.iter().map(|view| view.pattern().len()).sum();
     progress.rays_cast.fetch_add(cast as u64, Relaxed);
     progress.rays_culled.fetch_add((beams - cast) as u64, Relaxed);
-    Ok(Prepared { record, views, jobs, materials })
+    Ok(Prepared { record, views, jobs, scene })
 }
 
 pub(crate) fn materials(
@@ -146,12 +147,11 @@ pub(crate) fn write(
     prepared: Prepared,
     casts: &[Cast],
 ) -> Result<MeshRecord, DatasetError> {
-    let Prepared { mut record, views, jobs, materials } = prepared;
+    let Prepared { mut record, views, jobs, scene } = prepared;
     for ((view, job), cast) in views.iter().zip(&jobs).zip(casts) {
         let hits = run.progress.time(Stage::Resolve, || view.resolve(job, cast));
         run.progress.rays_decided_in_f64.fetch_add(hits.decided_in_f64 as u64, Relaxed);
-        let hits = ObjectHits::alone(job, &hits, materials.as_ref());
-        let scan = write_view(run, &record, view, &hits)?;
+        let scan = write_view(run, &record, view, &view.hits(&scene, job, &hits))?;
         record.scans.push(scan);
     }
     Ok(record)

@@ -5,19 +5,18 @@ use crate::config::{DatasetConfig, Variant, Viewpoints};
 use crate::error::DatasetError;
 use crate::mesh::{materials, read};
 use crate::record::{Cloud, Entry};
-use crate::view::{Rig, View, patterns};
+use crate::view::{self, Rig, View, patterns};
 use formats::hash::Hashing;
 use formats::rng::StreamKey;
 use formats::{Scan, Split};
 use rayon::prelude::*;
+use sim_gpu::Scene;
 use sim_gpu::effects::Effects;
 use sim_gpu::internals::bvh::Builder;
 use sim_gpu::internals::caster::OpenCaster;
 use sim_gpu::internals::config::InvalidValue;
 use sim_gpu::internals::job::{CastJob, Culling};
-use sim_gpu::internals::material::Materials;
 use sim_gpu::internals::mesh::tree::MeshEntry;
-use sim_gpu::internals::scan::ObjectHits;
 use sim_gpu::internals::sensor::BeamPattern;
 use sim_gpu::internals::target::{Surface, Target};
 use std::collections::HashMap;
@@ -42,8 +41,14 @@ pub struct Clouds {
 /// A mesh in memory.
 struct Ready {
     entry: Entry,
-    target: Target,
-    materials: Option<Materials>,
+    scene: Scene,
+}
+
+impl Ready {
+    /// Bytes of the mesh and its BVH.
+    fn bytes(&self) -> usize {
+        self.scene.instances().iter().map(|instance| instance.mesh.target().bytes()).sum()
+    }
 }
 
 /// A cloud and its class.
@@ -250,7 +255,7 @@ impl Clouds {
         let made = cast.into_par_iter().zip(indices).map(|(cast, &index)| {
             let (Aimed { mesh, view, job }, cast) = cast?;
             let hits = view.resolve(&job, &cast);
-            let hits = ObjectHits::alone(&job, &hits, mesh.materials.as_ref());
+            let hits = view.hits(&mesh.scene, &job, &hits);
             let (scan, tally) = view.scan(self.variant, &hits)?;
             let (set, variant, entry) = (view.set, self.variant, &mesh.entry);
             let source = Source { set, variant, entry, view: view.number };
@@ -269,7 +274,7 @@ impl Clouds {
         let (id, number) = (mesh.entry.id(), self.view(index));
         let pose = rig.config.sets[0].pose(rig.config.seed, &id, number);
         let view = rig.view(0, number, pose, &id);
-        let job = view.aim(&mesh.target, mesh.materials.as_ref());
+        let job = view.aim(&mesh.scene);
         Ok(Aimed { mesh, view, job })
     }
 
@@ -284,7 +289,8 @@ impl Clouds {
         let materials = materials(entry, config)?;
         // Rays are cast at it in every epoch, which pays for the better tree.
         let target = Target::new(Surface::new(mesh, kept), Builder::Sah);
-        let ready = Arc::new(Ready { entry: record.entry, target, materials });
+        let ready =
+            Arc::new(Ready { entry: record.entry, scene: view::scene(config, target, materials) });
         lock().put(number, &ready);
         Ok(ready)
     }
@@ -329,7 +335,7 @@ impl Cache {
     }
 
     fn put(&mut self, number: usize, ready: &Arc<Ready>) {
-        let size = ready.target.bytes();
+        let size = ready.bytes();
         if size > self.most_bytes || self.meshes.contains_key(&number) {
             return;
         }
@@ -337,7 +343,7 @@ impl Cache {
             let oldest = self.meshes.iter().min_by_key(|(_, (used_at, _))| *used_at);
             let Some(oldest) = oldest.map(|(&number, _)| number) else { break };
             if let Some((_, leaving)) = self.meshes.remove(&oldest) {
-                self.bytes -= leaving.target.bytes();
+                self.bytes -= leaving.bytes();
             }
         }
         self.clock += 1;

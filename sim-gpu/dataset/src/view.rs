@@ -4,6 +4,7 @@
 use crate::config::{DatasetConfig, SetConfig, Variant};
 use formats::Scan;
 use formats::vlp32c::Revolution;
+use glam::DVec3;
 use sim_gpu::effects::Effects;
 use sim_gpu::internals::config::InvalidValue;
 use sim_gpu::internals::job::{Cast, CastJob, Culling};
@@ -14,6 +15,7 @@ use sim_gpu::internals::resolve::{Hits, resolve};
 use sim_gpu::internals::scan::{ObjectHits, PlacedTarget, ScanRequest, Tally, assemble};
 use sim_gpu::internals::sensor::BeamPattern;
 use sim_gpu::internals::target::Target;
+use sim_gpu::{Mesh, Scene};
 use std::slice::from_ref;
 use std::sync::Arc;
 
@@ -38,6 +40,14 @@ pub(crate) struct View<'a> {
     pub number: u32,
     rig: Rig<'a>,
     request: ScanRequest<'a>,
+}
+
+/// The scene of a mesh: one instance, at the origin.
+pub(crate) fn scene(config: &DatasetConfig, target: Target, materials: Option<Materials>) -> Scene {
+    let mut scene = Scene::new();
+    let id = scene.add(Mesh::from_target(target, DVec3::ZERO), Pose::IDENTITY);
+    (scene[id].reflectivity, scene[id].materials) = (config.reflectivity, materials.map(Arc::new));
+    scene
 }
 
 /// The beams of each set's sensor, widened to the footprint that the effects ask for.
@@ -83,11 +93,20 @@ impl View<'_> {
     }
 
     /// The rays to cast at the mesh.
-    pub fn aim(&self, target: &Target, materials: Option<&Materials>) -> CastJob {
-        let mut placed = PlacedTarget::new(target);
-        placed.reflectivity = self.rig.config.reflectivity as f32;
-        placed.materials = materials;
-        self.request.aim(&placed)
+    pub fn aim(&self, scene: &Scene) -> CastJob {
+        self.request.aim(&self.placed(scene))
+    }
+
+    /// The mesh of `scene`, whose random numbers are those of the view.
+    fn placed<'s>(&self, scene: &'s Scene) -> PlacedTarget<'s> {
+        let mut placed = scene.placed(|_| self.request.stream);
+        placed.pop().expect("invariant: a dataset's scene has one instance")
+    }
+
+    /// The hits of `job`, with the instance of `scene` that they lie on.
+    pub fn hits<'s>(&self, scene: &'s Scene, job: &'s CastJob, hits: &'s Hits) -> ObjectHits<'s> {
+        let materials = scene.instances().first().and_then(|mesh| mesh.materials.as_deref());
+        ObjectHits::alone(job, hits, materials)
     }
 
     /// Where the rays of `job` meet the mesh, from the answers of the caster.
