@@ -55,9 +55,6 @@ impl FromStr for AdapterRequest {
 
 impl OpenCaster {
     /// The caster that answers `request` and models `effects`.
-    ///
-    /// # Errors
-    /// If a named adapter is missing or the device cannot be opened.
     pub fn open(request: &AdapterRequest, effects: &Effects) -> Result<Self, CastError> {
         match request {
             AdapterRequest::Cpu => Ok(Self::Cpu(effects.clone())),
@@ -133,9 +130,6 @@ impl OpenCaster {
     }
 
     /// Starts casting all `jobs` together.
-    ///
-    /// # Errors
-    /// If the device is lost or out of memory, or a target does not fit.
     pub fn submit(&self, jobs: &[CastJob]) -> Result<Casting, CastError> {
         match self {
             Self::Cpu(_) => Ok(Casting::Done(self.cast_on_cpu(jobs))),
@@ -151,9 +145,6 @@ impl OpenCaster {
     }
 
     /// Casts `jobs` and waits.
-    ///
-    /// # Errors
-    /// As [`OpenCaster::submit`].
     pub fn cast(&self, jobs: &[CastJob]) -> Result<Vec<Cast>, CastError> {
         self.submit(jobs)?.wait()
     }
@@ -161,9 +152,6 @@ impl OpenCaster {
 
 impl Casting {
     /// The answers, one per job, in order.
-    ///
-    /// # Errors
-    /// If the device was lost.
     pub fn wait(self) -> Result<Vec<Cast>, CastError> {
         match self {
             Self::Done(casts) => Ok(casts),

@@ -81,9 +81,6 @@ impl InvalidValue {
 }
 
 /// Reads `file` and parses it.
-///
-/// # Errors
-/// Names the file and the cause.
 pub fn read<T: DeserializeOwned>(file: &Path) -> Result<T, ConfigError> {
     let failed = |source| ConfigError::Read { file: file.to_owned(), source };
     let opened = std::fs::File::open(file).map_err(failed)?;
@@ -96,9 +93,6 @@ pub fn read<T: DeserializeOwned>(file: &Path) -> Result<T, ConfigError> {
 }
 
 /// Parses `text`, which is in `file`.
-///
-/// # Errors
-/// Names the file and the cause.
 pub fn parse<T: DeserializeOwned>(text: &str, file: &Path) -> Result<T, ConfigError> {
     toml::from_str(text).map_err(|error| ConfigError::Syntax {
         file: file.to_owned(),
@@ -126,9 +120,6 @@ pub(crate) fn positive(key: &str, value: impl Into<Option<f64>>) -> Result<(), I
 }
 
 /// Checks that `value`, if there is one, lies in `range`.
-///
-/// # Errors
-/// Names the `key`, its range, and the value.
 pub fn within(
     key: &str,
     value: impl Into<Option<f64>>,

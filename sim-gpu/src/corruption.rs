@@ -94,9 +94,6 @@ pub struct Recorded<'a> {
 
 impl Corruption {
     /// Checks all numbers, under names that begin with `key`.
-    ///
-    /// # Errors
-    /// On the first that is not finite or out of its bounds.
     pub fn validate(&self, key: &str) -> Result<(), InvalidValue> {
         let share = |field: &str, x: f64| within(&format!("{key}.{field}"), x, 0.0..=1.0);
         match self {

@@ -217,10 +217,6 @@ impl Effects {
     }
 
     /// The same effects, with the values of `sensor` wherever they refer to the sensor's own.
-    ///
-    /// # Errors
-    /// If they refer to a quantum, a detection limit or a beam shape that the sensor does not
-    /// state.
     #[doc(hidden)]
     pub fn for_sensor(&self, sensor: &SensorProfile) -> Result<Self, InvalidValue> {
         let mut resolved = self.clone();
@@ -254,10 +250,6 @@ impl Effects {
     }
 
     /// The `pattern` of `sensor` with the number of rays per beam that the footprint asks for.
-    ///
-    /// # Errors
-    /// If neither the footprint nor the sensor states the width of beams; if there would be more
-    /// than [`MAX_RAYS`](crate::sensor::MAX_RAYS) rays.
     #[doc(hidden)]
     pub fn widen(
         &self,

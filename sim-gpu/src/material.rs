@@ -42,9 +42,6 @@ impl Material {
     }
 
     /// Checks both numbers, under names that begin with `key`.
-    ///
-    /// # Errors
-    /// On the first that is not within 0 to 1.
     pub fn validate(&self, key: &str) -> Result<(), InvalidValue> {
         within(&format!("{key}.reflectivity"), self.reflectivity, 0.0..=1.0)?;
         within(&format!("{key}.retroreflection"), self.retroreflection, 0.0..=1.0)

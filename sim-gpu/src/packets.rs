@@ -24,9 +24,6 @@ pub fn attributes(effects: &Effects, wanted: &AttributeSet) -> AttributeSet {
 
 /// `sensor` with its beams as packets encode them: they start on the axis, and azimuths are
 /// whole units at the start of a sequence.
-///
-/// # Errors
-/// If the sensor is not a VLP-32C, or its packets cannot encode its scans.
 pub fn as_packets_tell(sensor: &SensorProfile) -> Result<SensorProfile, InvalidValue> {
     let mut sensor = sensor.clone();
     if let Layout::Rotating(rotating) = &mut sensor.layout {
@@ -38,9 +35,6 @@ pub fn as_packets_tell(sensor: &SensorProfile) -> Result<SensorProfile, InvalidV
 }
 
 /// One revolution of `sensor`, as its packets encode it.
-///
-/// # Errors
-/// As [`as_packets_tell`]; if the beams are not as packets encode them.
 pub fn revolution(sensor: &SensorProfile) -> Result<Revolution, InvalidValue> {
     let Layout::Rotating(rotating) = &sensor.layout else {
         return Err(no_packets("rotating", "missing"));
@@ -65,10 +59,6 @@ pub fn revolution(sensor: &SensorProfile) -> Result<Revolution, InvalidValue> {
 }
 
 /// The returns in the packets of a scan with these `effects`, if they agree with `wanted`.
-///
-/// # Errors
-/// If the noise is not of the model [`NoiseModel::Range`] and so moves points off their beams; if
-/// packets cannot hold the returns, or they are not those `wanted`.
 pub fn returns(effects: &Effects, wanted: Option<Returns>) -> Result<Returns, InvalidValue> {
     if effects.noise.is_some_and(|noise| noise.model != NoiseModel::Range) {
         let cause = "moves points off their beams; take \"range\"";
@@ -94,9 +84,6 @@ pub fn returns(effects: &Effects, wanted: Option<Returns>) -> Result<Returns, In
 
 /// As [`returns`]; if beams may have several returns, in weather or with a width, and `effects` do
 /// not select any, sets those `wanted`.
-///
-/// # Errors
-/// As [`returns`].
 pub fn settle_returns(
     effects: &mut Effects,
     wanted: Option<Returns>,

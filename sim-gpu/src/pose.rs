@@ -134,10 +134,6 @@ pub(crate) fn azimuth_on_ring(view: u32, count: u32, first_azimuth_rad: f64) -> 
 /// ```
 ///
 /// An empty file is an empty list.
-///
-/// # Errors
-///
-/// Names the file, the pose and the cause.
 pub fn load_poses(file: &Path) -> Result<Vec<Pose>, ConfigError> {
     poses(config::read(file)?, file)
 }

@@ -123,9 +123,6 @@ impl Surface {
 impl Target {
     /// Reads the mesh at `path`, turns it z up by the default of its format, applies `normalize`,
     /// and prepares it for casting.
-    ///
-    /// # Errors
-    /// As [`load`].
     pub fn load(path: &Path, normalize: Normalize) -> Result<Self, MeshError> {
         let loaded = load(path)?;
         let world = to_world(&loaded.mesh, loaded.format.default_up(), normalize);

@@ -110,9 +110,6 @@ pub(crate) struct Packed<'a> {
 impl<'a> Scans<'a> {
     /// Passes the clouds of `part` to `take`: by mesh, then by view. Clouds that are not in memory
     /// are read on all cores, some at a time. Returns the scans that have too few points.
-    ///
-    /// # Errors
-    /// A scan that cannot be read or differs from its record; errors of `take`.
     pub fn for_each_cloud(
         &self,
         part: &Part<'a>,

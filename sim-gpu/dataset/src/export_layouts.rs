@@ -62,10 +62,6 @@ fn refuse_if(unfit: bool, layout: Layout, cause: &'static str) -> Result<(), Dat
 }
 
 /// Writes the layouts of the settings; returns their files, sorted.
-///
-/// # Errors
-/// As [`check_layouts`]; a scan that cannot be read or differs from its record; a file that cannot
-/// be written.
 pub(crate) fn write_layouts(scans: &Scans) -> Result<Vec<LayoutFile>, DatasetError> {
     check_layouts(scans.config, scans.classes)?;
     let mut files = Vec::new();

@@ -18,10 +18,6 @@ use std::path::Path;
 /// If it is killed at any moment and called again with the same arguments, it ends with the same
 /// bytes. All files that a manifest names exist as long as the manifest does. Nothing else may
 /// write to `out`.
-///
-/// # Errors
-/// A scan that cannot be read or differs from its record; a file that cannot be written or
-/// removed. The journal remains.
 pub fn finish(
     out: &Path,
     terms: &Terms,

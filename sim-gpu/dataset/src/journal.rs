@@ -74,43 +74,28 @@ impl Journal {
     }
 
     /// Begins a journal.
-    ///
-    /// # Errors
-    /// If the file cannot be written.
     pub fn begin(&self, terms: &Terms) -> Result<(), DatasetError> {
         write_json(&self.terms_file(), terms)
     }
 
     /// The terms of the run that was begun.
-    ///
-    /// # Errors
-    /// If the file cannot be read.
     pub fn terms(&self) -> Result<Terms, DatasetError> {
         read_json(&self.terms_file())
     }
 
     /// The record of `entry`, or `None` if some of its scans are missing.
-    ///
-    /// # Errors
-    /// If there is a record that cannot be read.
     pub fn find(&self, entry: &Entry) -> Result<Option<MeshRecord>, DatasetError> {
         let file = self.record_file(entry);
         if file.exists() { read_json(&file).map(Some) } else { Ok(None) }
     }
 
     /// Records that all scans of a mesh are there.
-    ///
-    /// # Errors
-    /// If the file cannot be written.
     pub fn note(&self, record: &MeshRecord) -> Result<(), DatasetError> {
         write_json(&self.record_file(&record.entry), record)
     }
 
     /// Removes the journal of a finished run, its terms first: if the process is killed meanwhile,
     /// [`Journal::exists`] is false already, and the next call removes the rest.
-    ///
-    /// # Errors
-    /// If a file cannot be removed.
     pub fn remove(&self) -> Result<(), DatasetError> {
         layout::remove(&self.terms_file())?;
         layout::remove(&self.folder)

@@ -49,9 +49,6 @@ pub(crate) struct Prepared<'a> {
 }
 
 /// Reads the mesh of `entry` and aims every beam that may hit it.
-///
-/// # Errors
-/// Why the mesh cannot be scanned.
 pub(crate) fn prepare<'a>(run: &Run<'a>, entry: &MeshEntry) -> Result<Prepared<'a>, MeshFailure> {
     let (config, progress) = (run.plan.config, run.progress);
     let (mut record, mesh, kept) =
@@ -139,9 +136,6 @@ pub(crate) fn read(
 }
 
 /// Writes every scan of one mesh; returns its complete record.
-///
-/// # Errors
-/// If a file cannot be written.
 pub(crate) fn write(
     run: &Run,
     prepared: Prepared,

@@ -32,9 +32,6 @@ pub(crate) fn classes(meshes: &[MeshEntry]) -> Vec<String> {
 
 /// Writes the sets at `paths`, of clouds of `n_points` points that `draw` makes of each of
 /// `meshes`. Returns the number of clouds of each set and the meshes that `draw` could not use.
-///
-/// # Errors
-/// What `draw` returns, except [`DatasetError::Mesh`]; a file that cannot be written.
 pub(crate) fn write_packed_sets(
     paths: &[PathBuf],
     n_points: usize,

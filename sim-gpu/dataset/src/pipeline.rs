@@ -53,10 +53,6 @@ struct Shared<'a> {
 
 /// Scans the meshes of `plan`, except those whose scans the journal records. Returns the records
 /// and the failures.
-///
-/// # Errors
-/// A file that cannot be written, an adapter that fails, or [`DatasetError::Interrupted`]. A mesh
-/// that cannot be read is no error, but a failure.
 pub(crate) fn scan_all(
     plan: &Plan,
     caster: &OpenCaster,

@@ -12,9 +12,6 @@ pub const CLOSE: &str = "<!-- Written by `edgepuck card`. -->\n";
 
 /// Removes the card and the metadata from `out`, since they do not describe the dataset that will
 /// replace this one. A `README.md` that [`publish()`](crate::publish()) did not write stays.
-///
-/// # Errors
-/// A file that cannot be read or removed.
 pub fn retract(out: &Path) -> Result<(), DatasetError> {
     let [card, metadata] = FILES.map(|name| out.join(name));
     if !metadata.exists() {

@@ -115,17 +115,11 @@ impl View<'_> {
     }
 
     /// The scan with the effects of `variant`.
-    ///
-    /// # Errors
-    /// Effects that do not fit the sensor.
     pub fn scan(&self, variant: Variant, hits: &ObjectHits) -> Result<(Scan, Tally), InvalidValue> {
         assemble(&self.request_of(variant)?, self.rig.cast_effects, from_ref(hits))
     }
 
     /// The scan with the attributes that packets hold, and the revolution of the sensor.
-    ///
-    /// # Errors
-    /// As [`View::scan`]; a sensor without packets.
     pub fn packets(
         &self,
         variant: Variant,

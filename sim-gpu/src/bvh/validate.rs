@@ -5,9 +5,6 @@ use glam::Vec3A;
 
 /// Panics unless in both trees every triangle is reached exactly once, every box contains its
 /// children, and leaves and paths are within the limits. For tests.
-///
-/// # Panics
-/// With a message that names the node.
 pub fn assert_well_formed(bvh: &Bvh) {
     assert_narrow_well_formed(bvh);
     assert_wide_well_formed(bvh);

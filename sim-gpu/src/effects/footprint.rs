@@ -46,9 +46,6 @@ impl Footprint {
     const USUAL_SAMPLES: u32 = 19;
 
     /// The same footprint with missing values taken from `sensor`.
-    ///
-    /// # Errors
-    /// If the sensor does not state them either.
     pub(super) fn for_sensor(&self, sensor: &SensorProfile) -> Result<Self, InvalidValue> {
         let own = sensor.footprint;
         let missing = |key: &str| {

@@ -44,9 +44,6 @@ pub struct Pending {
 
 impl GpuCaster {
     /// Opens `adapter` and compiles the shader variant that models `effects`.
-    ///
-    /// # Errors
-    /// If the adapter gives no device.
     pub fn open(adapter: &wgpu::Adapter, effects: &Effects) -> Result<Self, CastError> {
         let summary = adapter::summary(adapter);
         let descriptor = wgpu::DeviceDescriptor {
@@ -102,18 +99,12 @@ impl GpuCaster {
     }
 
     /// Uploads and starts `jobs`, in as few dispatches as the limits allow.
-    ///
-    /// # Errors
-    /// If a mesh exceeds the limits or the device failed.
     pub fn submit(&self, jobs: &[CastJob]) -> Result<Pending, CastError> {
         self.start(jobs, false)
     }
 
     /// Casts `jobs`, waits, and returns the seconds that tracing took by the adapter's own clock,
     /// without upload and read-back; `None` if the adapter has no timestamps.
-    ///
-    /// # Errors
-    /// As [`GpuCaster::submit`].
     pub fn cast_timed(&self, jobs: &[CastJob]) -> Result<(Vec<Cast>, Option<f64>), CastError> {
         self.start(jobs, true)?.collect()
     }
@@ -181,9 +172,6 @@ impl Pending {
     }
 
     /// The answers, one per job, in order.
-    ///
-    /// # Errors
-    /// If the device was lost.
     pub fn wait(self) -> Result<Vec<Cast>, CastError> {
         Ok(self.collect()?.0)
     }

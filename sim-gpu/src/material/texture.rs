@@ -12,9 +12,6 @@ pub(super) struct Texture {
 
 impl Texture {
     /// Reads the PNG or JPEG file at `path`; `luminance` is that of an sRGB colour.
-    ///
-    /// # Errors
-    /// If the file cannot be read.
     #[cfg(feature = "textures")]
     pub fn load(path: &Path, luminance: impl Fn([f64; 3]) -> f64) -> Result<Self, String> {
         let failed = |error: &dyn std::error::Error| format!("cannot be read: {error}");

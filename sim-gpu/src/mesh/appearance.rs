@@ -50,9 +50,6 @@ pub(crate) struct Colour {
 
 impl Appearance {
     /// Reads the OBJ file at `path`.
-    ///
-    /// # Errors
-    /// If the file is not OBJ or cannot be read, or has an invalid index or number.
     pub fn load(path: &Path) -> Result<Self, MeshError> {
         if MeshFormat::from_path(path) != Some(MeshFormat::Obj) {
             let cause = "expected an OBJ file, whose faces have colours, found another format";
@@ -112,9 +109,6 @@ impl Appearance {
 }
 
 /// The materials in the MTL file at `path`.
-///
-/// # Errors
-/// If the file cannot be read, or has an invalid colour.
 pub(crate) fn colours(path: &Path) -> Result<Vec<Colour>, MeshError> {
     parse_colours(&read(path)?, path).map_err(malformed(path))
 }

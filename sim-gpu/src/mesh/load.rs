@@ -23,21 +23,11 @@ pub struct LoadedMesh {
 }
 
 /// Reads the mesh at `path`, in the format of its extension.
-///
-/// # Errors
-///
-/// [`MeshError`] names the path, the line if known, and the cause: the file cannot be read, is not
-/// a regular file, is empty, truncated or not of its format, has an index out of range or a
-/// coordinate that is not finite, or has no triangle.
 pub fn load(path: &Path) -> Result<LoadedMesh, MeshError> {
     Ok(load_hashed(path, Hashing::None)?.0)
 }
 
 /// As [`load`], with the hash of the file's bytes that `hashing` asks for. The file is read once.
-///
-/// # Errors
-///
-/// As [`load`].
 pub fn load_hashed(
     path: &Path,
     hashing: Hashing,
@@ -53,10 +43,6 @@ pub fn load_hashed(
 }
 
 /// Reads a mesh of `format` from a file's bytes.
-///
-/// # Errors
-///
-/// As [`load`], without the path.
 pub fn parse(bytes: &[u8], format: MeshFormat) -> Result<Parsed, ParseError> {
     let parsed = match format {
         _ if bytes.is_empty() => Err(Malformed::Empty.into()),
@@ -80,9 +66,6 @@ pub(super) fn read(path: &Path) -> Result<Vec<u8>, MeshError> {
 }
 
 /// Checks that `mesh` has the properties of [`LoadedMesh::mesh`].
-///
-/// # Errors
-/// If a vertex is not finite, an index is out of range, or there is no triangle.
 pub fn check(mesh: &TriangleMesh) -> Result<(), ParseError> {
     let n_vertices = mesh.vertices.len() as u64;
     Malformed::check_vertex_count(n_vertices)?;

@@ -79,10 +79,6 @@ pub enum TreeError {
 ///
 /// Links are followed, except to a folder that contains them. Files with other extensions, files
 /// and folders whose name begins with a dot, and `__MACOSX` are ignored.
-///
-/// # Errors
-///
-/// [`TreeError`]: a folder cannot be read, the path of a mesh is not Unicode, or there is no mesh.
 pub fn discover(root: &Path, seed: u64) -> Result<Vec<MeshEntry>, TreeError> {
     let absolute =
         root.canonicalize().map_err(|source| TreeError::Read { path: root.into(), source })?;

@@ -22,9 +22,6 @@ const ORIGIN_BEYOND_M: f64 = 1024.0;
 
 /// Assembles the scan that `request` asks for from the hits of all `objects`, which a caster of
 /// `cast_effects` computed. Points are in firing order.
-///
-/// # Errors
-/// As [`ScanRequest::applied_effects`].
 pub fn assemble(
     request: &ScanRequest,
     cast_effects: &Effects,

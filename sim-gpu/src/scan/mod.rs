@@ -59,10 +59,6 @@ pub struct Scanned {
 }
 
 /// The scan of `target` that `request` asks for. `target` stands where its mesh says.
-///
-/// # Errors
-/// [`ScanError`]: the adapter failed, or the request asks for what its sensor
-/// or `caster` does not have.
 pub fn scan(
     caster: &OpenCaster,
     target: &Target,
@@ -73,9 +69,6 @@ pub fn scan(
 
 /// As [`scan()`], for many targets and requests, whose rays are cast together.
 /// The scans stand in the order of the requests.
-///
-/// # Errors
-/// As [`scan()`].
 pub fn scan_many(
     caster: &OpenCaster,
     requests: &[(&Target, ScanRequest)],
@@ -87,9 +80,6 @@ pub fn scan_many(
 }
 
 /// The scan that `request` asks for of several objects: each beam returns from the nearest one.
-///
-/// # Errors
-/// As [`scan()`].
 pub fn scan_objects(
     caster: &OpenCaster,
     objects: &[PlacedTarget],

@@ -100,10 +100,6 @@ impl<'a> ScanRequest<'a> {
 
     /// The effects that this scan applies if the caster models `cast_effects`,
     /// with the sensor's own quantum filled in.
-    ///
-    /// # Errors
-    /// As [`Effects::for_sensor`]; if intensity is wanted as an attribute and the caster does
-    /// not model it; if beams are to be wider than those of the pattern.
     pub fn applied_effects(&self, cast_effects: &Effects) -> Result<Effects, InvalidValue> {
         if self.attributes.contains(&Attribute::Intensity) && cast_effects.intensity.is_none() {
             let cause = "expected a caster that models intensity, found one without";

@@ -88,10 +88,6 @@ pub struct SceneSensor {
 
 impl SceneFile {
     /// Reads a scene and its sensor profiles.
-    ///
-    /// # Errors
-    ///
-    /// Names the file, the key and the cause.
     pub fn load(file: &Path) -> Result<Self, ConfigError> {
         let table: table::SceneTable = config::read(file)?;
         Self::from_table(table, file)
@@ -99,10 +95,6 @@ impl SceneFile {
 
     /// Parses the text of a scene in `file`, which need not exist; relative paths start from its
     /// folder.
-    ///
-    /// # Errors
-    ///
-    /// As [`SceneFile::load`].
     pub fn parse(text: &str, file: &Path) -> Result<Self, ConfigError> {
         Self::from_table(config::parse(text, file)?, file)
     }
@@ -170,9 +162,6 @@ impl SceneFile {
 
     /// Checks that triangle numbers are not an attribute of simplified meshes, whose triangles
     /// differ from those of the file.
-    ///
-    /// # Errors
-    /// If they are.
     pub fn check_triangles(&self) -> Result<(), InvalidValue> {
         if self.simplifies() && self.attributes.contains(&Attribute::Triangle) {
             let cause = "a simplified mesh does not have the file's triangles, so that the \

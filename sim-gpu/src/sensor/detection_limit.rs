@@ -28,9 +28,6 @@ impl DetectionLimit {
     }
 
     /// Checks both numbers, under the names that begin with `key`.
-    ///
-    /// # Errors
-    /// On the first that is not finite or out of its bounds.
     pub(crate) fn validate(&self, key: &str) -> Result<(), InvalidValue> {
         positive(&format!("{key}.reflectivity"), self.reflectivity)?;
         within(&format!("{key}.reflectivity"), self.reflectivity, 0.0..=1.0)?;

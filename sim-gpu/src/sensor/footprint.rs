@@ -23,9 +23,6 @@ const WIDEST_DEG: f64 = 90.0;
 
 impl BeamShape {
     /// Checks all numbers, under the names that begin with `key`.
-    ///
-    /// # Errors
-    /// On the first that is not finite or out of its bounds.
     pub(crate) fn validate(&self, key: &str) -> Result<(), InvalidValue> {
         Self::check_divergence(key, self.divergence_deg)?;
         within(&format!("{key}.separation_m"), self.separation_m, 0.0..=f64::MAX)

@@ -151,10 +151,6 @@ impl SensorProfile {
 
     /// Reads a profile or, if the name of `file` ends with `.json`, the metadata of an Ouster
     /// sensor.
-    ///
-    /// # Errors
-    ///
-    /// Names the file, the key and the cause.
     pub fn load(file: &Path) -> Result<Self, ConfigError> {
         if file.extension().is_some_and(|extension| extension == "json") {
             return ouster::load(file);
@@ -165,20 +161,11 @@ impl SensorProfile {
     }
 
     /// A built-in sensor by name, or else a profile by path.
-    ///
-    /// # Errors
-    ///
-    /// As [`SensorProfile::load`]; if there is neither such a name nor such a
-    /// file, the error lists the known names.
     pub fn resolve(name_or_path: &str) -> Result<Self, ConfigError> {
         Self::resolve_in(Path::new(""), name_or_path)
     }
 
     /// As [`SensorProfile::resolve`], with relative paths taken from `folder`.
-    ///
-    /// # Errors
-    ///
-    /// As [`SensorProfile::resolve`].
     pub fn resolve_in(folder: &Path, name_or_path: &str) -> Result<Self, ConfigError> {
         if let Some(sensor) = Self::builtin(name_or_path) {
             return Ok(sensor);
@@ -208,9 +195,6 @@ impl SensorProfile {
     }
 
     /// The same sensor with this number of revolutions, or frames, per scan.
-    ///
-    /// # Errors
-    /// If all scans of the sensor are equal, or there would be too many rays.
     pub fn with_revolutions(self, revolutions: NonZeroU32) -> Result<Self, InvalidValue> {
         let repeated = Self { revolutions, ..self };
         repeated.check_revolutions()?;

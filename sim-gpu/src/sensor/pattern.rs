@@ -90,9 +90,6 @@ impl BeamPattern {
 
     /// The same beams with a width: each is sampled by `samples` rays of equal power in a Gaussian
     /// beam with these full angles of divergence, horizontal and vertical.
-    ///
-    /// # Errors
-    /// If the pattern would have more than [`MAX_RAYS`] rays.
     pub(crate) fn widened(&self, samples: u32, divergence_deg: [f64; 2]) -> Result<Self, String> {
         let n_rays = self.len() as u64 * u64::from(samples);
         if n_rays > MAX_RAYS {

@@ -86,10 +86,6 @@ impl Views {
     }
 
     /// Checks all numbers.
-    ///
-    /// # Errors
-    ///
-    /// On the first number that is not finite or out of its bounds.
     pub fn validate(&self) -> Result<(), InvalidValue> {
         positive("views.distance_m", self.distance_m)?;
         at_least("views.distance_to_m", self.distance_to_m, self.distance_m)?;

@@ -78,9 +78,6 @@ impl Simplify {
 ///
 /// The vertices are some of the mesh's own. As in a file, some triangles may be degenerate or
 /// duplicates.
-///
-/// # Errors
-/// If this build does not include decimation.
 #[cfg(feature = "simplify")]
 pub fn simplified(
     mesh: &TriangleMesh,
@@ -91,18 +88,12 @@ pub fn simplified(
 }
 
 /// Stands in for decimation, which this build does not include.
-///
-/// # Errors
-/// Always.
 #[cfg(not(feature = "simplify"))]
 pub fn simplified(_: &TriangleMesh, _: &[u32], _: f64) -> Result<Option<TriangleMesh>, NotBuilt> {
     Err(NotBuilt)
 }
 
 /// The surface of [`simplified`], or of the `kept` triangles of `mesh` if that saves too little.
-///
-/// # Errors
-/// If this build does not include decimation.
 pub fn simplified_surface(
     mesh: TriangleMesh,
     kept: Vec<u32>,
