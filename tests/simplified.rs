@@ -11,7 +11,6 @@ use rayon::prelude::*;
 use sim_gpu::effects::Effects;
 use sim_gpu::internals::caster::OpenCaster;
 use sim_gpu::internals::cpu::oracle;
-use sim_gpu::internals::job::Culling;
 use sim_gpu::internals::mesh::frame::{Normalize, to_world};
 use sim_gpu::internals::mesh::tree::discover;
 use sim_gpu::internals::mesh::validate::triangle_stats;
@@ -22,7 +21,7 @@ use sim_gpu::internals::sensor::{SensorProfile, Views};
 use sim_gpu::internals::simplify::{Viewpoint, distance_to_surface, resolved_m, simplified};
 use sim_gpu::internals::surface_points::area_uniform;
 use sim_gpu::internals::target::Target;
-use sim_gpu::{Scan, Scene};
+use sim_gpu::Scene;
 use test_support::{need, shared_data};
 use tests::casting::{builtin, job, target};
 use tests::meshes;
@@ -248,7 +247,6 @@ const SCENE: &str = "[[object]]\nmesh = \"fine.off\"\nup = \"z\"\nscale = [1, 1,
 fn a_scene_says_which_objects_are_simplified() {
     let folder = tempfile::tempdir().unwrap();
     edgepuck_shapes::write_off(&meshes::icosphere(5), &folder.path().join("fine.off")).unwrap();
-    let caster = OpenCaster::Cpu(Effects::default());
     let scan = |scene_key: &str, object_key: &str| {
         let object = format!("{object_key}\nup =");
         let text = format!("{scene_key}\n{}", SCENE.replacen("up =", &object, 1));
@@ -268,7 +266,7 @@ fn a_scene_says_which_objects_are_simplified() {
     // object's least factor, 0.5, halves what is promised of it.
     let step_m = 9.0 * (0.199_065_6f64 / 4.0).to_radians().tan();
     assert!((made.bound_m / (0.5 * step_m) - 1.0).abs() < 1e-3, "{made:?}");
-    assert_ne!(auto.scan, plain.scan);
+    assert_ne!(auto.0.points, plain.0.points);
     let two_metres = scan("simplify = 0.002", "");
-    assert_eq!(two_metres.simplified[0].unwrap().bound_m, 0.002);
+    assert_eq!(two_metres.1.unwrap().bound_m, 0.002);
 }
