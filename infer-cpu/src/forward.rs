@@ -27,9 +27,6 @@ pub struct Loaded {
 }
 
 /// Loads `model` with `options` and packs it for `kernels`, which must support `precision`.
-///
-/// # Errors
-/// A source that is not a model; threads that cannot be started.
 pub fn load(
     model: &ModelSource,
     options: &Options,

@@ -84,9 +84,6 @@ pub struct Vector<T: Format> {
 const UNKNOWN_RANGE: f32 = 1.0;
 
 /// Reads and packs the network of `file`, with the calibrated ranges of `card`.
-///
-/// # Errors
-/// As [`read_network`].
 pub fn pack<T: Format>(
     file: &mut WeightsFile,
     card: &ModelCard,

@@ -82,17 +82,11 @@ pub enum Role {
 const WIDEST: usize = 1 << 16;
 
 /// Reads the card and the network of the model file at `path`, in f32, with batch norms folded in.
-///
-/// # Errors
-/// A file that is not a model, as for [`crate::Classifier::load`].
 pub fn read(path: &Path) -> Result<(ModelCard, Network<Dense, Dense>), FormatError> {
     read_source(&ModelSource::File(path.to_path_buf()))
 }
 
 /// Does the same for the `bytes` of a model file, which errors call `name`.
-///
-/// # Errors
-/// Bytes that are not a model file, as for [`crate::Classifier::from_bytes`].
 pub fn read_bytes(
     name: &Path,
     bytes: Arc<[u8]>,
@@ -108,9 +102,6 @@ fn read_source(model: &ModelSource) -> Result<(ModelCard, Network<Dense, Dense>)
 
 /// Reads the network of `file`. `conv` or `fc` converts each layer as soon as it is read, so that
 /// at most one is in memory twice.
-///
-/// # Errors
-/// Tensors that are missing, unknown, of a wrong shape, or not finite.
 pub fn read_network<C, F>(
     file: &mut WeightsFile,
     card: &ModelCard,

@@ -30,9 +30,6 @@ pub struct Selection {
 
 impl Selection {
     /// A selection by `spec`; `front` is the pass that a Critical Points Layer pools.
-    ///
-    /// # Errors
-    /// An invalid specification.
     pub fn new(spec: &SamplerSpec, front: Option<Pass>) -> Result<Self, Error> {
         let coordinates_alone = match spec.kind {
             SamplerKind::Cpl => SamplerSpec { kind: SamplerKind::All, ..spec.clone() },
@@ -54,9 +51,6 @@ impl Selection {
     }
 
     /// The same selection with its own working memory.
-    ///
-    /// # Errors
-    /// As [`Selection::new`].
     pub fn twin(&self) -> Result<Self, Error> {
         Self::new(&self.spec, self.front)
     }
@@ -85,9 +79,6 @@ impl Selection {
 
     /// Chooses from `points` and returns the chosen indices: M of them, or as many as the sampler
     /// yields, repetitions included.
-    ///
-    /// # Errors
-    /// Errors of the sampler.
     pub fn select(
         &mut self,
         points: &[[f32; 3]],
@@ -137,9 +128,6 @@ impl Selection {
     }
 
     /// Allocates memory for clouds of `n` points.
-    ///
-    /// # Errors
-    /// Errors of the sampler.
     pub fn reserve(
         &mut self,
         n: usize,
@@ -167,9 +155,6 @@ impl Selection {
 }
 
 /// The pass of front end `choice` in a network with these parts.
-///
-/// # Errors
-/// The network lacks it.
 pub fn front_pass(choice: FrontChoice, parts: &Parts) -> Result<Pass, Error> {
     let lacks = |what: &'static str| Err(Error::FrontMissing { choice, what });
     match choice {

@@ -29,9 +29,6 @@ impl ModelSource {
     }
 
     /// Reads a file into memory.
-    ///
-    /// # Errors
-    /// A file that cannot be read or is not safetensors.
     pub fn into_memory(self) -> Result<Self, FormatError> {
         match self {
             Self::File(name) => {
@@ -52,9 +49,6 @@ impl ModelSource {
     }
 
     /// Opens the tensors and reads the card.
-    ///
-    /// # Errors
-    /// A file that cannot be read, is not safetensors, or has invalid metadata.
     pub fn open(&self) -> Result<(WeightsFile, ModelCard), FormatError> {
         let file = match self {
             Self::File(path) => WeightsFile::open(path)?,

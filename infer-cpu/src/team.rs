@@ -96,9 +96,6 @@ pub const MOST_CHUNKS: usize = u16::MAX as usize;
 
 impl<W: Work> Team<W> {
     /// A team of `n_threads`, one of which is the caller of [`Team::run`].
-    ///
-    /// # Errors
-    /// A thread cannot be started.
     pub fn new(work: W, n_threads: usize) -> std::io::Result<Self> {
         let n_workers = n_threads.max(1) - 1;
         let work = Arc::new(work);

@@ -20,9 +20,6 @@ pub struct TestTimeAugmentation {
 impl TestTimeAugmentation {
     /// The augmentation that `options` request, for a network of `n_classes` with the sampler
     /// `spec`.
-    ///
-    /// # Errors
-    /// Several votes without rotations, and a sampler without random draws.
     pub fn new(options: &Options, spec: &SamplerSpec, n_classes: usize) -> Result<Self, Error> {
         let n = options.votes.max(1);
         if n > 1 && spec.kind != SamplerKind::Random && !options.vote_rotations {

@@ -18,9 +18,6 @@ const SQUARE: &str = ".adam_square";
 
 /// Writes the state of `trainer`, the `digest` of its training data and `notes` to `path`,
 /// atomically.
-///
-/// # Errors
-/// A file that cannot be written.
 pub fn write(path: &Path, trainer: &mut Trainer, digest: &str, notes: &str) -> Result<(), Error> {
     let mut tensors = model_file::tensors(&mut trainer.model);
     for parameter in trainer.model.parameters() {
@@ -42,10 +39,6 @@ pub fn write(path: &Path, trainer: &mut Trainer, digest: &str, notes: &str) -> R
 
 /// Sets `trainer`, whose training data have this `digest`, to the state in the checkpoint at
 /// `path`. Returns the notes of the checkpoint.
-///
-/// # Errors
-/// A file that is not a checkpoint; a checkpoint of another recipe, of other data, or of more
-/// epochs than the recipe has.
 pub fn read(path: &Path, trainer: &mut Trainer, digest: &str) -> Result<String, Error> {
     let mut file = WeightsFile::open(path)?;
     let metadata = file.metadata();

@@ -62,18 +62,12 @@ impl Clouds {
     /// - a folder of ModelNet40's HDF5 files (`modelnet40_ply_hdf5_2048`), with feature `hdf5`;
     /// - a folder of text files as in yanx27/Pointnet_Pointnet2_pytorch. The first `most_points`
     /// -   points of each file are read.
-    ///
-    /// # Errors
-    /// Data that cannot be read; a set without clouds; a coordinate that is not finite.
     pub fn read(path: &Path, split: Split, most_points: usize) -> Result<Self, Error> {
         Self::read_for(Normalization::UnitSphere, path, split, most_points)
     }
 
     /// Reads as [`Clouds::read`] does, for a network of this `normalization`. Clouds for a network
     /// that takes metres stay unchanged, because training and infer-cpu move each of them.
-    ///
-    /// # Errors
-    /// As [`Clouds::read`].
     pub fn read_for(
         normalization: Normalization,
         path: &Path,
@@ -108,9 +102,6 @@ impl Clouds {
     }
 
     /// Reads the `split` of the packed data at `path` and leaves its clouds unchanged.
-    ///
-    /// # Errors
-    /// As [`Clouds::read`].
     pub fn read_unmoved(path: &Path, split: Split) -> Result<Self, Error> {
         let file = packed(path, split).unwrap_or_else(|| path.to_path_buf());
         Self::checked(read_labelled(&file)?, path)
@@ -161,9 +152,6 @@ impl Clouds {
     }
 
     /// These clouds followed by `others`. Of the remarks, only the names are kept.
-    ///
-    /// # Errors
-    /// Clouds whose classes differ.
     pub fn concat(&self, others: &Self) -> Result<Self, String> {
         if self.classes != others.classes {
             return Err(format!(

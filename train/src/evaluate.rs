@@ -13,9 +13,6 @@ use crate::error::Error;
 const CHUNK: usize = 128;
 
 /// The confusion matrix of the model at `path` on `clouds`.
-///
-/// # Errors
-/// A model that infer-cpu refuses; a number of classes other than the clouds'.
 pub fn confusion(path: &Path, clouds: &Clouds, options: &Options) -> Result<Evaluation, Error> {
     let n = clouds.classes.len();
     let parts = in_chunks(path, clouds, options, |classifier, some| {
@@ -32,9 +29,6 @@ pub fn confusion(path: &Path, clouds: &Clouds, options: &Options) -> Result<Eval
 }
 
 /// The predictions of the model at `path` for `clouds`, whose classes may differ from the model's.
-///
-/// # Errors
-/// A model or a cloud that infer-cpu refuses.
 pub fn predictions(
     path: &Path,
     clouds: &Clouds,

@@ -33,9 +33,6 @@ const CLOUDS: usize = 256;
 
 /// Sets the network of `trainer` to the model at `path`. `card` is the card of the network in
 /// training.
-///
-/// # Errors
-/// A file that is not a model; a model whose inputs or layers differ from the recipe's.
 pub fn start(
     trainer: &mut Trainer,
     path: &Path,

@@ -64,9 +64,6 @@ impl Explanation {
 }
 
 /// Explains the answer of `classifier` to `points`.
-///
-/// # Errors
-/// A cloud that the classifier refuses.
 pub fn explain(
     classifier: &mut Classifier,
     points: &[[f32; 3]],

@@ -55,9 +55,6 @@ impl Metrics {
     }
 
     /// Reads the text of a checkpoint.
-    ///
-    /// # Errors
-    /// Text that [`Metrics::to_notes`] did not write.
     pub fn from_notes(notes: &str) -> Result<Self, serde_json::Error> {
         serde_json::from_str(notes)
     }
@@ -74,9 +71,6 @@ impl Metrics {
     }
 
     /// Writes `metrics.csv` and `curve.svg` to `folder`.
-    ///
-    /// # Errors
-    /// A file that cannot be written.
     pub fn write(&self, folder: &Path) -> Result<(), FormatError> {
         atomic::write_bytes(&folder.join("metrics.csv"), self.to_csv())?;
         atomic::write_bytes(&folder.join("curve.svg"), self.curve())

@@ -26,9 +26,6 @@ pub fn tensors(network: &mut dyn Module) -> BTreeMap<String, Tensor> {
 }
 
 /// Writes the weights and batch norms of `network` to `path` in f32, atomically.
-///
-/// # Errors
-/// A file that cannot be written.
 pub fn write(path: &Path, network: &mut dyn Module, card: &ModelCard) -> Result<(), Error> {
     let mut tensors = tensors(network);
     tensors.retain(|name, _| !name.starts_with(TRAINING_ONLY));
@@ -37,9 +34,6 @@ pub fn write(path: &Path, network: &mut dyn Module, card: &ModelCard) -> Result<
 
 /// Sets `network` to the weights that [`write()`] wrote to `path`. Parameters that serve only
 /// training keep their values.
-///
-/// # Errors
-/// A file that is not a model; a model of another shape.
 pub fn read(path: &Path, network: &mut dyn Module) -> Result<(), Error> {
     let mut file = WeightsFile::open(path)?;
     for parameter in network.parameters() {
@@ -52,9 +46,6 @@ pub fn read(path: &Path, network: &mut dyn Module) -> Result<(), Error> {
 }
 
 /// Sets `values` to the tensor `name` of `file`.
-///
-/// # Errors
-/// A tensor that is missing, that cannot be read or that has another number of elements.
 pub fn read_into(
     file: &mut WeightsFile,
     name: &str,
@@ -71,9 +62,6 @@ pub fn read_into(
 
 /// Writes `network` to `path` for release, in f16 and with the batch norms folded into the linear
 /// layers, atomically.
-///
-/// # Errors
-/// A weight that f16 cannot hold; a file that cannot be written.
 pub fn ship(path: &Path, network: &mut dyn Module, card: &ModelCard) -> Result<(), Error> {
     let mut tensors = BTreeMap::new();
     for layer in network.folded() {

@@ -31,9 +31,6 @@ pub struct PointEncoder {
 
 impl PointEncoder {
     /// A point encoder with random weights.
-    ///
-    /// # Errors
-    /// An unknown rule of resizing.
     pub fn new(cpl: &Cpl, n_classes: usize, seed: u64) -> Result<Self, String> {
         let widths = [&[3], &cpl.front[..]].concat();
         let pooled = widths[widths.len() - 1];

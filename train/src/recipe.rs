@@ -271,9 +271,6 @@ impl Default for Augment {
 
 impl Recipe {
     /// Reads the recipe at `path`.
-    ///
-    /// # Errors
-    /// A file that is not TOML or has unknown keys; the errors of [`Recipe::check`].
     pub fn read(path: &Path) -> Result<Self, Error> {
         let text = std::fs::read_to_string(path).map_err(|source| FormatError::io(path, source))?;
         let recipe: Self = toml::from_str(&text)
@@ -283,9 +280,6 @@ impl Recipe {
     }
 
     /// The recipe as TOML, with all defaults.
-    ///
-    /// # Errors
-    /// [`Error::Recipe`] for a value that TOML cannot hold.
     pub fn to_toml(&self) -> Result<String, Error> {
         toml::to_string(self)
             .map_err(|error| Error::Recipe { key: "recipe", cause: error.to_string() })
@@ -312,9 +306,6 @@ impl Recipe {
     }
 
     /// Checks that every value is within its limits.
-    ///
-    /// # Errors
-    /// [`Error::Recipe`] with the key.
     pub fn check(&self) -> Result<(), Error> {
         let Self { network, augment, clusters, .. } = self;
         let is_metric = self.normalization.is_metric();

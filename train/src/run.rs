@@ -74,10 +74,6 @@ impl Job<'_> {
     /// Trains, continuing an interrupted run, and writes the model. At the end, measures the model
     /// on the clouds at `test` and returns the accuracy as a line of text. Calls `report` as the
     /// run goes on.
-    ///
-    /// # Errors
-    /// Data, a recipe or a checkpoint that cannot be used; a loss that is not finite; a file that
-    /// cannot be read or written.
     pub fn run(
         self,
         test: Option<&Path>,

@@ -30,9 +30,6 @@ pub struct Selection {
 
 impl CriticalPointSelector {
     /// A selector with the settings of `cpl`.
-    ///
-    /// # Errors
-    /// An unknown rule of resizing.
     pub fn new(cpl: &Cpl, seed: u64) -> Result<Self, String> {
         let resize = cpl.resize.parse().map_err(|error| format!("{error}"))?;
         Ok(Self { keep: cpl.keep, resize, gumbel: cpl.gumbel, seed })

@@ -46,9 +46,6 @@ pub struct EpochSummary {
 
 impl Trainer {
     /// A network with random weights for `n_classes` classes.
-    ///
-    /// # Errors
-    /// [`Error::Recipe`] for an unknown rule of resizing.
     pub fn new(recipe: Recipe, n_classes: usize) -> Result<Self, Error> {
         let refuse = |cause| Error::Recipe { key: "cpl.resize", cause };
         let mut network = PointNet::new(&recipe.network, n_classes, recipe.seed);
@@ -66,9 +63,6 @@ impl Trainer {
 
     /// Trains on the clouds of one epoch, except those of an incomplete last batch. Calls `report`
     /// after each step.
-    ///
-    /// # Errors
-    /// [`Error::NotFinite`].
     pub fn learn(
         &mut self,
         clouds: &Clouds,

@@ -28,9 +28,6 @@ struct Line {
 }
 
 /// Passes each message of the input to `publish`, until the input ends.
-///
-/// # Errors
-/// Input in another format, or truncated; errors of `publish`.
 pub fn read(
     mut input: impl BufRead,
     mut publish: impl FnMut(Encoded) -> anyhow::Result<()>,

@@ -43,9 +43,6 @@ impl Serialize for Body {
 
 impl Publisher {
     /// Creates a node with a name in a domain.
-    ///
-    /// # Errors
-    /// An invalid name; a network that cannot be used.
     pub fn new(domain: u16, node: &str) -> anyhow::Result<Self> {
         let name = NodeName::new("/", node).map_err(|_| {
             Usage(format!("--node: expected letters, digits and _, found {node:?}"))
@@ -60,9 +57,6 @@ impl Publisher {
 
     /// Publishes a message on its topic, which the first message creates. A subscriber that is too
     /// slow misses messages.
-    ///
-    /// # Errors
-    /// An invalid topic or type; an encoding other than plain CDR.
     pub fn publish(&mut self, message: Encoded) -> anyhow::Result<()> {
         let Encoded { topic, kind, mut cdr } = message;
         if !cdr.starts_with(&[0, 1, 0, 0]) {

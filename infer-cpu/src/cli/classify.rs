@@ -118,10 +118,6 @@ pub struct ClassifyArgs {
 }
 
 /// Classifies the clouds that `args` name, one after the other.
-///
-/// # Errors
-/// Invalid options; a model or a list of names that cannot be read; an output that cannot be
-/// written to. The failure of a cloud is printed instead.
 pub fn run(args: &ClassifyArgs) -> anyhow::Result<Outcome> {
     input::check_names(args.files.iter().map(PathBuf::as_path))?;
     let (model, card) = args.model.open()?;

@@ -14,9 +14,6 @@ const STANDARD_INPUT: &str = "-";
 
 /// Reads a cloud from a file or from standard input. Without a `format`, the extension of the file
 /// or the first bytes of standard input determine it.
-///
-/// # Errors
-/// Input that cannot be read or is not a cloud.
 pub fn read(name: &Path, format: Option<CloudFormat>) -> Result<Vec<[f64; 3]>, FormatError> {
     if name.as_os_str() == STANDARD_INPUT {
         return read_cloud_from(stdin().lock(), format, Path::new("standard input"));
@@ -25,9 +22,6 @@ pub fn read(name: &Path, format: Option<CloudFormat>) -> Result<Vec<[f64; 3]>, F
 }
 
 /// Reads the cloud in the file at `path`.
-///
-/// # Errors
-/// Input that cannot be read or is not a cloud.
 pub fn read_file(path: &Path, format: Option<CloudFormat>) -> Result<Vec<[f64; 3]>, FormatError> {
     if path.is_dir() {
         return Err(FormatError::malformed(
@@ -46,9 +40,6 @@ pub fn read_file(path: &Path, format: Option<CloudFormat>) -> Result<Vec<[f64; 3
 }
 
 /// Checks that standard input, which holds one cloud, is named at most once.
-///
-/// # Errors
-/// Standard input is named more often.
 pub fn check_names<'a>(names: impl IntoIterator<Item = &'a Path>) -> Result<(), Usage> {
     let n = names.into_iter().filter(|name| name.as_os_str() == STANDARD_INPUT).count();
     match n {

@@ -31,9 +31,6 @@ pub struct InspectArgs {
 }
 
 /// Shows the model.
-///
-/// # Errors
-/// A file that is not a model.
 pub fn run(args: &InspectArgs) -> anyhow::Result<Outcome> {
     let path = model::find(args.model.as_deref())?;
     let summary = infer_cpu::inspect(&path)?;

@@ -42,9 +42,6 @@ enum Command {
 }
 
 /// Runs the command.
-///
-/// # Errors
-/// The error of the command: a [`Usage`] if the command line is invalid.
 pub fn run(cli: &Cli) -> anyhow::Result<Outcome> {
     match &cli.command {
         Command::Classify(args) => classify::run(args),

@@ -29,17 +29,11 @@ pub struct ModelArgs {
 
 impl ModelArgs {
     /// The path and the card of the model.
-    ///
-    /// # Errors
-    /// The model is not found or cannot be read, or is untrained without --allow-untrained.
     pub fn open(&self) -> anyhow::Result<(PathBuf, ModelCard)> {
         self.open_or(&NAMES)
     }
 
     /// The same, with `names` as the file names of suitable bundled weights.
-    ///
-    /// # Errors
-    /// As [`ModelArgs::open`].
     pub fn open_or(&self, names: &[&str]) -> anyhow::Result<(PathBuf, ModelCard)> {
         let path = find_or(self.model.as_deref(), names)?;
         let card = ModelCard::read(&path)?;
@@ -56,9 +50,6 @@ impl ModelArgs {
 }
 
 /// The path of the model `named`, else of [`VARIABLE`], else of the bundled one.
-///
-/// # Errors
-/// No model is found.
 pub fn find(named: Option<&Path>) -> Result<PathBuf, Usage> {
     find_or(named, &NAMES)
 }

@@ -9,9 +9,6 @@ const LONGEST: u64 = 1 << 16;
 
 /// Calls `take` with each name in `list`, as soon as its line has come. Empty lines and a carriage
 /// return at the end of a line are ignored; a line that is too long is truncated.
-///
-/// # Errors
-/// Errors of reading, and of `take`.
 pub fn for_each<E: From<io::Error>>(
     mut list: impl BufRead,
     mut take: impl FnMut(&Path) -> Result<(), E>,

@@ -52,9 +52,6 @@ struct Failed<'a> {
 impl Style {
     /// Prints and flushes the prediction for the cloud `name`; `precision` is the requested one and
     /// `time` the duration.
-    ///
-    /// # Errors
-    /// Standard output cannot be written to.
     pub fn classified(
         self,
         name: &Path,
@@ -86,9 +83,6 @@ impl Style {
     }
 
     /// Prints that the cloud `name` failed with `error`.
-    ///
-    /// # Errors
-    /// Standard output cannot be written to.
     pub fn failed(self, name: &Path, error: &str) -> io::Result<()> {
         match self {
             Self::Json => json_line(&Failed { file: &name.to_string_lossy(), error }),

@@ -55,9 +55,6 @@ pub struct SampleArgs {
 }
 
 /// Writes the chosen points.
-///
-/// # Errors
-/// A cloud or a model that cannot be read; an invalid sampler; a file that cannot be written.
 pub fn run(args: &SampleArgs) -> anyhow::Result<Outcome> {
     // An unknown extension fails before a long computation.
     CloudFormat::of_path(&args.output)?;

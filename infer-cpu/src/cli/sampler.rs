@@ -45,9 +45,6 @@ pub struct SamplerArgs {
 
 impl SamplerArgs {
     /// The sampler `kind`, or that of `trained`; these flags override the values of `trained`.
-    ///
-    /// # Errors
-    /// A flag that does not apply to the sampler.
     pub fn apply(
         &self,
         kind: Option<SamplerKind>,

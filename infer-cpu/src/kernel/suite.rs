@@ -260,9 +260,6 @@ fn assert_near(found: f32, exact: f64, bound: f64, place: impl Debug) {
 }
 
 /// Checks the matrix products of format `T`.
-///
-/// # Errors
-/// These kernels do not support the format.
 pub fn products_are_sound<T: Bounded>(kernels: &Kernels) -> Result<(), String> {
     let gemm = T::gemm(kernels)
         .ok_or_else(|| "this set of kernels leaves these products to another".to_owned())?;

@@ -70,9 +70,6 @@ pub struct Facts {
 
 impl Decoder {
     /// A decoder for the sensor of `metadata`, or else for the Velodyne that sent `payload`.
-    ///
-    /// # Errors
-    /// `payload` is not a data packet.
     pub fn new(metadata: Option<&ouster::Metadata>, payload: &[u8]) -> Result<Self, Flaw> {
         let Some(metadata) = metadata else {
             let header = velodyne::Header::parse(payload)?;
@@ -86,9 +83,6 @@ impl Decoder {
     }
 
     /// Decodes a packet into `returns`.
-    ///
-    /// # Errors
-    /// It is not this sensor's data.
     pub fn decode(&mut self, payload: &[u8], returns: &mut Vec<Return>) -> Result<Facts, Flaw> {
         returns.clear();
         match self {

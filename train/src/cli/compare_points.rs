@@ -20,9 +20,6 @@ pub struct ComparePointsArgs {
 }
 
 /// Prints the Chamfer distance of two clouds.
-///
-/// # Errors
-/// The errors of [`read_finite`].
 pub fn run(args: &ComparePointsArgs) -> anyhow::Result<()> {
     let (a, b) = (read_finite(&args.a)?, read_finite(&args.b)?);
     let found = chamfer(&a, &b);
@@ -32,9 +29,6 @@ pub fn run(args: &ComparePointsArgs) -> anyhow::Result<()> {
 }
 
 /// Reads the cloud at `path`.
-///
-/// # Errors
-/// A cloud that cannot be read, that has no points, or that has points that are not finite.
 pub fn read_finite(path: &Path) -> anyhow::Result<Vec<[f64; 3]>> {
     let cloud = read_cloud(path)?;
     ensure!(!cloud.is_empty(), "{}: expected points, found none", path.display());

@@ -69,9 +69,6 @@ struct ObjectArgs {
 }
 
 /// Prints the accuracy of a model.
-///
-/// # Errors
-/// A model or data that cannot be used; numbers of classes that differ.
 pub fn run(args: &EvalArgs) -> anyhow::Result<()> {
     let (card, names) = {
         let classifier = Classifier::load(&args.model, &options(args))?;

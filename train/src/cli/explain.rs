@@ -42,9 +42,6 @@ pub struct ExplainArgs {
 const DRAWS: u32 = 1000;
 
 /// Explains the prediction of a model for a cloud.
-///
-/// # Errors
-/// A model or a cloud that cannot be used.
 pub fn run(args: &ExplainArgs) -> anyhow::Result<()> {
     check(args)?;
     let cloud = read_finite(&args.cloud)?;

@@ -11,9 +11,6 @@ use formats::outcome::Usage;
 use std::io::Write;
 
 /// Writes a line to standard output.
-///
-/// # Errors
-/// Standard output cannot be written.
 fn print(line: &str) -> anyhow::Result<()> {
     Ok(writeln!(std::io::stdout(), "{line}")?)
 }

@@ -33,9 +33,6 @@ const WARM_UP: usize = 3;
 const RATES: Rates = Rates { momentum: 0.1, orthogonality: 0.001, step: 0 };
 
 /// Answers requests until the input ends.
-///
-/// # Errors
-/// Files that cannot be read.
 pub fn run(args: &ServeArgs) -> anyhow::Result<()> {
     let mut session = Session::open(args)?;
     respond(&json!({ "version": env!("CARGO_PKG_VERSION") }))?;

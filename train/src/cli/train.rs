@@ -71,9 +71,6 @@ fn parse_widths(word: &str) -> Result<Widths, String> {
 }
 
 /// Trains a network, continuing an interrupted run.
-///
-/// # Errors
-/// The errors of [`Job::run`]; flags that contradict each other.
 pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
     let recipe = recipe(args)?;
     let most_points = points_to_read(&recipe);

@@ -18,9 +18,6 @@ pub fn is_layout_of(path: &Path) -> bool {
 }
 
 /// Reads the first `n_points` points of every cloud of `split`, like the baseline's loader.
-///
-/// # Errors
-/// A file that is missing or malformed; an id of an unknown class; a cloud of fewer points.
 pub fn read(root: &Path, split: Split, n_points: usize) -> Result<LabelledSet, Error> {
     let lines = |name: &str| -> Result<Vec<String>, FormatError> {
         let path = root.join(name);

@@ -75,9 +75,6 @@ impl Object {
 
 /// Classifies `clouds`, read from the file `data`, with the model at `path`. Leaves out clouds of
 /// fewer than `least` points, and those whose labels `labels` leaves out.
-///
-/// # Errors
-/// A model or a cloud that infer-cpu refuses.
 pub fn classified(
     path: &Path,
     data: &str,

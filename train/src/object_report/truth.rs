@@ -52,9 +52,6 @@ impl Labels {
 
     /// Adds the aliases in the TOML file at `path`, which replace built-in ones: `pedestrian =
     /// "person"`, or `rider = ""` to leave objects out.
-    ///
-    /// # Errors
-    /// A file that is not a table of aliases.
     pub fn with_aliases(mut self, path: &Path) -> Result<Self, Error> {
         let text = std::fs::read_to_string(path).map_err(|source| FormatError::io(path, source))?;
         let aliases: BTreeMap<String, String> = toml::from_str(&text)

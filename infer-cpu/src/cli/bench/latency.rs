@@ -54,9 +54,6 @@ struct Setting<'a> {
 }
 
 /// Measures and prints every setting that `args` name.
-///
-/// # Errors
-/// A model or a set that cannot be read; a cloud that cannot be classified.
 pub fn run(args: &BenchArgs, model: &Path) -> anyhow::Result<()> {
     let ranges = super::calibration(args, model)?;
     // fp32 comes first, as the baseline of the others.

@@ -130,10 +130,6 @@ fn rate(word: &str) -> Result<f64, String> {
 }
 
 /// Runs the pipeline until the packets end or a signal comes.
-///
-/// # Errors
-/// Invalid options; a model, poses or a capture that cannot be read; a port in use; an output that
-/// cannot be written to.
 pub fn run(args: &LiveArgs) -> anyhow::Result<Outcome> {
     let mut pipeline = args.pipeline()?;
     let is_over = Arc::new(AtomicBool::new(false));

@@ -26,9 +26,6 @@ pub struct Notifier {
 
 impl Notifier {
     /// A notifier for the environment variables that systemd sets.
-    ///
-    /// # Errors
-    /// A variable has an invalid value.
     pub fn of_environment() -> anyhow::Result<Self> {
         Self::new(|name| env::var_os(name))
     }
@@ -48,9 +45,6 @@ impl Notifier {
     }
 
     /// Reports that the model is loaded and packets are received.
-    ///
-    /// # Errors
-    /// The message cannot be sent, and systemd would wait for it in vain.
     pub fn ready(&self) -> anyhow::Result<()> {
         let Some(manager) = &self.manager else { return Ok(()) };
         manager.tell("READY=1\nSTATUS=Waiting for packets").context("telling NOTIFY_SOCKET")

@@ -53,9 +53,6 @@ impl Outputs {
     }
 
     /// Ends the recording.
-    ///
-    /// # Errors
-    /// Lines or a recording that could not be written completely. A closed pipe is not an error.
     pub fn end(self, pipeline: &Pipeline) -> anyhow::Result<()> {
         let recorded = self.recorder.map_or(Ok(()), |recorder| recorder.finish(pipeline));
         if let Some(failure) = self.lines_failure.filter(|f| f.kind() != ErrorKind::BrokenPipe) {
