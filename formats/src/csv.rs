@@ -14,9 +14,6 @@ use crate::scan::{Column, Scan};
 ///
 /// Numbers have the fewest digits that read back as the same f32. The origin is added to the
 /// positions, since text can represent any coordinate.
-///
-/// # Errors
-/// An attribute of another length than the positions; errors of the system.
 pub fn write_scan(
     path: &Path,
     hashing: Hashing,

@@ -55,10 +55,6 @@ impl LabelledBox {
 }
 
 /// Reads the labelled sweep at `path`.
-///
-/// # Errors
-/// A missing array, or one of an unexpected shape or type:
-/// [`FormatError::Malformed`] with file and key.
 pub fn read_labelled_sweep(path: &Path) -> Result<LabelledSweep, FormatError> {
     let mut npz = NpzReader::open(path)?;
     let millimetres = rows(&mut npz, "xyz_mm", 3)?;

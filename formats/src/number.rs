@@ -98,32 +98,3 @@ numbers! {
     f32: F32, "f4", x => x.into();
     f64: F64, "f8", x => x;
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Values from IEEE 754-2019, table 3.5, and from NumPy.
-    #[test]
-    fn half_precision_is_exact() {
-        for (bits, value) in [
-            (0x0001_u16, 2f64.powi(-24)),
-            (0x03ff, 1023.0 * 2f64.powi(-24)),
-            (0x3555, 0.333251953125),
-            (0xc000, -2.0),
-            (0x7bff, 65504.0),
-            (0xfc00, f64::NEG_INFINITY),
-        ] {
-            let decoded = NumberType::F16.decode(&bits.to_le_bytes(), ByteOrder::Little);
-            assert_eq!(decoded, value, "{bits:#x}");
-        }
-    }
-
-    #[test]
-    fn the_order_of_bytes_is_heeded() {
-        let bytes = [0x12, 0x34, 0, 0, 0, 0, 0, 0x80];
-        assert_eq!(NumberType::U16.decode(&bytes, ByteOrder::Little), 13_330.0);
-        assert_eq!(NumberType::U16.decode(&bytes, ByteOrder::Big), 4_660.0);
-        assert_eq!(NumberType::I64.decode(&bytes, ByteOrder::Little), 13_330.0 - 2f64.powi(63));
-    }
-}

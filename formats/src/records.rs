@@ -11,9 +11,6 @@ const LARGEST_RECORD: usize = 1 << 24;
 
 /// Passes `n` records of `size` bytes to `each`. Memory does not grow with `n`, which comes from a
 /// header and may be wrong.
-///
-/// # Errors
-/// [`io::ErrorKind::UnexpectedEof`] for fewer than `n` records; errors of the reader.
 pub(crate) fn read(
     reader: &mut (impl Read + ?Sized),
     size: usize,

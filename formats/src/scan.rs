@@ -251,20 +251,3 @@ impl Attribute {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_column_of_another_length_is_named() {
-        let scan = Scan {
-            positions: vec![[0.0; 3]; 2],
-            ring: Some(vec![1, 2]),
-            time_s: Some(vec![0.5]),
-            ..Scan::default()
-        };
-        let error = scan.check_lengths().unwrap_err().to_string();
-        assert_eq!(error, "attribute time: expected 2 values, one for each point, found 1");
-    }
-}

@@ -24,10 +24,6 @@ pub struct KeyedPose {
 
 /// Reads a trajectory in TUM's or KITTI's format, which the count of numbers in a line tells apart.
 /// The poses of KITTI's format are `period_s` apart and begin at 0.
-///
-/// # Errors
-/// A file that cannot be read or has no pose; a line that is not a pose, or not later than the line
-/// before.
 pub fn read_trajectory(path: &Path, period_s: f64) -> Result<Vec<KeyedPose>, FormatError> {
     let io = |source| FormatError::io(path, source);
     let text = std::fs::read_to_string(path).map_err(io)?;

@@ -32,9 +32,6 @@ pub struct Yanx27Writer {
 impl Yanx27Writer {
     /// Begins a dataset in the folder `root`. Labels follow the order of
     /// `classes`; files are hashed as `hashing` says.
-    ///
-    /// # Errors
-    /// [`FormatError::Instance`] for a class whose name cannot be a folder's.
     pub fn create(
         root: &Path,
         classes: Vec<String>,
@@ -52,11 +49,6 @@ impl Yanx27Writer {
 
     /// Writes the cloud of view `view` of the mesh `name` of `class`. Unknown normals are written as
     /// 0.
-    ///
-    /// # Errors
-    /// [`FormatError::Instance`] for fewer than two points (NumPy reads a single line as a vector,
-    /// and the loader fails), for another number of normals than of points, for an unknown class, or
-    /// for a name that cannot be a file's or was written before; errors of the system.
     pub fn push(
         &mut self,
         class: &str,
@@ -67,6 +59,7 @@ impl Yanx27Writer {
         normals: Option<&[[f32; 3]]>,
     ) -> Result<(), FormatError> {
         let refuse = |cause: String| Err(FormatError::instance(name, cause));
+        // NumPy reads a single line as a vector, on which the loader fails.
         if points.len() < 2 {
             return refuse(format!("expected two points or more, found {}", points.len()));
         }
@@ -104,9 +97,6 @@ impl Yanx27Writer {
 
     /// Writes the lists of classes and instances, atomically, in the order of
     /// the labels and of the ids. Returns all files of the dataset.
-    ///
-    /// # Errors
-    /// Errors of the system.
     pub fn finish(mut self) -> Result<Vec<HashedFile>, FormatError> {
         self.write_lists("modelnet40")?;
         if self.classes.len() == 10 {

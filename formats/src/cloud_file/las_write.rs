@@ -34,10 +34,6 @@ struct Axis {
 }
 
 /// Writes `points` to `path`, atomically.
-///
-/// # Errors
-/// A coordinate that is not finite; more points than 32 bits count; errors of the
-/// system.
 pub(super) fn write(path: &Path, points: &[[f64; 3]]) -> Result<(), FormatError> {
     let infinite = |point: &[f64; 3]| point.iter().any(|x| !x.is_finite());
     if let Some(i) = points.iter().position(infinite) {

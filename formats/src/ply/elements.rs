@@ -19,10 +19,6 @@ use crate::records;
 /// header.
 ///
 /// Returns the `origin` of the header, an offset to add to every position.
-///
-/// # Errors
-/// [`FormatError::Malformed`] for a file that is not PLY, lacks an element of
-/// `wanted`, is refused by `choose`, or ends before all elements.
 pub fn read_elements(
     reader: &mut impl BufRead,
     name: &Path,

@@ -51,9 +51,6 @@ impl Element {
     }
 
     /// The index of the property `name`, which must be a number.
-    ///
-    /// # Errors
-    /// If the property is missing or is a list.
     pub fn scalar(&self, name: &str) -> Result<usize, String> {
         let at = self.properties.iter().position(|property| property.name == name);
         match at {
@@ -66,9 +63,6 @@ impl Element {
     }
 
     /// The index of the first list with one of these names.
-    ///
-    /// # Errors
-    /// If no such list exists.
     pub fn list(&self, names: &[&str]) -> Result<usize, String> {
         let is_wanted = |p: &Property| p.length.is_some() && names.contains(&p.name.as_str());
         let at = self.properties.iter().position(is_wanted);

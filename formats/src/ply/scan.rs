@@ -18,9 +18,6 @@ use crate::scan::{Attribute, Column, ColumnSlot, Scan};
 
 /// Writes `scan` to `path`, atomically, and returns the hash of the file that
 /// `hashing` asks for.
-///
-/// # Errors
-/// An attribute of another length than the positions; errors of the system.
 pub fn write_scan(
     path: &Path,
     hashing: Hashing,
@@ -74,11 +71,6 @@ fn header(scan: &Scan) -> String {
 
 /// Reads a scan from a PLY file, ASCII or binary, with properties in any order. Other properties are
 /// skipped.
-///
-/// # Errors
-/// A file that is not PLY, lacks x, y or z, holds a number that does not fit its
-/// attribute, or has fewer vertices than its header says:
-/// [`FormatError::Malformed`].
 pub fn read_scan(path: &Path) -> Result<Scan, FormatError> {
     let file = File::open(path).map_err(|source| FormatError::io(path, source))?;
     let (mut known, mut values) = (Vec::new(), Vec::new());
