@@ -44,9 +44,6 @@ pub struct AdviseArgs {
 type Timed<'a> = (f64, &'a Row);
 
 /// Prints one configuration and the reason for it.
-///
-/// # Errors
-/// A record that cannot be read or lacks the device; limits that no measured setting meets.
 pub fn run(args: &AdviseArgs) -> Result<Outcome> {
     args.check()?;
     let (name, rows) = match &args.record {

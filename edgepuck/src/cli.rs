@@ -92,9 +92,6 @@ pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
 
 /// Runs the command line `words` like [`main`], but returns errors to the caller instead of
 /// printing them. `--help` is an error.
-///
-/// # Errors
-/// The errors of the command; words that are not a command line.
 pub fn run_words(words: impl IntoIterator<Item = OsString>) -> anyhow::Result<Outcome> {
     run(&Cli::try_parse_from(words)?.command)
 }

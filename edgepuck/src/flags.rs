@@ -4,9 +4,6 @@ use crate::Usage;
 use std::path::Path;
 
 /// Checks that this program can simplify meshes, if that is `wanted`.
-///
-/// # Errors
-/// A usage error that explains how to get a program that can.
 pub fn need_simplification(wanted: bool) -> Result<(), Usage> {
     if !wanted || cfg!(feature = "simplify") {
         return Ok(());
@@ -20,9 +17,6 @@ pub fn need_simplification(wanted: bool) -> Result<(), Usage> {
 }
 
 /// Checks that `--meshes`, if present, names a folder.
-///
-/// # Errors
-/// A usage error that names the path.
 pub fn need_folder_of_meshes(meshes: Option<&Path>) -> Result<(), Usage> {
     match meshes.filter(|path| !path.is_dir()) {
         Some(path) => Err(Usage(format!("--meshes: expected a folder, found {}", path.display()))),

@@ -191,9 +191,6 @@ impl fmt::Display for Row {
 }
 
 /// Writes `rows` to `path` as CSV.
-///
-/// # Errors
-/// A file that cannot be written.
 pub fn write(rows: &[Row], path: &Path) -> Result<()> {
     let mut csv = csv::Writer::from_writer(Vec::new());
     for row in rows {
@@ -203,17 +200,11 @@ pub fn write(rows: &[Row], path: &Path) -> Result<()> {
 }
 
 /// The record that is part of this program.
-///
-/// # Errors
-/// A record whose columns differ.
 pub fn bundled() -> Result<Vec<Row>> {
     parse(edgepuck_assets::TRADE_RECORD.as_bytes()).context("the built-in record")
 }
 
 /// Reads the record that [`write()`] wrote to `path`.
-///
-/// # Errors
-/// A file that cannot be read; a malformed line.
 pub fn read(path: &Path) -> Result<Vec<Row>> {
     let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
     parse(&bytes).with_context(|| path.display().to_string())

@@ -22,9 +22,6 @@ pub struct TrainerArgs {
 }
 
 /// Runs `command` of the training program in the current folder.
-///
-/// # Errors
-/// A training program that is missing or cannot be started.
 pub fn run(command: &str, args: &TrainerArgs) -> anyhow::Result<Outcome> {
     let mut program = find(&args.flags);
     program.arg(command).args(&args.flags);

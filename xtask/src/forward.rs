@@ -17,9 +17,6 @@ const WITHOUT_MODELS: &str = "gen-dataset gen gen-scenes gen-drive gen-shapes sa
 
 /// Runs the program of `package` with `words` in the caller's folder and gives
 /// the exit code that it ended with.
-///
-/// # Errors
-/// Cargo cannot be started.
 pub fn run(package: &str, words: &[OsString]) -> anyhow::Result<u8> {
     let mut cargo = cargo_run(package);
     if words.first().is_some_and(|word| WITHOUT_MODELS.split(' ').any(|name| word == name)) {

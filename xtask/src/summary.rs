@@ -120,9 +120,6 @@ impl Summary {
 }
 
 /// Prints a command and runs it as one check. Its output goes to the terminal.
-///
-/// # Errors
-/// If it cannot be started or fails.
 pub fn check(name: &str, command: &mut Command) -> anyhow::Result<Counts> {
     let shown = words(command);
     eprintln!("== {name}: {shown}");

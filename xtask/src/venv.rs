@@ -34,9 +34,6 @@ pub struct Environment<'a> {
 
 impl Environment<'_> {
     /// The interpreter of the environment, which is made under [`cache_dir`] unless it exists.
-    ///
-    /// # Errors
-    /// The reason why it cannot be made, in words for the user.
     pub fn interpreter(&self) -> Result<PathBuf, String> {
         if let Some(interpreter) = self.made()? {
             return Ok(interpreter);
@@ -50,9 +47,6 @@ impl Environment<'_> {
     }
 
     /// The interpreter, if the environment exists and has these packages.
-    ///
-    /// # Errors
-    /// The list of packages cannot be read.
     pub fn made(&self) -> Result<Option<PathBuf>, String> {
         let pinned = self.pinned()?;
         let is_made = std::fs::read_to_string(self.done()).is_ok_and(|found| found == pinned);
@@ -79,9 +73,6 @@ impl Environment<'_> {
 }
 
 /// Makes the environment `folder` for the interpreter `base`; an older one there is removed.
-///
-/// # Errors
-/// The reason, in words for the user.
 pub fn make(base: &Path, folder: &Path, options: &[&str]) -> Result<(), String> {
     let mut make = Command::new(base);
     succeeds(make.args(["-m", "venv", "--clear"]).args(options).arg(folder))
@@ -90,9 +81,6 @@ pub fn make(base: &Path, folder: &Path, options: &[&str]) -> Result<(), String> 
 
 /// Installs packages, which `words` name as for pip, in the environment of `python`. uv installs
 /// them, or else pip: uv reads no settings of pip, and does not see packages of the system.
-///
-/// # Errors
-/// The reason, in words for the user.
 pub fn install(
     python: &Path,
     words: impl IntoIterator<Item = OsString> + Clone,
@@ -134,9 +122,6 @@ fn python_in(folder: &Path) -> PathBuf {
 }
 
 /// Runs `command` to its end.
-///
-/// # Errors
-/// The last line that it printed, if it fails.
 pub fn succeeds(command: &mut Command) -> Result<(), String> {
     let output = command.output().map_err(|error| error.to_string())?;
     if output.status.success() {

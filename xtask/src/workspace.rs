@@ -55,9 +55,6 @@ pub fn cargo_run(package: &str) -> Command {
 }
 
 /// The folder of Rust's standard library for `target`, which may be missing.
-///
-/// # Errors
-/// rustc cannot run.
 pub fn standard_library(target: &str) -> anyhow::Result<PathBuf> {
     let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
     let mut ask = Command::new(rustc);
@@ -66,9 +63,6 @@ pub fn standard_library(target: &str) -> anyhow::Result<PathBuf> {
 }
 
 /// Downloads the standard library for `target` through rustup if it is missing.
-///
-/// # Errors
-/// rustup is missing, or cannot download the library.
 pub fn need_standard_library(target: &str) -> anyhow::Result<()> {
     if standard_library(target)?.is_dir() {
         return Ok(());
@@ -85,9 +79,6 @@ pub fn need_standard_library(target: &str) -> anyhow::Result<()> {
 }
 
 /// The standard output of a command.
-///
-/// # Errors
-/// The command cannot be started, or fails. The error has its error output.
 pub fn output(command: &mut Command) -> anyhow::Result<String> {
     let output = command.output().with_context(|| format!("cannot run {}", words(command)))?;
     if !output.status.success() {
@@ -104,9 +95,6 @@ pub fn words(command: &Command) -> String {
 }
 
 /// The packages of the workspace with this manifest, as `cargo metadata` describes them.
-///
-/// # Errors
-/// Cargo fails.
 pub fn packages(manifest: &str) -> anyhow::Result<Vec<Value>> {
     let words = ["metadata", "--no-deps", "--format-version", "1", "--manifest-path", manifest];
     let mut metadata: Value = serde_json::from_str(&output(&mut cargo(&words))?)?;
@@ -114,9 +102,6 @@ pub fn packages(manifest: &str) -> anyhow::Result<Vec<Value>> {
 }
 
 /// The path of program `name`, from Cargo's `messages`, one JSON object a line.
-///
-/// # Errors
-/// Cargo has not built the program.
 pub fn executable(messages: &str, name: &str) -> anyhow::Result<PathBuf> {
     let mut programs = executables(messages, false).filter(|message| {
         message["target"]["name"] == name && message["target"]["kind"][0] == "bin"

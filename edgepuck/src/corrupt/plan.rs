@@ -51,9 +51,6 @@ pub struct LeftOut {
 
 impl Plan {
     /// The plan in `file`, or the built-in one.
-    ///
-    /// # Errors
-    /// A file that is not a plan; the error names the key and the cause.
     pub fn read(file: Option<&Path>) -> anyhow::Result<Self> {
         let plan: Self = match file {
             Some(file) => config::read(file)?,
@@ -98,9 +95,6 @@ pub type Chosen<'a, T> = (&'a Entry<T>, u32, &'a T);
 
 /// Chooses the `entries` with these `names`, at these `severities`. An empty list stands for all
 /// names or all severities.
-///
-/// # Errors
-/// A name or a severity that no entry has.
 pub fn chosen<'a, T>(
     entries: &'a [Entry<T>],
     names: &[String],

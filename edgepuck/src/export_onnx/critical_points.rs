@@ -15,9 +15,6 @@ pub const KEPT: &str = "kept";
 
 /// Adds the selection of `n_points` points of `cloud` `[batch, all, 3]`, and returns the inputs of
 /// the network. Value [`KEPT`] holds the indices of the points.
-///
-/// # Errors
-/// A network without a front end.
 pub fn add(
     graph: &mut Graph,
     net: &Net,

@@ -76,9 +76,6 @@ pub struct Args {
 }
 
 /// The settings of a dataset that these `flags` ask for, such as `--distance=2,10`.
-///
-/// # Errors
-/// An unknown flag or value; a sensor that is missing or does not fit the other flags.
 pub fn config(flags: &[String]) -> anyhow::Result<DatasetConfig> {
     Settings::try_parse_from(behind_name(flags))?.config()
 }
@@ -90,9 +87,6 @@ fn behind_name(words: &[String]) -> impl Iterator<Item = &str> {
 
 /// Checks the words of a command line for the tasks of a cluster, which share their folders. The
 /// folders need not exist on this machine.
-///
-/// # Errors
-/// As [`config`]; words without a folder of meshes, an output folder or tars.
 pub fn check_words_of_tasks(words: &[String]) -> anyhow::Result<()> {
     #[derive(Parser)]
     struct Words {

@@ -18,9 +18,6 @@ const FARTHEST_M: f64 = 50.0;
 
 /// Draws the points of `scan` around its origin, each in its tint, and `names` at
 /// their places (x, y), to the PNG file `out`, atomically.
-///
-/// # Errors
-/// A file that cannot be written.
 pub fn draw_from_above(
     scan: &Scan,
     tints: &[RGBColor],

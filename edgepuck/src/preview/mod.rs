@@ -29,9 +29,6 @@ const BAR_WIDTH: u32 = 120;
 /// know it and by height otherwise, as the colour bar says. Points outside the
 /// frame are counted in their row's heading; those that are not finite count
 /// with them. Axes start at the scans' origin where that is not 0.
-///
-/// # Errors
-/// A scan whose attributes differ in length, a file that cannot be written.
 pub fn draw(clean: &Scan, noisy: Option<&Scan>, title: &str, out: &Path) -> Result<()> {
     let rows: Vec<_> =
         [(if noisy.is_some() { "clean" } else { "" }, Some(clean)), ("noisy", noisy)]

@@ -11,9 +11,6 @@ const SECTION_SYMBOLS: u32 = 2;
 
 /// That `file` is a program for 64-bit Arm which needs no library of the
 /// system it runs on and carries no symbols.
-///
-/// # Errors
-/// Which of these it is not.
 pub fn check_static_stripped_aarch64(file: &[u8]) -> anyhow::Result<()> {
     // Class 2 is 64-bit, data 1 is little endian.
     ensure!(file.starts_with(b"\x7fELF\x02\x01"), "expected a 64-bit little-endian ELF file");

@@ -52,9 +52,6 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
 }
 
 /// Builds infer-cpu for the Pi, with more arguments for rustc, and returns its path.
-///
-/// # Errors
-/// Cargo fails, and has printed the reason.
 pub fn build(for_rustc: &[&str]) -> anyhow::Result<PathBuf> {
     let words = ["rustc", "--package", "infer-cpu", "--bin", "infer-cpu", "--profile", "pi"];
     let mut cargo = pi_target::cargo(&words);

@@ -9,9 +9,6 @@ use test_support::SKIPPED_TESTS;
 use xtask::workspace::{root, words};
 
 /// Runs `cargo`, which is `cargo test` or a test program, prints its output, and counts its tests.
-///
-/// # Errors
-/// The command cannot run.
 pub fn run(summary: &mut Summary, cargo: &mut Command) -> anyhow::Result<Counts> {
     let skipped_tests = root().join("target/skipped-tests.txt");
     fs::create_dir_all(root().join("target"))?;

@@ -41,9 +41,6 @@ pub struct Import {
 }
 
 /// Reads the crate whose root is the file `root`.
-///
-/// # Errors
-/// A file cannot be read.
 pub fn read(root: &Path) -> anyhow::Result<Modules> {
     let mut modules = Modules::new();
     let folder = root.parent().unwrap_or(Path::new(""));
