@@ -66,10 +66,8 @@ pub struct Packet {
 /// The points on objects, by (revolution, object).
 pub(crate) type ObjectPoints = BTreeMap<(u32, u32), PointSum>;
 
-/// Points on one object.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PointSum {
-    /// The number of points.
     pub(crate) count: u32,
     /// The sum of their times since the start of the drive.
     pub(crate) time_s: f64,

@@ -5,7 +5,6 @@ use glam::DVec2;
 /// The least space between two objects, metres.
 const CLEARANCE_M: f64 = 0.05;
 
-/// A rectangle on the ground.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Footprint {
     pub(crate) centre: DVec2,
@@ -15,7 +14,6 @@ pub(crate) struct Footprint {
 }
 
 impl Footprint {
-    /// A rectangle along x and y.
     pub(crate) fn level(centre: DVec2, half: DVec2) -> Self {
         Self { centre, half, yaw_rad: 0.0 }
     }

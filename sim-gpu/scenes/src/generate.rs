@@ -101,7 +101,6 @@ impl LabelledScene {
     }
 }
 
-/// Adds the clusters of a scene to a set.
 fn pack(
     stage: &Stage,
     done: &LabelledScene,

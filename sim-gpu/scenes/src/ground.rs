@@ -32,7 +32,6 @@ pub(crate) struct Ground {
     roughness_m: f64,
     /// y of the middle of the road.
     pub(crate) road_y_m: f64,
-    /// Half the width of the road.
     pub(crate) road_half_m: f64,
     kerb_m: f64,
     stream: StreamKey,
@@ -66,7 +65,6 @@ impl Ground {
         DVec3::new(x_m, 0.0, self.slope.x * x_m)
     }
 
-    /// The ground of a scene as triangles.
     pub(crate) fn mesh(&self) -> TriangleMesh {
         let xs = self.lines(&[]);
         self.surface(&xs, |row, column| (row * xs.len() + column) as u64)

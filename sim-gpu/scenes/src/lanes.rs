@@ -22,7 +22,6 @@ pub(crate) struct Lane {
     pub(crate) y_m: f64,
     /// Half its width.
     pub(crate) half_m: f64,
-    /// The velocity of its objects along x, metres a second.
     pub(crate) velocity_m_s: f64,
     /// The entries of the recipe whose objects move in it.
     pub(crate) entries: Vec<usize>,

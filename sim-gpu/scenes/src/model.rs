@@ -20,7 +20,6 @@ use crate::recipe::Objects;
 /// The mesh of an object, which all instances of the object share.
 pub(crate) struct Model {
     pub(crate) mesh: Mesh,
-    /// The triangles of glass.
     pub(crate) glass: Range<u32>,
     /// Length, width and height.
     pub(crate) size_m: DVec3,

@@ -89,17 +89,14 @@ impl<'a> Placer<'a> {
             }
             let beside_m = lane.half_m - object.half.y;
             object.half.x += headway_m;
-            for _ in 0..MAX_TRIES {
-                let x_m = self.half_length_m * self.s.uniform(-1.0, 1.0);
-                let y_m = lane.y_m + beside_m * self.s.uniform(-1.0, 1.0);
-                if self.try_at(&object, DVec2::new(x_m, y_m), heading_rad) {
-                    break;
-                }
-            }
+            self.try_drawn(&object, |placer| {
+                let x_m = placer.half_length_m * placer.s.uniform(-1.0, 1.0);
+                let y_m = lane.y_m + beside_m * placer.s.uniform(-1.0, 1.0);
+                (DVec2::new(x_m, y_m), heading_rad)
+            });
         }
     }
 
-    /// Draws the objects of entry number `entry`.
     fn draw(&mut self, entry: usize) -> Vec<Unplaced> {
         let stage = self.stage;
         let objects = &stage.recipe().object[entry];
@@ -147,6 +144,14 @@ impl<'a> Placer<'a> {
         true
     }
 
+    /// Places `object` at the first free one of the places that `draw` returns.
+    fn try_drawn(&mut self, object: &Unplaced, draw: impl Fn(&mut Self) -> (DVec2, f64)) {
+        let _ = (0..MAX_TRIES).any(|_| {
+            let (centre, yaw_rad) = draw(self);
+            self.try_at(object, centre, yaw_rad)
+        });
+    }
+
     /// Places each object on its own.
     fn scatter(
         &mut self,
@@ -155,12 +160,7 @@ impl<'a> Placer<'a> {
         draw: fn(&mut Self, &Objects) -> (DVec2, f64),
     ) {
         for object in queue {
-            for _ in 0..MAX_TRIES {
-                let (centre, yaw_rad) = draw(self, objects);
-                if self.try_at(&object, centre, yaw_rad) {
-                    break;
-                }
-            }
+            self.try_drawn(&object, |placer| draw(placer, objects));
         }
     }
 
@@ -187,14 +187,11 @@ impl<'a> Placer<'a> {
         let anchor = DVec2::new(self.side() * self.distance(objects), y_m);
         let heading_rad = self.s.uniform(0.0, TAU);
         for object in group {
-            for _ in 0..MAX_TRIES {
-                let off = DVec2::from_angle(self.s.uniform(0.0, TAU))
-                    * (object.half.max_element() + self.within(objects.gap_m));
-                let yaw_rad = heading_rad + self.s.uniform(-0.5, 0.5);
-                if self.try_at(&object, anchor + off, yaw_rad) {
-                    break;
-                }
-            }
+            self.try_drawn(&object, |placer| {
+                let off = DVec2::from_angle(placer.s.uniform(0.0, TAU))
+                    * (object.half.max_element() + placer.within(objects.gap_m));
+                (anchor + off, heading_rad + placer.s.uniform(-0.5, 0.5))
+            });
         }
     }
 
@@ -269,8 +266,6 @@ struct RowStyle {
     side: f64,
     /// Whether cars are parked across the road.
     across: bool,
-    /// The width of the pavement, metres.
     pavement_m: f64,
-    /// The depth of the front gardens, metres.
     garden_m: f64,
 }

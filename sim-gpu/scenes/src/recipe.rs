@@ -86,7 +86,7 @@ pub struct Mount {
 }
 
 /// A sensor and its errors.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SensorChoice {
     /// The name of a built-in sensor, or the path of a profile relative to the recipe.
@@ -258,12 +258,7 @@ impl Recipe {
         }
         let choice = |name: &String| {
             let known = self.sensor.iter().find(|sensor| sensor.profile == *name).cloned();
-            known.unwrap_or_else(|| SensorChoice {
-                profile: name.clone(),
-                noise_m: None,
-                dropout: 0.0,
-                effects: Effects::default(),
-            })
+            known.unwrap_or_else(|| SensorChoice { profile: name.clone(), ..Default::default() })
         };
         self.sensor = names.iter().map(choice).collect();
     }

@@ -10,7 +10,6 @@ pub(crate) struct Sector {
 }
 
 impl Sector {
-    /// The azimuths of all beams of `pattern`.
     pub(crate) fn of_beams(pattern: &BeamPattern) -> Self {
         let level = pattern.directions.iter().map(|direction| direction.truncate().normalize());
         let middle = level.clone().sum::<DVec2>().normalize();

@@ -27,7 +27,6 @@ pub struct Stage {
     models: Vec<Vec<OnceLock<Model>>>,
 }
 
-/// A sensor, and the caster of its effects.
 pub(crate) struct StageSensor {
     pub(crate) sensor: Sensor,
     pub(crate) caster: Arc<OpenCaster>,

@@ -29,7 +29,6 @@ pub struct StreetObject {
 }
 
 impl StreetObject {
-    /// The radius of its bounding sphere, metres.
     pub(crate) fn radius_m(&self) -> f64 {
         self.size_m.length() / 2.0
     }
@@ -47,7 +46,6 @@ pub(crate) struct Street<'a> {
     pub(crate) stage: &'a Stage,
     pub(crate) ground: Ground,
     lanes: Vec<Lane>,
-    /// The length of a block.
     block_m: f64,
     /// The numbers of the blocks drawn so far, by layer. Layer 0 holds the objects that stand,
     /// layer `1 + i` those that move in lane `i`.
@@ -105,7 +103,6 @@ impl<'a> Street<'a> {
         tile(x_m - self.ground.half_m)..=tile(x_m + self.ground.half_m)
     }
 
-    /// Draws one block of a layer.
     fn draw_block(&mut self, layer: usize, number: i32) {
         let Self { stage, ground, lanes, block_m, .. } = &*self;
         let lane = layer.checked_sub(1).map(|i| &lanes[i]);

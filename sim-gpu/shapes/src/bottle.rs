@@ -5,7 +5,6 @@ use crate::primitives::{
     smooth_tube,
 };
 
-/// Radii and heights of a bottle.
 struct Form {
     body_m: f64,
     neck_m: f64,

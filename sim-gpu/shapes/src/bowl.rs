@@ -56,7 +56,6 @@ fn outside(s: &mut Sampler, [rim_m, foot_m]: [f64; 2], [height_m, ring_m]: [f64;
     }
 }
 
-/// Two small handles at the rim.
 fn lugs(b: &mut Builder, s: &mut Sampler, rim_m: f64, height_m: f64) {
     let out_m = rim_m * s.uniform(1.2, 1.4);
     let side_m = 0.3 * rim_m;

@@ -34,12 +34,10 @@ impl Builder {
         }
     }
 
-    /// The number of triangles so far.
     pub fn n_triangles(&self) -> usize {
         self.mesh.triangles.len()
     }
 
-    /// The mesh so far.
     pub fn mesh(&self) -> &TriangleMesh {
         &self.mesh
     }

@@ -16,7 +16,6 @@ struct Seat {
     shape: Shape,
 }
 
-/// The form of a seat.
 #[derive(Clone, Copy, PartialEq)]
 enum Shape {
     Board,
@@ -25,7 +24,6 @@ enum Shape {
     Round,
 }
 
-/// The form of a pair of arms.
 #[derive(Clone, Copy, PartialEq)]
 enum Arms {
     /// A rest on two posts.

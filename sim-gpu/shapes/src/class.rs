@@ -6,7 +6,7 @@ use crate::{airplane, bottle, bowl, chair, cone, cup, lamp, monitor, table, vase
 /// The makes of each class, and the fraction of its shapes that are rotated by a quarter or half
 /// turn. The fractions follow ModelNet40's training clouds: chairs are hardly ever rotated,
 /// airplanes and monitors sometimes, vessels have no preferred direction.
-const FAMILIES: [(Makes, f64); 10] = [
+pub(super) const FAMILIES: [(Makes, f64); 10] = [
     (airplane::MAKES, 0.15),
     (&[(1, bottle::build)], 0.6),
     (&[(1, bowl::build)], 0.6),
@@ -42,13 +42,6 @@ formats::named! {
         Table = "table",
         /// Amphorae, trumpets, globes, cylinders, square and fluted vases.
         Vase = "vase",
-    }
-}
-
-impl ShapeClass {
-    /// The makes, and the probability that a shape is rotated by a quarter or half turn.
-    pub(super) fn family(self) -> (Makes, f64) {
-        FAMILIES[self as usize]
     }
 }
 

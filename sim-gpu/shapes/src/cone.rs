@@ -7,7 +7,6 @@ use crate::primitives::{
     outline, prism,
 };
 
-/// The makes, with their weights.
 pub const MAKES: Makes =
     &[(3, plain), (2, traffic_cone), (1, party_hat), (1, ice_cream), (1, funnel)];
 

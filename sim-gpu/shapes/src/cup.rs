@@ -4,7 +4,6 @@ use crate::primitives::{
     Builder, DVec2, DVec3, Profile, Sampler, Section, Vessel, Wall, outline, smooth, sweep,
 };
 
-/// The body of a cup.
 struct Body {
     rim_m: f64,
     base_m: f64,

@@ -5,13 +5,11 @@ use std::f64::consts::FRAC_PI_2;
 
 use glam::{DQuat, DVec3};
 
-use super::class::ShapeClass;
+use super::class::{FAMILIES, ShapeClass};
 use crate::primitives::{Builder, Sampler};
 use sim_gpu::internals::mesh::TriangleMesh;
 
-/// The fewest triangles of a shape.
 pub const MIN_TRIANGLES: usize = 200;
-/// The most triangles of a shape.
 const MAX_TRIANGLES: usize = 50_000;
 /// Coordinates are multiples of this: a micrometre.
 const STEPS_PER_METRE: f64 = 1e6;
@@ -55,7 +53,7 @@ impl Finish {
         use Winding::{AsBuilt, Inverted, SomePartsInverted, SomeTrianglesInverted};
         let doubled_share = s.pick(&[0.0, 0.0, 0.0, 0.05, 0.2, 0.5, 1.0]);
         let wanted = s.log_uniform(1.1 * MIN_TRIANGLES as f64, MAX_TRIANGLES as f64);
-        let turned = s.chance(class.family().1);
+        let turned = s.chance(FAMILIES[class as usize].1);
         let turns = f64::from(if turned { s.pick(&[1, 2, 2, 3]) } else { 0 });
         Self {
             target_triangles: (wanted / (1.0 + doubled_share)).floor() as usize,

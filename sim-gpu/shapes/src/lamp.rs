@@ -10,7 +10,6 @@ use crate::primitives::{
 };
 use shade::shade;
 
-/// The makes, with their weights.
 pub const MAKES: Makes = &[
     (3, table_lamp),
     (1, floor_lamp),

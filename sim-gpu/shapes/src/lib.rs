@@ -39,6 +39,7 @@ pub use write::{write_obj, write_off};
 
 use formats::rng::StreamKey;
 
+use class::FAMILIES;
 use finish::Finish;
 use primitives::build_one;
 use sim_gpu::internals::mesh::TriangleMesh;
@@ -54,7 +55,7 @@ pub fn generate(class: ShapeClass, seed: u64, instance: u32) -> TriangleMesh {
     let stream = |part: &str| StreamKey::new(seed, &format!("shapes/{class}/{part}"), instance);
     let finish = Finish::draw(class, &mut Sampler::new(stream("finish")));
     let builder = tessellation::fit(&finish, |b| {
-        build_one(class.family().0, b, &mut Sampler::new(stream("form")));
+        build_one(FAMILIES[class as usize].0, b, &mut Sampler::new(stream("form")));
     });
     finish.apply(builder, &mut Sampler::new(stream("wear")))
 }

@@ -12,10 +12,8 @@ use screen::Screen;
 /// size of the foot.
 type Stand = fn(&mut Builder, &mut Sampler, &Screen, f64, DVec2);
 
-/// The makes, with their weights.
 pub const MAKES: Makes = &[(4, flat), (2, tube_monitor), (1, pair)];
 
-/// A flat screen on a stand.
 fn flat(b: &mut Builder, s: &mut Sampler) {
     let screen = Screen::draw(s);
     let gap_m = screen.height_m * s.uniform(0.08, 0.4);

@@ -74,13 +74,4 @@ mod tests {
         // 1000 expected, standard deviation 26: 800 lies 7 sigma below.
         assert!(counts.iter().all(|&count| count > 800), "{counts:?}");
     }
-
-    #[test]
-    fn the_same_key_draws_the_same_numbers() {
-        let draw = || {
-            let mut sampler = Sampler::new(StreamKey::new(5, "sampler", 1));
-            (sampler.uniform(0.0, 1.0), sampler.pick(&[1, 2, 3]), sampler.chance(0.5))
-        };
-        assert_eq!(draw(), draw());
-    }
 }

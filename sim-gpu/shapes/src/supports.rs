@@ -7,11 +7,10 @@ use crate::primitives::{
     loft, outline, rod, smooth_tube, tube,
 };
 
-/// The form of a set of legs.
 pub struct Legs {
     kind: LegKind,
-    /// Half the width of a leg at its top.
-    half_width_m: f64,
+    /// Half the width of a leg at its top, by which legs stand in from an edge.
+    pub half_width_m: f64,
     /// The width at the floor over that at the top.
     taper: f64,
     /// The distance of the feet outwards from the tops, over the height.
@@ -41,11 +40,6 @@ impl Legs {
             taper: if s.chance(0.5) { taper } else { 1.0 },
             splay: if splayed && !matches!(kind, Square) { steep } else { 0.0 },
         }
-    }
-
-    /// Half the width of a leg at its top, by which legs stand in from an edge.
-    pub fn half_width_m(&self) -> f64 {
-        self.half_width_m
     }
 
     /// The point on the floor of the leg with this top.

@@ -20,7 +20,6 @@ struct Top {
     shape: Shape,
 }
 
-/// The outline of a top.
 #[derive(Clone, Copy, PartialEq)]
 enum Shape {
     Rectangle,
@@ -30,7 +29,6 @@ enum Shape {
     Oval,
 }
 
-/// The support of a top.
 #[derive(Clone, Copy)]
 enum Support {
     Legs,
@@ -135,7 +133,7 @@ fn build_top(b: &mut Builder, s: &mut Sampler, top: &Top) {
 /// Four legs, with stretchers, an apron or a lower shelf.
 fn legged(b: &mut Builder, s: &mut Sampler, top: &Top) {
     let legs = Legs::draw(s, top.height_m);
-    let half = top.legs_half(legs.half_width_m());
+    let half = top.legs_half(legs.half_width_m);
     let stretcher = if s.chance(0.2) { Some(s.uniform(0.12, 0.4)) } else { None };
     four_legs(b, &legs, half, top.under_m(), stretcher);
     if s.chance(0.5) {

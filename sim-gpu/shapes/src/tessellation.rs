@@ -7,7 +7,6 @@ use crate::primitives::Builder;
 use sim_gpu::internals::mesh::TriangleMesh;
 use sim_gpu::internals::mesh::unit_frame::bounding_box;
 
-/// The greatest number of trials.
 const MAX_TRIALS: usize = 10;
 /// A mesh with this fraction of the wanted triangles is good enough.
 const CLOSE_ENOUGH: f64 = 0.93;

@@ -7,7 +7,6 @@ use crate::primitives::{
     smooth_tube, tube,
 };
 
-/// The outline of a vase.
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
     Bellied,
@@ -16,7 +15,6 @@ enum Kind {
     Shouldered,
 }
 
-/// The radii and heights of a vase.
 struct Form {
     height_m: f64,
     foot_m: f64,

@@ -8,9 +8,9 @@ use crate::primitives::{
     Builder, DAffine3, DVec3, Profile, Section, Vessel, Wall, cylinder, ellipsoid, rod, sheet,
 };
 
-/// A frame at `front` with its z axis to the rear (+y).
-fn rearwards(front: DVec3) -> DAffine3 {
-    DAffine3::from_translation(front) * DAffine3::from_rotation_x(-FRAC_PI_2)
+/// Builds in a frame at `front` with its z axis to the rear (+y).
+fn rearwards(b: &mut Builder, front: DVec3, build: impl FnOnce(&mut Builder)) {
+    b.turned(front, DAffine3::from_rotation_x(-FRAC_PI_2), build);
 }
 
 /// A jet engine: a ring that is open at both ends, a core, and a pylon above.
@@ -23,7 +23,7 @@ pub fn jet_engine(b: &mut Builder, front: DVec3, radius_m: f64, length_m: f64) {
     let core = Profile::from(0.0, 0.2 * length_m)
         .curve(&[(0.35 * radius_m, 0.35 * length_m), (0.6 * radius_m, 0.7 * length_m)])
         .line(0.0, 1.1 * length_m);
-    b.place(rearwards(front), |b| {
+    rearwards(b, front, |b| {
         Vessel::new(ring, Wall::Sheet, Section::Round).build(b);
         core.revolve(b, Section::Round);
     });
@@ -41,7 +41,7 @@ pub fn nacelle(b: &mut Builder, front: DVec3, radius_m: f64, length_m: f64) {
         (0.25 * radius_m, length_m),
     ]);
     let profile = profile.line(0.0, length_m);
-    b.place(rearwards(front), |b| profile.revolve(b, Section::Round));
+    rearwards(b, front, |b| profile.revolve(b, Section::Round));
 }
 
 /// A spinner and twisted blades without thickness.

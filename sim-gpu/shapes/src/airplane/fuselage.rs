@@ -4,7 +4,6 @@ use crate::primitives::{Builder, DVec2, DVec3, loft, outline};
 
 /// A body from its nose at y = -length / 2 to its tail at y = length / 2.
 pub struct Fuselage {
-    /// Length from nose to tail.
     pub length_m: f64,
     /// Length over diameter.
     pub slender: f64,
@@ -17,12 +16,10 @@ pub struct Fuselage {
 }
 
 impl Fuselage {
-    /// The largest radius.
     pub fn radius_m(&self) -> f64 {
         0.5 * self.length_m / self.slender
     }
 
-    /// The foremost point.
     pub fn nose(&self) -> DVec3 {
         DVec3::new(0.0, -0.5 * self.length_m, 0.0)
     }

@@ -28,7 +28,6 @@ impl Wing {
         self.root + DVec3::new(1.0, self.sweep, self.dihedral) * out_m
     }
 
-    /// The chord at a fraction of the half span.
     pub fn chord_m(&self, share: f64) -> f64 {
         self.root_chord_m * (1.0 + share * (self.taper - 1.0))
     }
@@ -42,7 +41,6 @@ impl Wing {
         b.mirrored_x(|b| open_at_root(b, &ends));
     }
 
-    /// Adds small fins at both tips.
     pub fn winglets(&self, b: &mut Builder, high_m: f64) {
         let chord = self.chord_m(1.0);
         let tip = self.leading_edge(1.0);
@@ -57,8 +55,8 @@ pub fn fin(b: &mut Builder, root: DVec3, high_m: f64, chord_m: f64, sweep: f64) 
         section.iter().map(|p| DVec3::new(chord * p.y, sweep * up + chord * p.x, up)).collect()
     });
     // With x and y exchanged, the outline runs clockwise; mirrored, it looks outwards.
-    let frame = DAffine3::from_translation(root) * DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0));
-    b.place(frame, |b| open_at_root(b, &ends));
+    let mirror = DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0));
+    b.turned(root, mirror, |b| open_at_root(b, &ends));
 }
 
 /// The surface from the first section, which stays open, to the last, which is closed.

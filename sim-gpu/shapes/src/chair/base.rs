@@ -6,7 +6,6 @@ use crate::supports::{
     Legs, crossed_legs, disc_pedestal, four_legs, side_panels, sledge, star_pedestal,
 };
 
-/// Adds the base of `seat`.
 pub fn build(b: &mut Builder, s: &mut Sampler, seat: &Seat) {
     let under_m = seat.under_m();
     let tube_m = s.uniform(0.01, 0.016);
@@ -27,7 +26,7 @@ pub fn build(b: &mut Builder, s: &mut Sampler, seat: &Seat) {
 fn legged(b: &mut Builder, s: &mut Sampler, seat: &Seat) {
     let legs = Legs::draw(s, seat.top_m);
     let stretcher = if s.chance(0.35) { Some(s.uniform(0.2, 0.5)) } else { None };
-    four_legs(b, &legs, seat.legs_half(legs.half_width_m()), seat.under_m(), stretcher);
+    four_legs(b, &legs, seat.legs_half(legs.half_width_m), seat.under_m(), stretcher);
 }
 
 /// A tube from the rear of the seat along its underside, down in front and back along the floor.
@@ -50,7 +49,6 @@ fn cantilever(b: &mut Builder, seat: &Seat, radius_m: f64) {
     tube(b, &[rear, rear * DVec3::new(-1.0, 1.0, 1.0)], radius_m);
 }
 
-/// Four legs on two runners.
 fn rocker(b: &mut Builder, s: &mut Sampler, seat: &Seat) {
     let runner_m = s.uniform(0.015, 0.025);
     let x = 0.85 * seat.legs_half(0.0).x;

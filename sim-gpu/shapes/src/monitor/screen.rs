@@ -5,11 +5,8 @@ use crate::primitives::{Builder, DVec3, Sampler, block, block_between, board, cu
 /// A screen that faces +x, with its width along y and its middle at the origin.
 #[derive(Clone, Copy)]
 pub struct Screen {
-    /// From side to side.
     pub width_m: f64,
-    /// From the lower to the upper edge.
     pub height_m: f64,
-    /// From front to back.
     pub depth_m: f64,
     housing: Housing,
 }

@@ -9,7 +9,6 @@ use crate::primitives::{
     frustum, outline, prism, rod,
 };
 
-/// The makes, with their weights.
 pub const MAKES: Makes =
     &[(3, bollard), (4, post), (3, utility), (4, pillar), (1, delineator), (2, meter)];
 

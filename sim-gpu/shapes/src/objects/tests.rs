@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use glam::DVec3;
 
-use super::{Object, ObjectKind, object};
+use super::{ObjectKind, object};
 
 const SEED: u64 = 5;
 const INSTANCES: u32 = 8;
@@ -49,18 +49,11 @@ fn sizes(kind: ObjectKind) -> [[f64; 2]; 3] {
     }
 }
 
-/// Runs the assertions `holds` on many objects of every kind, each with its name.
-fn for_all(holds: impl Fn(ObjectKind, &str, &Object)) {
-    for kind in ObjectKind::ALL {
-        for k in 0..INSTANCES {
-            holds(kind, &format!("{kind} {k}"), &object(kind, SEED, k));
-        }
-    }
-}
-
 #[test]
-fn every_object_is_a_sound_mesh() {
-    for_all(|_, what, object| {
+fn every_object_is_a_sound_mesh_that_stands_about_the_origin_at_its_kind_s_size() {
+    let all = ObjectKind::ALL.into_iter().flat_map(|kind| (0..INSTANCES).map(move |k| (kind, k)));
+    for (kind, k) in all {
+        let (what, object) = (format!("{kind} {k}"), object(kind, SEED, k));
         let mesh = &object.mesh;
         assert!(mesh.vertices.iter().all(|v| v.is_finite()), "{what}");
         for triangle in &mesh.triangles {
@@ -71,12 +64,6 @@ fn every_object_is_a_sound_mesh() {
         }
         assert!(object.glass.start <= object.glass.end, "{what}");
         assert_eq!(object.glass.end as usize, mesh.triangles.len(), "{what}: glass comes last");
-    });
-}
-
-#[test]
-fn every_object_stands_on_the_ground_about_the_origin_at_its_kind_s_size() {
-    for_all(|kind, what, object| {
         let vertices = object.mesh.vertices.iter().copied();
         let low = vertices.clone().fold(DVec3::INFINITY, DVec3::min);
         let high = vertices.fold(DVec3::NEG_INFINITY, DVec3::max);
@@ -87,7 +74,7 @@ fn every_object_stands_on_the_ground_about_the_origin_at_its_kind_s_size() {
             let size_m = high - low;
             assert!((least..=most).contains(&size), "{what}: {size_m:.2} m, {least} to {most}");
         }
-    });
+    }
 }
 
 #[test]

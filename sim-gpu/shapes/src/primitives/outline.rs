@@ -18,7 +18,6 @@ pub fn superellipse(half: DVec2, exponent: f64, n: usize) -> Vec<DVec2> {
         .collect()
 }
 
-/// A rectangle.
 pub fn rectangle(half: DVec2) -> Vec<DVec2> {
     [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
         .map(|(x, y)| DVec2::new(x, y) * half)

@@ -71,7 +71,6 @@ impl Profile {
 /// The cross-section of an upright surface.
 #[derive(Clone, Copy, Debug)]
 pub enum Section {
-    /// A circle.
     Round,
     /// An ellipse; y is `ratio` times x.
     Oval(f64),
@@ -81,7 +80,6 @@ pub enum Section {
     Polygon(usize),
     /// A circle with `count` waves of relative `depth`.
     Fluted {
-        /// Waves around.
         count: usize,
         /// Half the waves' height over the radius.
         depth: f64,
@@ -153,7 +151,6 @@ pub fn frustum(b: &mut Builder, base: DVec3, radii_m: [f64; 2], height_m: f64) {
     b.shifted(base, |b| profile.revolve(b, Section::Round));
 }
 
-/// An ellipsoid.
 pub fn ellipsoid(b: &mut Builder, centre: DVec3, radii_m: DVec3) {
     let widest_m = radii_m.max_element();
     let n = b.curved(FRAC_PI_2 * 2.0 * widest_m, 6);

@@ -5,7 +5,6 @@ use glam::DVec2;
 use super::revolve::revolve;
 use super::{Builder, Profile, Sampler, Section};
 
-/// The side of a vessel.
 #[derive(Clone, Copy, Debug)]
 pub enum Wall {
     /// One sheet without thickness.
@@ -37,7 +36,6 @@ pub struct Vessel {
 }
 
 impl Vessel {
-    /// A vessel without twist or foot.
     pub fn new(outside: Profile, wall: Wall, section: Section) -> Self {
         Self { outside, wall, section, twist_rad: 0.0, hollow_from_m: f64::NEG_INFINITY }
     }

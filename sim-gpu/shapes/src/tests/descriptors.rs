@@ -8,9 +8,7 @@ use crate::tessellation::bounds;
 use formats::rng::StreamKey;
 use sim_gpu::internals::mesh::TriangleMesh;
 
-/// The number of bins of the distance histogram.
 const BINS: usize = 24;
-/// The number of measured pairs of points.
 const PAIRS: usize = 4000;
 
 /// The logarithms of the sides of the bounding box over its height, the longer side first, so that
@@ -55,7 +53,6 @@ pub fn height_profile(mesh: &TriangleMesh) -> Vec<f64> {
     shares.chain(radii).collect()
 }
 
-/// Random points, uniform on the surface.
 fn surface_points(mesh: &TriangleMesh, n: usize) -> Vec<DVec3> {
     let mut sums = Vec::with_capacity(mesh.triangles.len());
     let mut sum = 0.0;

@@ -4,7 +4,6 @@ use crate::primitives::{
     Builder, DVec2, DVec3, Makes, Sampler, block, cylinder, loft, outline, rod, skin,
 };
 
-/// The makes, with their weights.
 pub const MAKES: Makes = &[(4, guard_rail), (3, concrete), (2, boards), (2, crowd), (1, filled)];
 
 /// A steel beam with two waves, 0.31 m high and 0.08 m deep (AASHTO M 180), its top 0.75 m up (EN

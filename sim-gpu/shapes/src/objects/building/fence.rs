@@ -8,7 +8,6 @@ struct Stretch {
     high_m: f64,
     /// Half the width of the posts.
     post_m: f64,
-    /// The distance between posts.
     apart_m: f64,
 }
 

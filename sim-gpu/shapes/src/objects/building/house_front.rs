@@ -25,7 +25,6 @@ struct Front {
     wide_below: Option<Filling>,
 }
 
-/// Builds a house front.
 pub fn build(b: &mut Builder, s: &mut Sampler) {
     let front = Front::draw(s);
     let door = s.count(0, front.n_bays - 1);

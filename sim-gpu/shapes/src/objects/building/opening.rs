@@ -5,9 +5,7 @@ use crate::primitives::{Builder, DVec2, DVec3, block};
 /// An upright rectangle across x, in (y, z).
 #[derive(Clone, Copy)]
 pub struct Rect {
-    /// The corner with the least y and z.
     pub low: DVec2,
-    /// The opposite corner.
     pub high: DVec2,
 }
 
@@ -34,21 +32,16 @@ impl Rect {
     }
 }
 
-/// The filling of an opening.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Filling {
-    /// A pane of glass.
     Glass,
-    /// Two panes of glass with a bar between them.
     Panes,
     /// A door, a roller blind, or a curtain behind the glass.
     Solid,
 }
 
-/// An opening in a wall.
 #[derive(Clone, Copy)]
 pub struct Opening {
-    /// The hole in the wall.
     pub hole: Rect,
     /// The distance of the filling behind the face of the wall.
     pub recess_m: f64,

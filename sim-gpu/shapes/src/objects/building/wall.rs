@@ -3,7 +3,6 @@
 use crate::objects::plant::uneven::{Ripple, warped_box};
 use crate::primitives::{Builder, DAffine3, DVec3, Sampler, block};
 
-/// The form of a wall.
 struct Masonry {
     thick_m: f64,
     /// How far stones stand out; 0 for plaster and concrete.

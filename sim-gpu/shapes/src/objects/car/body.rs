@@ -10,7 +10,6 @@ const ROWS: [f64; 6] = [0.0, 0.2, 0.42, 0.65, 0.88, 1.0];
 /// The columns of points at the nose and the tail, as shares of the half width.
 const END_SHARES: [f64; 5] = [0.0, 0.3, 0.55, 0.75, 0.88];
 
-/// The shape of the body.
 pub struct Body<'a> {
     form: &'a Form,
     arches: [Arch; 2],

@@ -12,7 +12,6 @@ pub struct Cabin {
     crown_m: f64,
 }
 
-/// The roof's shape.
 struct Roof<'a> {
     form: &'a Form,
     half_y: f64,

@@ -47,7 +47,6 @@ fn mirrors(b: &mut Builder, s: &mut Sampler, form: &Form, body: &Body) {
     });
 }
 
-/// A rack of bars on the roof.
 fn rack(b: &mut Builder, [rear, front]: [f64; 2], roof_y: f64, roof_m: f64) {
     for k in 0..4 {
         let x = rear + f64::from(k) / 3.0 * (front - rear);

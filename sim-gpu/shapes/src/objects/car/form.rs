@@ -17,7 +17,6 @@ struct Styles {
     style: Vec<Ranges>,
 }
 
-/// A body style.
 #[derive(Clone, Copy, PartialEq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Style {
@@ -80,7 +79,6 @@ pub struct Form {
     pub rear: [f64; 2],
     /// The width of the roof over the width of the car.
     pub roof_share: f64,
-    /// The radius of the wheels.
     pub wheel_m: f64,
     /// x of the rear axle and of the front axle.
     pub axles: [f64; 2],

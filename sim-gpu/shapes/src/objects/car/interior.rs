@@ -33,7 +33,6 @@ pub fn build(b: &mut Builder, s: &mut Sampler, form: &Form) {
     }
 }
 
-/// The measures of a seat on the left.
 struct Seat {
     y: f64,
     width_m: f64,

@@ -7,9 +7,7 @@ use crate::primitives::Builder;
 /// An upright line of a wall, and the panel between it and the next one.
 #[derive(Clone, Copy)]
 pub struct Column {
-    /// The lower end.
     pub foot: DVec3,
-    /// The upper end.
     pub head: DVec3,
     /// The lower and the upper end of the pane, as shares of the height; `None` for sheet metal.
     pub pane: Option<[f64; 2]>,
@@ -58,9 +56,7 @@ pub fn lid(b: &mut Builder, edge: &[DVec3], crown_m: f64) {
 pub struct Arch {
     /// x of the axle.
     pub x: f64,
-    /// The height of the axle.
     pub z: f64,
-    /// The radius of the opening.
     pub radius_m: f64,
 }
 

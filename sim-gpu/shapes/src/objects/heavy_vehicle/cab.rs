@@ -12,7 +12,6 @@ pub struct Cab {
     pub axle_x: f64,
     /// x of the cab's rear wall.
     pub rear_x: f64,
-    /// The height of its roof.
     pub roof_m: f64,
     /// The length of a bonnet in front of the windscreen; 0 if the driver sits above the engine.
     pub bonnet_m: f64,

@@ -36,7 +36,6 @@ pub struct Shell {
 }
 
 impl Shell {
-    /// Adds both sides, front, rear, and the roof.
     pub fn build(&self, b: &mut Builder) {
         for side in [-1.0, 1.0] {
             let mirror = DAffine3::from_scale(DVec3::new(1.0, -side, 1.0));

@@ -155,7 +155,6 @@ fn rigid(b: &mut Builder, s: &mut Sampler) {
     cargo(&space, b, s);
 }
 
-/// The cab of a lorry above 12 t.
 fn heavy_cab(s: &mut Sampler, half_width_m: f64, wheel_m: f64, bonnet_m: f64) -> Cab {
     Cab {
         half_width_m: half_width_m - s.uniform(0.0, 0.03),

@@ -14,7 +14,6 @@ pub struct Measures {
     head_share: f64,
 }
 
-/// A leg's joints.
 #[derive(Clone, Copy)]
 pub struct Leg {
     pub knee: DVec3,

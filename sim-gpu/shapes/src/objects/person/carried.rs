@@ -13,14 +13,12 @@ pub enum Carried {
     Nothing,
     Backpack,
     ShoulderBag,
-    /// A bag that hangs from the hand.
     HandBag(DVec3),
     /// A box that both arms hold in front of the chest.
     Box(DVec3),
     Umbrella(DVec3),
     /// A suitcase on wheels that the hand pulls.
     Suitcase(DVec3),
-    /// A pram with its handle.
     Pram(DVec3),
 }
 

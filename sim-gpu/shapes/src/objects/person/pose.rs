@@ -17,7 +17,6 @@ pub struct Pose {
     pub twist_rad: f64,
     /// The rotation of the head to the left, and downwards.
     pub look_rad: [f64; 2],
-    /// The right and the left leg.
     pub legs: [Leg; 2],
     /// The right and the left wrist.
     pub hands: [DVec3; 2],

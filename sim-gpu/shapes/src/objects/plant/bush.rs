@@ -7,7 +7,6 @@ use super::uneven::{Lump, Ripple, direction};
 use super::wood::{Branch, Stem};
 use crate::primitives::{Builder, DAffine3, DVec2, DVec3, Makes, Sampler};
 
-/// The makes, with their weights.
 pub const MAKES: Makes =
     &[(5, loose), (6, trimmed), (2, thicket), (1, bare), (1, grass), (1, standard)];
 
@@ -90,7 +89,6 @@ fn coated(b: &mut Builder, s: &mut Sampler, body: &Lump) {
     }
 }
 
-/// A shrub in winter.
 fn bare(b: &mut Builder, s: &mut Sampler) {
     let height_m = s.uniform(0.6, 2.2);
     for _ in 0..s.count(6, 14) {

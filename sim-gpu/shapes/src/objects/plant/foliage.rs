@@ -11,7 +11,6 @@ const LEAF_AREA: f64 = 0.45;
 /// An ellipsoid that leaves fill.
 pub struct Clump {
     pub centre: DVec3,
-    /// Half the sizes.
     pub radii_m: DVec3,
 }
 

@@ -10,10 +10,8 @@ use super::uneven::{Lump, Ripple, direction};
 use super::wood::{Branch, Stem, bough};
 use crate::primitives::{Builder, DVec2, DVec3, Makes, Sampler};
 
-/// The makes, with their weights.
 pub const MAKES: Makes = &[(6, broadleaved), (2, conifer), (2, bare), (1, column), (1, palm)];
 
-/// The sizes of a tree with a crown.
 struct Form {
     height_m: f64,
     /// The height of the crown's lower end.
@@ -33,7 +31,6 @@ impl Form {
         Self { height_m, crown_m, reach_m, stem_m: height_m * s.uniform(0.01, 0.028) }
     }
 
-    /// The middle of the crown and half its sizes.
     fn crown(&self) -> (DVec3, DVec3) {
         let half_m = 0.5 * (self.height_m - self.crown_m);
         let radii_m = DVec3::new(self.reach_m, self.reach_m, half_m);
@@ -111,7 +108,6 @@ fn conifer(b: &mut Builder, s: &mut Sampler) {
     fill(b, s, &clumps, 4200, layers);
 }
 
-/// A tree in winter.
 fn bare(b: &mut Builder, s: &mut Sampler) {
     let form = Form::draw(s);
     let stems = form.stems(b, s);

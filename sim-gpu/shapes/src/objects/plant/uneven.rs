@@ -37,7 +37,6 @@ impl Ripple {
         Self { waves, amplitude_m: deviation_m * (2.0 / N_WAVES as f64).sqrt() }
     }
 
-    /// The height at `place`, metres.
     pub fn at(&self, place: DVec3) -> f64 {
         let sum: f64 = self.waves.iter().map(|(k, phase)| (k.dot(place) + phase).sin()).sum();
         self.amplitude_m * sum
@@ -47,7 +46,6 @@ impl Ripple {
 /// An ellipsoid or a box with soft edges. The part below height 0 is moved up to the ground.
 pub struct Lump {
     pub centre: DVec3,
-    /// Half the sizes.
     pub radii_m: DVec3,
     /// 2 for an ellipsoid; 4 and more approach a box.
     pub exponent: f64,
@@ -99,7 +97,6 @@ pub enum BoxFace {
     End(f64),
     /// The side towards +y or -y.
     Side(f64),
-    /// The upper side.
     Top,
 }
 

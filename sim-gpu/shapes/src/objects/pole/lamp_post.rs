@@ -6,7 +6,6 @@ use crate::primitives::{
     ellipsoid, frustum, rod, smooth_tube,
 };
 
-/// The makes, with their weights.
 pub const MAKES: Makes = &[(4, arm), (3, post_top), (2, lantern)];
 
 /// A column that tapers upwards, sometimes with a wider foot.

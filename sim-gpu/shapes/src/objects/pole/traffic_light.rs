@@ -10,7 +10,6 @@ use crate::primitives::{
     Builder, DAffine3, DVec3, Makes, Sampler, Section, block, cushion, rod, sheet,
 };
 
-/// The makes, with their weights.
 pub const MAKES: Makes = &[(4, mast), (2, gantry), (2, pedestrian)];
 
 /// A head with `n` lenses that faces +x, with its middle at `centre`.

@@ -12,7 +12,6 @@ use crate::primitives::{
     Builder, DAffine3, DVec2, DVec3, Makes, Sampler, Section, block, outline, prism,
 };
 
-/// The makes, with their weights.
 pub const MAKES: Makes = &[(6, single), (3, board), (2, low_panel), (1, street_name), (2, stele)];
 
 /// Adds a plate across x with its middle at `centre`. The axes of `outline` point up and to the

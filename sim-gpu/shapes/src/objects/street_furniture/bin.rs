@@ -5,7 +5,6 @@ use crate::primitives::{
     cylinder, ellipsoid, loft, outline, prism, rod,
 };
 
-/// The makes, with their weights.
 pub const MAKES: Makes =
     &[(3, litter), (4, two_wheels), (3, four_wheels), (1, skip), (1, bottle_bank), (2, group)];
 

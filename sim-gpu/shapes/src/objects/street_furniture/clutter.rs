@@ -7,7 +7,6 @@ use crate::primitives::{
     rod,
 };
 
-/// The makes, with their weights.
 pub const MAKES: Makes = &[
     (3, boxes),
     (3, rocks),

@@ -48,7 +48,6 @@ impl Bicycle {
         }
     }
 
-    /// The places where a rider touches it.
     pub fn contacts(&self) -> Contacts {
         let soles = [-1.0, 1.0].map(|side| self.pedal(side) + 0.01 * DVec3::Z);
         Contacts { saddle: self.saddle + 0.02 * DVec3::Z, grip: self.grip, soles }

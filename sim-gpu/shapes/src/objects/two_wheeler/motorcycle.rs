@@ -45,7 +45,6 @@ impl Motorcycle {
         }
     }
 
-    /// The places where a rider touches it.
     pub fn contacts(&self) -> Contacts {
         let sole = if self.scooter {
             DVec3::new(0.22, 0.12, 0.31)
@@ -182,7 +181,6 @@ impl Motorcycle {
         block(b, DVec3::new(rear.x + 0.2, 0.0, 0.3), DVec3::new(0.4, 1.4 * w, 0.2));
     }
 
-    /// A silencer beside the rear wheel.
     fn exhaust(&self, b: &mut Builder, rear: DVec3) {
         let y = -(0.5 * self.tyre_m[0] + 0.1);
         let from = DVec3::new(rear.x + 0.45, y, rear.z + 0.02);

@@ -4,7 +4,6 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use crate::primitives::{Builder, DAffine3, DVec2, DVec3, Profile, Section, smooth_tube};
 
-/// The inside of a wheel.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Filling {
     /// The number of spokes, and their width in metres.
