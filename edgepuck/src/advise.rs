@@ -4,7 +4,7 @@
 use crate::flags::positive;
 use crate::sampler_config::SamplerConfig;
 use crate::significant_digits::digits;
-use crate::trade_record::{self as row, Device, Part, Row};
+use crate::trade_record::{self as row, Device, Measurement, Part};
 use crate::{Outcome, Usage};
 use anyhow::{Context, Result, bail};
 use std::cmp::Ordering;
@@ -12,7 +12,6 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::PathBuf;
 
-/// Flags of `advise`.
 #[derive(clap::Args)]
 pub struct AdviseArgs {
     /// Device that runs the classifier
@@ -41,9 +40,8 @@ pub struct AdviseArgs {
 }
 
 /// The time on the device, and the row.
-type Timed<'a> = (f64, &'a Row);
+type Timed<'a> = (f64, &'a Measurement);
 
-/// Prints one configuration and the reason for it.
 pub fn run(args: &AdviseArgs) -> Result<Outcome> {
     args.check()?;
     let (name, rows) = match &args.record {
@@ -55,13 +53,14 @@ pub fn run(args: &AdviseArgs) -> Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-fn advise(args: &AdviseArgs, rows: &[Row]) -> Result<String> {
+fn advise(args: &AdviseArgs, rows: &[Measurement]) -> Result<String> {
     // infer-cpu runs all T-Nets of a model, so other settings are not a choice.
-    let runs_all = |row: &&Row| matches!(row.t_nets.as_str(), "" | "both");
+    let runs_all = |row: &&Measurement| matches!(row.t_nets.as_str(), "" | "both");
     // An older record may have samplers that infer-cpu no longer has.
     let is_known =
-        |row: &&Row| row.sampler.is_empty() || SamplerConfig::named(&row.sampler).is_some();
-    let is_choice = |row: &&Row| row.part == Part::Classifier && runs_all(row) && is_known(row);
+        |row: &&Measurement| row.sampler.is_empty() || SamplerConfig::named(&row.sampler).is_some();
+    let is_choice =
+        |row: &&Measurement| row.part == Part::Classifier && runs_all(row) && is_known(row);
     let choices = rows.iter().filter(is_choice);
     let timed: Vec<Timed> = choices.filter_map(|row| Some((row.ms(args.device)?, row))).collect();
     if timed.is_empty() {
@@ -190,9 +189,8 @@ fn one_line((ms, row): Timed) -> String {
     )
 }
 
-/// The command line of the configuration.
-fn command(row: &Row) -> String {
-    let Row { model_file, precision, .. } = row;
+fn command(row: &Measurement) -> String {
+    let Measurement { model_file, precision, .. } = row;
     let mut words = format!("infer-cpu classify --model {model_file}");
     // A row names the sampler, and after a colon the front end of `cpl`.
     let mut sampler = row.sampler.split(':');
@@ -217,8 +215,8 @@ fn share(word: &str) -> Result<f64, String> {
 mod tests {
     use super::*;
 
-    fn row(model: &str, ms_pi5: f64, right: usize, threads: usize) -> Row {
-        let row = Row {
+    fn row(model: &str, ms_pi5: f64, right: usize, threads: usize) -> Measurement {
+        let row = Measurement {
             part: Part::Classifier,
             model: model.to_owned(),
             t_nets: "both".to_owned(),
@@ -227,12 +225,12 @@ mod tests {
             threads: Some(threads),
             ms_pi5: Some(ms_pi5),
             megabytes: Some(2.0),
-            ..Row::default()
+            ..Measurement::default()
         };
         row.with_accuracy(right, 1000)
     }
 
-    fn rows() -> Vec<Row> {
+    fn rows() -> Vec<Measurement> {
         vec![
             row("small", 0.3, 850, 4),
             row("middle", 0.6, 895, 4),
@@ -248,7 +246,9 @@ mod tests {
     }
 
     #[test]
-    fn the_most_accurate_within_the_time_is_advised_and_what_a_little_less_saves() {
+    fn the_most_accurate_within_the_time_or_the_fastest_that_is_accurate_enough_is_advised() {
+        let advice = advise(&asked(None, Some(0.89)), &rows()).unwrap();
+        assert!(advice.starts_with("middle"), "{advice}");
         let advice = advise(&asked(Some(5.0), None), &rows()).unwrap();
         assert!(advice.starts_with("large"), "{advice}");
         assert!(advice.contains("1 thread:"), "of equals fewer threads: {advice}");
@@ -260,15 +260,9 @@ mod tests {
     }
 
     #[test]
-    fn the_fastest_that_is_accurate_enough_is_advised() {
-        let advice = advise(&asked(None, Some(0.89)), &rows()).unwrap();
-        assert!(advice.starts_with("middle"), "{advice}");
-    }
-
-    #[test]
     fn a_configuration_is_a_command_line() {
-        let row = Row { sampler: "cpl:own".to_owned(), ..row("m", 1.0, 1, 2) };
-        let row = Row { precision: "i8".to_owned(), ..row };
+        let row = Measurement { sampler: "cpl:own".to_owned(), ..row("m", 1.0, 1, 2) };
+        let row = Measurement { precision: "i8".to_owned(), ..row };
         assert_eq!(
             command(&row),
             "infer-cpu classify --model m.safetensors --sampler cpl --front own \
@@ -278,7 +272,7 @@ mod tests {
 
     #[test]
     fn a_sampler_that_infer_cpu_lacks_is_not_advised() {
-        let best = Row { sampler: "cpl:own:table8".to_owned(), ..row("best", 0.1, 999, 4) };
+        let best = Measurement { sampler: "cpl:own:table8".to_owned(), ..row("best", 0.1, 999, 4) };
         let rows = [rows(), vec![best]].concat();
         let advice = advise(&asked(Some(5.0), None), &rows).unwrap();
         assert!(advice.starts_with("large"), "{advice}");

@@ -18,7 +18,6 @@ pub struct BrightnessArgs {
 }
 
 impl BrightnessArgs {
-    /// Checks the values.
     pub fn check(&self) -> Result<(), Usage> {
         within("--reflectivity", self.reflectivity, 0.0..=1.0)
             .map_err(|error| Usage(error.to_string()))

@@ -5,7 +5,6 @@ use anyhow::Context;
 use edgepuck_dataset::{Publication, publish};
 use std::path::PathBuf;
 
-/// Flags of `card`.
 #[derive(Clone, clap::Args)]
 pub struct CardArgs {
     /// Folder of a finished dataset
@@ -38,7 +37,6 @@ pub struct CardArgs {
     overwrite: bool,
 }
 
-/// Writes the card and the metadata.
 pub fn run(args: &CardArgs) -> anyhow::Result<Outcome> {
     let CardArgs { folder, name, license, url, creator, published, overwrite } = args.clone();
     let full = folder.canonicalize().with_context(|| folder.display().to_string())?;

@@ -1,10 +1,8 @@
 //! Opens the adapter that a command line asks for.
 
 use anyhow::Context;
-use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::Caster;
 use sim_gpu::internals::job::Culling;
-use sim_gpu::{Caster, Effects};
-use std::sync::Arc;
 
 /// What a GPU may lack.
 pub const HOW_TO_GET_VULKAN: &str = "a GPU needs a Vulkan driver, which on Debian or Ubuntu \
@@ -32,11 +30,6 @@ impl CasterArgs {
             _ => eprintln!("Casting on {}.", caster.name()),
         }
         Ok(caster)
-    }
-
-    /// As [`CasterArgs::caster`], for these effects alone.
-    pub fn open(&self, effects: &Effects) -> anyhow::Result<Arc<OpenCaster>> {
-        Ok(self.caster()?.for_effects(effects)?)
     }
 
     /// Whether beams that cannot hit are cast.

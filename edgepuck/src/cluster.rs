@@ -17,7 +17,6 @@ formats::named! {
     }
 }
 
-/// Flags of `cluster`.
 #[derive(clap::Args)]
 pub struct ClusterArgs {
     /// Scheduler of the tasks: slurm, kubernetes or hyperqueue
@@ -53,7 +52,6 @@ pub struct ClusterArgs {
     words: Vec<String>,
 }
 
-/// Prints the job file.
 pub fn run(args: &ClusterArgs) -> anyhow::Result<Outcome> {
     print!("{}", job_file(args)?);
     Ok(Outcome::Success)

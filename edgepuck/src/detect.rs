@@ -14,9 +14,8 @@ use crate::{Outcome, Usage, preview};
 /// The model that comes with the program.
 const BUNDLED: &str = "street-128";
 
-/// Flags of `detect`.
 #[derive(clap::Args)]
-pub struct DetectArgs {
+pub(crate) struct DetectArgs {
     #[command(flatten)]
     input: SweepArgs,
 
@@ -37,8 +36,7 @@ pub struct DetectArgs {
     precision: Precision,
 }
 
-/// Detects the objects of the sweep and writes them.
-pub fn run(args: &DetectArgs) -> anyhow::Result<Outcome> {
+pub(crate) fn run(args: &DetectArgs) -> anyhow::Result<Outcome> {
     let scan = args.input.read()?;
     let options = Options { precision: args.precision, ..Options::default() };
     let mut detector = Detector::open(&args.model, &options, args.min_points)?;

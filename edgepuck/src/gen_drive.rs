@@ -13,7 +13,6 @@ use indicatif::{ProgressBar, ProgressStyle};
 use crate::gen_scenes::read_recipe;
 use crate::{Outcome, Usage};
 
-/// Flags of `gen-drive`.
 #[derive(clap::Args)]
 pub struct Args {
     /// Scene recipe: street, yard, or the path of a TOML file
@@ -56,7 +55,6 @@ const MOST_SPEED_M_S: f64 = 100.0;
 /// The number of packets that are fired together, on all cores: about one revolution.
 const BATCH: usize = 150;
 
-/// The frequency of the poses.
 const POSES_HZ: u32 = 100;
 
 fn seconds(word: &str) -> Result<f64, String> {
@@ -73,7 +71,6 @@ fn speed(word: &str) -> Result<f64, String> {
     }
 }
 
-/// Simulates the drive and writes the capture, the poses and the ground truth.
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     if args.out.extension() != Some(OsStr::new("pcap")) {
         let found = args.out.display();

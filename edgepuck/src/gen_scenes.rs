@@ -16,9 +16,8 @@ use serde_json::{Value, json};
 use crate::caster::CasterArgs;
 use crate::{Outcome, preview, segment};
 
-/// Flags of `gen-scenes`.
 #[derive(clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     /// Scene recipe: street, room, yard, or the path of a TOML file
     #[arg(value_name = "RECIPE", default_value = "street")]
     recipe: PathBuf,
@@ -52,8 +51,7 @@ pub struct Args {
     caster: CasterArgs,
 }
 
-/// Draws and scans the scenes, and packs their clusters.
-pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let mut recipe = read_recipe(&args.recipe)?;
     recipe.use_sensors(&args.sensor);
     let meshes = args.meshes.as_deref();

@@ -5,9 +5,8 @@ use anyhow::Context;
 use edgepuck_shapes as shapes;
 use std::path::PathBuf;
 
-/// Flags of `gen-shapes`.
 #[derive(clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     /// Folder to write CLASS/{train,test}/NAME.off into
     #[arg(long, default_value = "data/shapes", value_name = "DIR")]
     out: PathBuf,
@@ -31,8 +30,7 @@ pub const TRAIN_PER_CLASS: u32 = 40;
 /// The default number of test shapes of each class.
 pub const TEST_PER_CLASS: u32 = 10;
 
-/// Writes the shapes.
-pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     shapes::write_tree(&args.out, args.seed, args.train, args.test)
         .context("cannot write the shapes")?;
     let classes = shapes::ShapeClass::ALL.len() as u32;

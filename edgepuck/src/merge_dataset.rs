@@ -4,7 +4,6 @@ use crate::{Outcome, gen_dataset};
 use edgepuck_dataset::merge;
 use std::path::PathBuf;
 
-/// Flags of `merge-dataset`.
 #[derive(clap::Args)]
 pub struct Args {
     /// Folders of all the shards
@@ -16,7 +15,6 @@ pub struct Args {
     out: PathBuf,
 }
 
-/// Merges the shards.
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let manifest = merge(&args.shards, &args.out)?;
     eprintln!("{} meshes: {}", manifest.meshes.len(), args.out.display());

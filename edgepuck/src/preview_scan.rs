@@ -4,7 +4,6 @@ use crate::{Outcome, preview};
 use formats::scan_file::read_scan;
 use std::path::{Path, PathBuf};
 
-/// Flags of `preview`.
 #[derive(clap::Args)]
 pub struct Args {
     /// Scan to draw, .npz or .ply; if it is in the folder clean/ of a dataset, its noisy version is
@@ -21,7 +20,6 @@ pub struct Args {
     out: PathBuf,
 }
 
-/// Draws the picture.
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let clean = read_scan(&args.scan)?;
     let noisy = match &args.noisy {

@@ -9,7 +9,6 @@ use sim_gpu::internals::sensor::{BeamPattern, Layout, SensorProfile, builtin_nam
 use std::fmt::Write;
 use std::path::PathBuf;
 
-/// Flags of `profile`.
 #[derive(clap::Args)]
 pub struct ProfileArgs {
     /// Sensor to check and describe: a built-in name, a TOML file, or the metadata (JSON) of an

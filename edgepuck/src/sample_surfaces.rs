@@ -8,7 +8,6 @@ use sim_gpu::internals::mesh::tree::discover;
 use sim_gpu::internals::sensor::Views;
 use std::path::PathBuf;
 
-/// Flags of `sample-surfaces`.
 #[derive(clap::Args)]
 pub struct SampleSurfacesArgs {
     /// Folder of meshes, as for gen-dataset
@@ -39,7 +38,6 @@ pub struct SampleSurfacesArgs {
     seed: u64,
 }
 
-/// Samples the meshes.
 pub fn run(args: &SampleSurfacesArgs) -> anyhow::Result<Outcome> {
     let meshes = discover(&args.meshes, args.seed)?;
     let config = SurfaceConfig {

@@ -18,18 +18,20 @@ impl SamplerConfig {
     pub const RANDOM: Self = Self::by("random", SamplerKind::Random, FrontChoice::Auto);
     /// Farthest point sampling.
     pub const FPS: Self = Self::by("fps", SamplerKind::Fps, FrontChoice::Auto);
-    /// One point in each cell of a grid.
-    pub const VOXEL: Self = Self::by("voxel", SamplerKind::Voxel, FrontChoice::Auto);
     /// Critical points of the model's own front end.
     pub const CPL: Self = Self::by("cpl:own", SamplerKind::Cpl, FrontChoice::Own);
     /// Critical points of the trunk of the input T-Net.
     pub const CPL_STN: Self = Self::by("cpl:stn", SamplerKind::Cpl, FrontChoice::Stn);
-    /// Critical points of the network's own trunk.
-    pub const CPL_TRUNK: Self = Self::by("cpl:trunk", SamplerKind::Cpl, FrontChoice::Trunk);
 
     /// All samplers.
-    pub const ALL: [Self; 6] =
-        [Self::RANDOM, Self::FPS, Self::VOXEL, Self::CPL, Self::CPL_STN, Self::CPL_TRUNK];
+    pub const ALL: [Self; 6] = [
+        Self::RANDOM,
+        Self::FPS,
+        Self::by("voxel", SamplerKind::Voxel, FrontChoice::Auto),
+        Self::CPL,
+        Self::CPL_STN,
+        Self::by("cpl:trunk", SamplerKind::Cpl, FrontChoice::Trunk),
+    ];
 
     const fn by(name: &'static str, kind: SamplerKind, front: FrontChoice) -> Self {
         Self { name, kind, front }

@@ -13,7 +13,6 @@ use sim_gpu::internals::simplify::Simplify;
 use sim_gpu::{Scan, Scene};
 use std::path::{Path, PathBuf};
 
-/// Flags of `scan`.
 #[derive(clap::Args)]
 pub struct Args {
     /// Scene file [default: two chairs, written to data/default-scene for you to edit]
@@ -39,7 +38,6 @@ pub struct Args {
     caster: CasterArgs,
 }
 
-/// Scans the scene.
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let format = ScanFormat::of_path(&args.out)?;
     let scene_file = match &args.scene {

@@ -29,7 +29,6 @@ pub struct SweepArgs {
     sensor: Option<Vec<f64>>,
 }
 
-/// Flags of `segment`.
 #[derive(clap::Args)]
 pub struct SegmentArgs {
     #[command(flatten)]
@@ -46,7 +45,6 @@ pub struct SegmentArgs {
     radius: Option<f32>,
 }
 
-/// Segments the sweep and writes the results.
 pub fn run(args: &SegmentArgs) -> anyhow::Result<Outcome> {
     let scan = args.input.read()?;
     let settings = args.radius.map_or_else(Settings::default, Settings::of_components);

@@ -33,7 +33,7 @@ formats::named! {
 
 /// A measured setting of all parameters. Fields that do not apply to its part are empty.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Row {
+pub struct Measurement {
     /// The part of the pipeline.
     pub part: Part,
     /// The clouds of the measurement.
@@ -81,8 +81,6 @@ pub struct Row {
     pub ms_here: Option<f64>,
     /// Modelled time of a classification on a Raspberry Pi 5.
     pub ms_pi5: Option<f64>,
-    /// Energy of a scan or a classification, if this machine can measure it.
-    pub joules: Option<f64>,
     /// Mean size of a scan's file, or size of the weights in the precision.
     pub megabytes: Option<f64>,
 
@@ -122,9 +120,8 @@ pub struct Row {
     pub front_pi5: bool,
 }
 
-impl Row {
+impl Measurement {
     /// The row with the accuracy of `right` correct answers for `clouds` clouds.
-    #[must_use]
     pub fn with_accuracy(mut self, right: usize, clouds: usize) -> Self {
         (self.right, self.clouds) = (right, clouds);
         self.accuracy = right as f64 / clouds.max(1) as f64;
@@ -133,7 +130,6 @@ impl Row {
     }
 
     /// The row with the times of a scan that fires `rays` rays in `seconds` seconds of CPU time.
-    #[must_use]
     pub fn with_time(mut self, rays: usize, seconds: f64) -> Self {
         self.rays_per_cpu_s = Some(rays as f64 / seconds);
         self.scans_per_cpu_s = Some(1.0 / seconds);
@@ -142,7 +138,6 @@ impl Row {
     }
 
     /// Time in milliseconds on `device`.
-    #[must_use]
     pub fn ms(&self, device: Device) -> Option<f64> {
         match device {
             Device::Pi5 => self.ms_pi5,
@@ -151,7 +146,6 @@ impl Row {
     }
 
     /// Whether the row is on the Pareto front of `device`.
-    #[must_use]
     pub fn on_front(&self, device: Device) -> bool {
         match device {
             Device::Pi5 => self.front_pi5,
@@ -161,7 +155,7 @@ impl Row {
 }
 
 /// The settings in words.
-impl fmt::Display for Row {
+impl fmt::Display for Measurement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut words: Vec<String> = Vec::new();
         match self.part {
@@ -191,7 +185,7 @@ impl fmt::Display for Row {
 }
 
 /// Writes `rows` to `path` as CSV.
-pub fn write(rows: &[Row], path: &Path) -> Result<()> {
+pub fn write(rows: &[Measurement], path: &Path) -> Result<()> {
     let mut csv = csv::Writer::from_writer(Vec::new());
     for row in rows {
         csv.serialize(row)?;
@@ -200,19 +194,19 @@ pub fn write(rows: &[Row], path: &Path) -> Result<()> {
 }
 
 /// The record that is part of this program.
-pub fn bundled() -> Result<Vec<Row>> {
+pub fn bundled() -> Result<Vec<Measurement>> {
     parse(edgepuck_assets::TRADE_RECORD.as_bytes()).context("the built-in record")
 }
 
 /// Reads the record that [`write()`] wrote to `path`.
-pub fn read(path: &Path) -> Result<Vec<Row>> {
+pub fn read(path: &Path) -> Result<Vec<Measurement>> {
     let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
     parse(&bytes).with_context(|| path.display().to_string())
 }
 
-fn parse(bytes: &[u8]) -> Result<Vec<Row>> {
+fn parse(bytes: &[u8]) -> Result<Vec<Measurement>> {
     let mut csv = csv::Reader::from_reader(bytes);
-    let rows: Result<Vec<Row>, csv::Error> = csv.deserialize().collect();
+    let rows: Result<Vec<Measurement>, csv::Error> = csv.deserialize().collect();
     let rows = rows.context("expected a record of `cargo xtask trade`")?;
     ensure!(!rows.is_empty(), "expected a record of `cargo xtask trade`, found no rows");
     Ok(rows)
@@ -226,8 +220,12 @@ mod tests {
     fn rows_survive_a_round_trip() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("trade.csv");
-        let scan = Row { noise_m: Some(0.01), joules: None, ..Row::default() };
-        let class = Row { part: Part::Classifier, model: "a, \"b\"".to_owned(), ..Row::default() };
+        let scan = Measurement { noise_m: Some(0.01), ..Measurement::default() };
+        let class = Measurement {
+            part: Part::Classifier,
+            model: "a, \"b\"".to_owned(),
+            ..Measurement::default()
+        };
         let rows = [scan.with_accuracy(9, 10), class.with_accuracy(0, 0)];
         write(&rows, &path).unwrap();
         assert_eq!(read(&path).unwrap(), rows);
@@ -237,7 +235,7 @@ mod tests {
     fn a_line_that_is_no_row_is_named() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("trade.csv");
-        write(&[Row::default(), Row::default()], &path).unwrap();
+        write(&[Measurement::default(), Measurement::default()], &path).unwrap();
         let text = std::fs::read_to_string(&path).unwrap().replacen("\nscan,", "\nscam,", 1);
         std::fs::write(&path, text).unwrap();
         let error = format!("{:#}", read(&path).unwrap_err());

@@ -14,7 +14,6 @@ use sim_gpu::internals::sensor::SensorProfile;
 use sim_gpu::internals::weather::{Air, Fates, Medium, in_weather};
 use std::path::PathBuf;
 
-/// Flags of `weather`.
 #[derive(clap::Args)]
 pub struct WeatherArgs {
     #[command(flatten)]
@@ -61,7 +60,6 @@ pub struct WeatherArgs {
     seed: u64,
 }
 
-/// Reads a scan, and writes it with the weather.
 pub fn run(args: &WeatherArgs) -> anyhow::Result<Outcome> {
     let usage = |error: &dyn std::fmt::Display| Usage(error.to_string());
     let format = ScanFormat::of_path(&args.out)?;

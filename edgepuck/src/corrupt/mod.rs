@@ -12,7 +12,6 @@ use plan::{Entry, Plan};
 use sim_gpu::internals::sensor::SensorProfile;
 use std::path::PathBuf;
 
-/// Flags of `corrupt`.
 #[derive(clap::Args)]
 #[command(after_help = "\
 For a sweep, --out gets a scan for each corruption and severity of Robo3D, such as fog-1.npz.
@@ -59,7 +58,6 @@ pub struct CorruptArgs {
     seed: u64,
 }
 
-/// Writes the chosen corruptions of a sweep or of meshes.
 pub fn run(args: &CorruptArgs) -> anyhow::Result<Outcome> {
     let plan = Plan::read(args.plan.as_deref())?;
     if args.list {
@@ -111,7 +109,6 @@ fn write_list(written: &[Written<'_>], out: &std::path::Path) -> anyhow::Result<
     Ok(formats::atomic::write_bytes(&out.join("corruptions.csv"), csv.into_inner()?)?)
 }
 
-/// A usage error with this cause.
 fn usage(error: impl std::fmt::Display) -> Usage {
     Usage(error.to_string())
 }

@@ -20,7 +20,6 @@ pub struct Plan {
     /// Corruptions of mesh scans.
     #[serde(default)]
     pub object: Vec<Entry<ObjectCorruption>>,
-    /// Corruptions of other benchmarks that are left out.
     #[serde(default)]
     pub left_out: Vec<LeftOut>,
 }
@@ -29,7 +28,6 @@ pub struct Plan {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Entry<T> {
-    /// The name.
     pub name: String,
     /// The physical cause.
     pub by: String,
@@ -41,11 +39,9 @@ pub struct Entry<T> {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LeftOut {
-    /// The name.
     pub name: String,
     /// The benchmark.
     pub of: String,
-    /// The reason.
     pub because: String,
 }
 

@@ -33,28 +33,20 @@ pub fn add(
 /// The features to pool, `[batch, features, all]`, by infer-cpu's choice of a front end, and
 /// whether they are those of the input T-Net.
 fn front(graph: &mut Graph, net: &Net, cloud: &str) -> anyhow::Result<(String, bool)> {
-    let mut entry = || transposed(graph, "cpl.entry", cloud);
-    match (&net.front, &net.stn, &net.fstn) {
-        (Some(layers), ..) => {
-            let entry = entry();
-            Ok((convolutions(graph, layers, &entry, "cpl"), false))
-        }
-        (None, Some(stn), _) => {
-            let entry = entry();
-            Ok((convolutions(graph, &stn.convs, &entry, "feat.stn"), true))
-        }
+    let (layers, prefix) = match (&net.front, &net.stn, &net.fstn) {
+        (Some(layers), ..) => (layers, "cpl"),
+        (None, Some(stn), _) => (&stn.convs, "feat.stn"),
         (None, None, None) => {
-            let all = NetInputs {
-                points: cloud.to_owned(),
-                cloud: Some(cloud.to_owned()),
-                pooled_stn: None,
-            };
-            Ok((trunk(graph, net, &all, "cpl"), false))
+            let points = cloud.to_owned();
+            let all = NetInputs { cloud: Some(points.clone()), points, pooled_stn: None };
+            return Ok((trunk(graph, net, &all, "cpl"), false));
         }
         (None, None, Some(_)) => {
             bail!("it has neither a front end of its own nor a T-Net of coordinates")
         }
-    }
+    };
+    let entry = transposed(graph, "cpl.entry", cloud);
+    Ok((convolutions(graph, layers, &entry, prefix), net.front.is_none()))
 }
 
 /// The score of each point, `[batch, all]`: the sum of the maxima above 0 that it wins.

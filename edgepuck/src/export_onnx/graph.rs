@@ -116,25 +116,19 @@ fn value(name: &str, elem_type: i32, shape: &[Size<'_>]) -> ValueInfoProto {
 
 /// An attribute with one whole number.
 pub fn int(name: &str, i: i64) -> AttributeProto {
-    AttributeProto { name: name.to_owned(), i, r#type: attribute_type::INT, ..Default::default() }
+    AttributeProto { i, ..attribute(name, attribute_type::INT) }
 }
 
 /// An attribute with a list of whole numbers.
 pub fn ints(name: &str, ints: &[i64]) -> AttributeProto {
-    AttributeProto {
-        name: name.to_owned(),
-        ints: ints.to_vec(),
-        r#type: attribute_type::INTS,
-        ..Default::default()
-    }
+    AttributeProto { ints: ints.to_vec(), ..attribute(name, attribute_type::INTS) }
 }
 
 /// An attribute with a string.
 pub fn word(name: &str, word: &str) -> AttributeProto {
-    AttributeProto {
-        name: name.to_owned(),
-        s: word.as_bytes().to_vec(),
-        r#type: attribute_type::STRING,
-        ..Default::default()
-    }
+    AttributeProto { s: word.into(), ..attribute(name, attribute_type::STRING) }
+}
+
+fn attribute(name: &str, kind: i32) -> AttributeProto {
+    AttributeProto { name: name.to_owned(), r#type: kind, ..Default::default() }
 }

@@ -31,7 +31,6 @@ const IR_VERSION: i64 = 8;
 /// The largest message of protobuf, in bytes.
 const LARGEST: usize = i32::MAX as usize;
 
-/// Flags of `export-onnx`.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -72,7 +71,6 @@ pub struct ExportOnnxArgs {
     points: Option<u32>,
 }
 
-/// Exports the model.
 pub fn run(args: &ExportOnnxArgs) -> anyhow::Result<Outcome> {
     let path = find(&args.model);
     let (card, net) = read(&path)?;
@@ -103,7 +101,6 @@ fn find(model: &Path) -> PathBuf {
     found.unwrap_or_else(|| model.to_path_buf())
 }
 
-/// The name of the built-in model.
 const BUILTIN: &str = "edge-64";
 
 /// Reads the model file, or the model that is built into this program.

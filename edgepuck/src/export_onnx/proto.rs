@@ -6,7 +6,6 @@ use prost::Message;
 /// A whole file.
 #[derive(Clone, PartialEq, Message)]
 pub struct ModelProto {
-    /// Version of the messages.
     #[prost(int64, tag = "1")]
     pub ir_version: i64,
     #[prost(string, tag = "2")]
@@ -32,7 +31,6 @@ pub struct OperatorSetIdProto {
     pub version: i64,
 }
 
-/// An entry of the metadata.
 #[derive(Clone, PartialEq, Message)]
 pub struct StringStringEntryProto {
     #[prost(string, tag = "1")]
@@ -99,7 +97,6 @@ pub mod attribute_type {
 pub struct TensorProto {
     #[prost(int64, repeated, packed = "false", tag = "1")]
     pub dims: Vec<i64>,
-    /// See [`data_type`].
     #[prost(int32, tag = "2")]
     pub data_type: i32,
     #[prost(string, tag = "8")]
@@ -140,7 +137,6 @@ pub struct TensorTypeProto {
     pub shape: Option<TensorShapeProto>,
 }
 
-/// A size for each axis.
 #[derive(Clone, PartialEq, Message)]
 pub struct TensorShapeProto {
     #[prost(message, repeated, tag = "1")]

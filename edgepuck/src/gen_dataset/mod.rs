@@ -35,9 +35,8 @@ const DEFAULT_SHAPES: &str = "data/default-shapes";
 /// Folder of the dataset of the built-in shapes.
 const DEFAULT_OUT: &str = "data/lidar-shapes";
 
-/// Flags of `gen-dataset`.
 #[derive(clap::Args)]
-pub struct Args {
+pub(crate) struct Args {
     /// Folder of OBJ, OFF, PLY and STL files, as CLASS/{train,test}/NAME or in any other layout
     /// [default: built-in procedural shapes, written to data/default-shapes-SEED]
     #[arg(value_name = "MESHES")]
@@ -87,7 +86,7 @@ fn behind_name(words: &[String]) -> impl Iterator<Item = &str> {
 
 /// Checks the words of a command line for the tasks of a cluster, which share their folders. The
 /// folders need not exist on this machine.
-pub fn check_words_of_tasks(words: &[String]) -> anyhow::Result<()> {
+pub(crate) fn check_words_of_tasks(words: &[String]) -> anyhow::Result<()> {
     #[derive(Parser)]
     struct Words {
         #[command(flatten)]
@@ -111,8 +110,7 @@ pub fn check_words_of_tasks(words: &[String]) -> anyhow::Result<()> {
     Ok(check_layouts(&config, &[])?)
 }
 
-/// Makes or verifies a dataset.
-pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     if let Some(folder) = &args.verify {
         return check(folder);
     }
@@ -124,7 +122,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     };
     let out = args.out.clone().unwrap_or(default_out);
     let meshes = discover(&meshes_folder, config.seed)?;
-    let caster = args.caster.open(&config.cast_effects())?;
+    let caster = args.caster.caster()?.for_effects(&config.cast_effects())?;
     let plan = Plan {
         part: args.shard.map(|shard| (shard.number, shard.of)),
         begin: match (args.resume, args.overwrite) {
@@ -174,7 +172,7 @@ pub fn report_failures(failures: &[MeshFailure]) {
 }
 
 /// Draws the example picture, which is missing after an interruption, and prints its path.
-pub fn end(out: &Path, manifest: &Manifest) -> anyhow::Result<Outcome> {
+pub(crate) fn end(out: &Path, manifest: &Manifest) -> anyhow::Result<Outcome> {
     match example::draw(out, manifest).context("cannot draw the example")? {
         Some(picture) => eprintln!("Open this picture to see an example: {}", picture.display()),
         None => eprintln!("No scan holds a point, so no example picture was drawn."),
@@ -214,7 +212,6 @@ fn default_out(meshes: &Path) -> PathBuf {
     Path::new("data").join(format!("lidar-{name}"))
 }
 
-/// A usage error.
-fn usage(message: impl Into<String>) -> anyhow::Error {
-    Usage(message.into()).into()
+fn usage(message: impl std::fmt::Display) -> anyhow::Error {
+    Usage(message.to_string()).into()
 }

@@ -143,7 +143,6 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// The settings that the flags ask for.
     pub fn config(&self) -> anyhow::Result<DatasetConfig> {
         let mut sets = self.sets()?;
         let recommended = sets.iter().find_map(|set| match &set.viewpoints {
@@ -155,9 +154,9 @@ impl Settings {
         formats.sort_unstable();
         formats.dedup();
         if self.simplify.is_some() && self.attributes.contains(&Attribute::Triangle) {
-            return Err(usage(
-                "--simplify renumbers the triangles of a mesh: leave `triangle` out of --attributes",
-            ));
+            let cause = "--simplify renumbers the triangles of a mesh: leave `triangle` out of \
+                         --attributes";
+            return Err(usage(cause));
         }
         if self.simplify.is_some() && self.layout.contains(&Layout::Webdataset) {
             let cause = "--simplify cannot be used with --layout webdataset, which reads a mesh \
@@ -170,8 +169,7 @@ impl Settings {
                          sensor changes";
             return Err(usage(cause));
         }
-        within("--reflectivity", self.reflectivity, 0.0..=1.0)
-            .map_err(|error| usage(error.to_string()))?;
+        within("--reflectivity", self.reflectivity, 0.0..=1.0).map_err(usage)?;
         let mut returns = Returns::default();
         if formats.contains(&ScanFormat::Pcap) {
             returns = cast_as_packets_tell(&mut sets, &mut effects, self.returns)?;
@@ -179,13 +177,10 @@ impl Settings {
             return Err(usage("--returns applies to packets only: add --format pcap"));
         }
         for set in &sets {
-            effects.for_sensor(&set.sensor).map_err(|error| usage(error.to_string()))?;
+            effects.for_sensor(&set.sensor).map_err(usage)?;
         }
-        let variants = if effects == effects.clean() {
-            vec![Variant::Clean]
-        } else {
-            vec![Variant::Clean, Variant::Noisy]
-        };
+        let mut variants = vec![Variant::Clean];
+        variants.extend((effects != effects.clean()).then_some(Variant::Noisy));
         Ok(DatasetConfig {
             seed: self.seed,
             normalize: self.normalize.or(recommended).unwrap_or_default(),
@@ -232,7 +227,7 @@ impl Settings {
             intensity,
             ..Effects::default()
         };
-        effects.validate().map_err(|error| usage(error.to_string()))?;
+        effects.validate().map_err(usage)?;
         Ok(effects)
     }
 
@@ -275,7 +270,7 @@ impl Settings {
                 if let Some(jitter_deg) = self.azimuth_jitter {
                     views.azimuth_jitter_deg = jitter_deg;
                 }
-                views.validate().map_err(|error| usage(error.to_string()))?;
+                views.validate().map_err(usage)?;
                 Viewpoints::Views(views)
             }
         };
@@ -306,7 +301,6 @@ impl FromStr for FromTo {
     }
 }
 
-/// The contents of a file of effects.
 #[derive(serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 struct EffectsFile {

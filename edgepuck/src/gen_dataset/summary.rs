@@ -6,7 +6,6 @@ use std::path::Path;
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Duration;
 
-/// Prints the closing summary of a run that took `total`.
 pub fn print(out: &Path, manifest: &Manifest, progress: &Progress, total: Duration) {
     progress.notes().iter().for_each(|note| eprintln!("{note}"));
     let count = |counter: &std::sync::atomic::AtomicU64| counter.load(Relaxed);

@@ -13,7 +13,6 @@ use std::time::Duration;
 /// Pauses before a command is tried again, seconds.
 const PAUSES_S: [u64; 3] = [1, 4, 16];
 
-/// Flags of tars.
 #[derive(clap::Args)]
 #[command(next_help_heading = "Tars (--layout webdataset)")]
 pub struct TarArgs {
@@ -34,7 +33,6 @@ pub struct TarArgs {
     on_shard: Option<String>,
 }
 
-/// Makes the tars of `plan`.
 pub fn run(args: &TarArgs, plan: &Plan, caster: &OpenCaster) -> anyhow::Result<Outcome> {
     let progress = Progress::default();
     // A second Ctrl-C ends the program immediately; schedulers may repeat SIGTERM.

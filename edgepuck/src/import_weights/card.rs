@@ -8,7 +8,7 @@ use formats::hash;
 use formats::model_card::{ModelCard, Normalization};
 use formats::weights::Tensor;
 
-use super::checkpoint::{Accuracy, Checkpoint};
+use super::checkpoint::Checkpoint;
 use super::table::Table;
 
 /// Flags for the facts on the card that neither the checkpoint nor the table states, or that
@@ -64,18 +64,20 @@ impl CardArgs {
         card.points = self.points.or(card.points);
         card.normalization = self.normalization.unwrap_or(card.normalization);
         card.training_set = self.training_set.clone().or(card.training_set);
-        card.accuracy = match checkpoint.accuracy() {
+        card.accuracy = match &checkpoint.accuracy {
             _ if self.accuracy.is_some() => self.accuracy.clone(),
-            Accuracy::Stated(text) => Some(text.clone()),
-            Accuracy::Silent => card.accuracy,
-            Accuracy::Unread(kind) => {
+            Ok(stated) => stated.clone().or(card.accuracy),
+            Err(kind) => {
                 eprintln!("{}: its accuracy is a {kind}; --accuracy states it", path.display());
                 card.accuracy
             }
         };
         card.provenance = match &self.provenance {
             Some(text) => Some(text.clone()),
-            None => Some(source(path)?),
+            None => {
+                let name = path.file_name().unwrap_or_default().to_string_lossy();
+                Some(format!("{name}, SHA-256 {}", hash::of_file(path)?))
+            }
         };
         Ok(card)
     }
@@ -117,9 +119,4 @@ fn widths(tensors: &BTreeMap<String, Tensor>, stem: &str) -> Vec<usize> {
     let inputs = shape(1).and_then(|shape| shape.get(1)).copied();
     let outputs = (1..).map_while(|i| shape(i)?.first().copied());
     inputs.into_iter().chain(outputs).collect()
-}
-
-fn source(path: &Path) -> anyhow::Result<String> {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    Ok(format!("{name}, SHA-256 {}", hash::of_file(path)?))
 }

@@ -25,22 +25,12 @@ const MOST_ELEMENTS: usize = 1 << 27;
 pub struct Checkpoint {
     path: PathBuf,
     tensors: BTreeMap<String, pytorch_reader::Tensor>,
-    accuracy: Accuracy,
-}
-
-/// The accuracy of the model according to the checkpoint.
-#[derive(Debug, PartialEq)]
-pub enum Accuracy {
-    /// Not stated.
-    Silent,
-    /// Stated, as text.
-    Stated(String),
-    /// Stated by an object of this Python type, which is not read.
-    Unread(String),
+    /// The accuracy of the model, if the checkpoint states it; the error is the Python type of an
+    /// object that is not read.
+    pub accuracy: Result<Option<String>, String>,
 }
 
 impl Checkpoint {
-    /// Opens the checkpoint at `path`.
     pub fn open(path: &Path) -> anyhow::Result<Self> {
         let here = || format!("{}", path.display());
         let file = PytorchReader::new(path).with_context(here)?;
@@ -55,11 +45,6 @@ impl Checkpoint {
     /// The names of the model's tensors, sorted.
     pub fn names(&self) -> impl Iterator<Item = &str> + Clone {
         self.tensors.keys().map(String::as_str)
-    }
-
-    /// The accuracy of the model according to the checkpoint.
-    pub fn accuracy(&self) -> &Accuracy {
-        &self.accuracy
     }
 
     /// Reads the tensors in `names`, which maps new names to names in the checkpoint.
@@ -117,22 +102,19 @@ fn elements<const N: usize>(bytes: &[u8], decode: impl Fn([u8; N]) -> f32) -> Ve
 }
 
 /// The accuracy that yanx27's training script stores with the weights.
-fn accuracy(root: &PickleValue) -> Accuracy {
-    let PickleValue::Dict(entries) = root else { return Accuracy::Silent };
+fn accuracy(root: &PickleValue) -> Result<Option<String>, String> {
+    let PickleValue::Dict(entries) = root else { return Ok(None) };
     let mut stated = Vec::new();
     for (key, word) in [("instance_acc", "instance"), ("class_acc", "class")] {
         match entries.get(key) {
             Some(PickleValue::Float(share)) => {
                 stated.push(format!("{word} {:.2} %", 100.0 * share))
             }
-            Some(PickleValue::Unsupported(kind)) => return Accuracy::Unread(kind.clone()),
+            Some(PickleValue::Unsupported(kind)) => return Err(kind.clone()),
             _ => {}
         }
     }
-    match stated.is_empty() {
-        true => Accuracy::Silent,
-        false => Accuracy::Stated(format!("{}, as its checkpoint says", stated.join(", "))),
-    }
+    Ok((!stated.is_empty()).then(|| format!("{}, as its checkpoint says", stated.join(", "))))
 }
 
 #[cfg(test)]

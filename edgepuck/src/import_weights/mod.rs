@@ -18,7 +18,6 @@ use formats::weights::{Tensor, tensor_part, write_weights};
 use infer_cpu::{Classifier, Options};
 use table::{Names, Table};
 
-/// Flags of `import-weights`.
 #[derive(clap::Args)]
 pub struct ImportWeightsArgs {
     /// Checkpoint file that torch.save wrote
@@ -41,7 +40,6 @@ pub struct ImportWeightsArgs {
     card: CardArgs,
 }
 
-/// Imports the checkpoint.
 pub fn run(args: &ImportWeightsArgs) -> anyhow::Result<Outcome> {
     let checkpoint = Checkpoint::open(&args.checkpoint)?;
     let tables = match &args.table {

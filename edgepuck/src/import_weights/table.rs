@@ -23,7 +23,6 @@ const NUMBER: &str = "{i}";
 /// Largest number of unknown names in an error.
 const LISTED: usize = 5;
 
-/// An importer table.
 #[derive(Debug)]
 pub struct Table {
     /// A short name of the repository.
@@ -51,12 +50,10 @@ struct TableFile {
 pub type Names = BTreeMap<String, String>;
 
 impl Table {
-    /// The built-in tables.
     pub fn builtin() -> anyhow::Result<Vec<Self>> {
         BUILTIN.into_iter().map(|(path, text)| Self::parse(Path::new(path), text)).collect()
     }
 
-    /// Reads the table at `path`.
     pub fn read(path: &Path) -> anyhow::Result<Self> {
         let text = std::fs::read_to_string(path).with_context(|| format!("{}", path.display()))?;
         Self::parse(path, &text)

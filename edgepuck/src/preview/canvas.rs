@@ -16,39 +16,35 @@ pub type Area<'a> = DrawingArea<BitMapBackend<'a>, Shift>;
 const FONT: &[u8] = epaint_default_fonts::HACK_REGULAR;
 const FONT_NAME: &str = "preview";
 
-/// A picture of 8-bit RGB pixels.
-pub struct Canvas {
-    width: u32,
-    height: u32,
-    pixels: Vec<u8>,
-}
-
-impl Canvas {
-    /// A black picture of `width` x `height` pixels.
-    pub fn new(width: u32, height: u32) -> Result<Self> {
-        register_font(FONT_NAME, FontStyle::Normal, FONT)
-            .ok()
-            .context("invariant: the font that comes with the program can be read")?;
-        Ok(Self { width, height, pixels: vec![0; (width * height * 3) as usize] })
+/// Draws a picture of 8-bit RGB pixels to the PNG file `out`, atomically: `title` in a heading
+/// `title_height` pixels high, and below it what `draw` adds.
+pub fn draw_png(
+    out: &Path,
+    (width, height): (u32, u32),
+    (title, title_height): (&str, u32),
+    draw: impl FnOnce(&Area<'_>) -> Result<()>,
+) -> Result<()> {
+    register_font(FONT_NAME, FontStyle::Normal, FONT)
+        .ok()
+        .context("invariant: the font that comes with the program can be read")?;
+    let mut pixels = vec![0; (width * height * 3) as usize];
+    {
+        let area = BitMapBackend::with_buffer(&mut pixels, (width, height)).into_drawing_area();
+        area.fill(&WHITE)?;
+        let (heading, below) = area.split_vertically(title_height);
+        heading.draw_text(title, &text(24), (16, 16))?;
+        draw(&below)?;
+        area.present()?;
     }
-
-    /// The whole picture, to draw on.
-    pub fn area(&mut self) -> Area<'_> {
-        BitMapBackend::with_buffer(&mut self.pixels, (self.width, self.height)).into_drawing_area()
-    }
-
-    /// Writes the picture to the PNG file `out`, atomically.
-    pub fn write_png(&self, out: &Path) -> Result<()> {
-        atomic::write(out, |writer| {
-            let mut encoder = png::Encoder::new(writer, self.width, self.height);
-            encoder.set_color(png::ColorType::Rgb);
-            encoder.set_depth(png::BitDepth::Eight);
-            let mut writer = encoder.write_header()?;
-            writer.write_image_data(&self.pixels)?;
-            Ok(writer.finish()?)
-        })?;
-        Ok(())
-    }
+    atomic::write(out, |writer| {
+        let mut encoder = png::Encoder::new(writer, width, height);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(&pixels)?;
+        Ok(writer.finish()?)
+    })
+    .with_context(|| format!("drawing {}", out.display()))
 }
 
 /// Black text `height` pixels high.

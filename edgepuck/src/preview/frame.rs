@@ -8,9 +8,7 @@ const MARGIN: f64 = 1.06;
 /// A cube in metres: the same for all panels, so that they share one scale.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame {
-    /// Its middle.
     pub centre: [f64; 3],
-    /// Half of its edge.
     pub half: f64,
 }
 
@@ -53,11 +51,8 @@ fn bounds(points: &[[f32; 3]]) -> Option<([f64; 3], [f64; 3])> {
 /// A direction to look in.
 #[derive(Clone, Copy, Debug)]
 pub struct View {
-    /// What the panel is called.
     pub name: &'static str,
-    /// The axis that points right.
     pub right: usize,
-    /// The axis that points up.
     pub up: usize,
     /// The axis along which one looks, and the side one looks from.
     pub depth: (usize, f32),

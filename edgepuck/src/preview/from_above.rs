@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use formats::Scan;
 use plotters::prelude::*;
 
-use super::canvas::{Canvas, text};
+use super::canvas::draw_png;
 use super::frame::{Frame, View};
 use super::panel;
 
@@ -28,15 +28,8 @@ pub fn draw_from_above(
     let finite = scan.positions.iter().flatten().filter(|x| x.is_finite());
     let farthest = finite.fold(1.0, |farthest: f64, x| farthest.max(f64::from(x.abs())));
     let frame = Frame { centre: [0.0; 3], half: farthest.min(FARTHEST_M) };
-    let mut canvas = Canvas::new(EDGE, EDGE + TITLE_HEIGHT)?;
-    {
-        let area = canvas.area();
-        area.fill(&WHITE)?;
-        let (heading, below) = area.split_vertically(TITLE_HEIGHT);
-        heading.draw_text(title, &text(24), (16, 16))?;
-        let [_, from_above, _] = View::ALL;
-        panel::draw(&below, from_above, scan, tints, &frame, names)?;
-        area.present()?;
-    }
-    canvas.write_png(out).with_context(|| format!("drawing {}", out.display()))
+    let [_, from_above, _] = View::ALL;
+    draw_png(out, (EDGE, EDGE + TITLE_HEIGHT), (title, TITLE_HEIGHT), |below| {
+        panel::draw(below, from_above, scan, tints, &frame, names)
+    })
 }

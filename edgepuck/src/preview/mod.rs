@@ -9,11 +9,10 @@ mod panel;
 
 use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use formats::Scan;
-use plotters::prelude::*;
 
-use canvas::{Canvas, text};
+use canvas::{draw_png, text};
 use colours::Colours;
 use frame::{Frame, View};
 pub use from_above::draw_from_above;
@@ -45,12 +44,7 @@ pub fn draw(clean: &Scan, noisy: Option<&Scan>, title: &str, out: &Path) -> Resu
     let width = panel::WIDTH * View::ALL.len() as u32 + BAR_WIDTH;
     let row_height = ROW_HEADING_HEIGHT + panel::HEIGHT;
     let height = TITLE_HEIGHT + row_height * rows.len() as u32;
-    let mut canvas = Canvas::new(width, height)?;
-    {
-        let area = canvas.area();
-        area.fill(&WHITE)?;
-        let (heading, below) = area.split_vertically(TITLE_HEIGHT);
-        heading.draw_text(title, &text(24), (16, 16))?;
+    draw_png(out, (width, height), (title, TITLE_HEIGHT), |below| {
         let (panels, bar) = below.split_horizontally(width - BAR_WIDTH);
         colours.draw_bar(&bar)?;
         for (row, &(name, scan)) in panels.split_evenly((rows.len(), 1)).iter().zip(&rows) {
@@ -61,9 +55,8 @@ pub fn draw(clean: &Scan, noisy: Option<&Scan>, title: &str, out: &Path) -> Resu
                 panel::draw(area, view, scan, &tints, &frame, &[])?;
             }
         }
-        area.present()?;
-    }
-    canvas.write_png(out).with_context(|| format!("drawing {}", out.display()))
+        Ok(())
+    })
 }
 
 fn row_heading(name: &str, scan: &Scan, frame: &Frame) -> String {

@@ -7,7 +7,7 @@ use crate::measure::clock::{Workload, interleave, measured};
 use crate::measure::methods::{self, Accuracy};
 use crate::measure::ray_set::RaySet;
 use anyhow::Result;
-use edgepuck_program::trade_record::{Part, Row};
+use edgepuck_program::trade_record::{Measurement, Part};
 use glam::DVec3;
 use rayon::prelude::*;
 use sim_gpu::effects::Effects;
@@ -128,7 +128,7 @@ fn assess(
     let wrong = accuracy.false_hits_per_million() + accuracy.misses_per_million();
     let clouds: Vec<Cloud> = aimed.ray_sets.iter().zip(&ranges).map(|(s, r)| cloud(s, r)).collect();
     let points: usize = clouds.iter().map(Vec::len).sum();
-    let row = Row {
+    let row = Measurement {
         part: Part::Caster,
         knob: "caster".to_owned(),
         sensor: Scanning::reference().name,
@@ -136,7 +136,7 @@ fn assess(
         range_rms_m: Some(accuracy.rms_m),
         range_worst_m: Some(accuracy.worst_m),
         wrong_rays_per_million: Some(wrong),
-        ..Row::default()
+        ..Measurement::default()
     };
     Ok(Scanned { row, clouds })
 }

@@ -3,7 +3,7 @@
 use super::scans::Cloud;
 use anyhow::{Context, Result, ensure};
 use edgepuck_program::sampler_config::SamplerConfig;
-use edgepuck_program::trade_record::{Part, Row};
+use edgepuck_program::trade_record::{Measurement, Part};
 use formats::labelled::read_labelled;
 use infer_cpu::sampler::{SamplerKind, SamplerSpec};
 use infer_cpu::{Classifier, Options, Precision, Prediction, Summary, TNets, inspect};
@@ -172,22 +172,22 @@ impl Classifying {
         model: &Summary,
         answers: &Answers,
         reference: &Answers,
-    ) -> Row {
-        let row = Row {
+    ) -> Measurement {
+        let row = Measurement {
             part: Part::Classifier,
             test_set: set.name.clone(),
             megabytes: Some(model.bytes(self.precision) as f64 * 1e-6),
             agreement: Some(agreement(answers, reference)),
             logit_error: Some(largest_error(answers, reference)),
-            ..Row::default()
+            ..Measurement::default()
         };
         self.named_in(row, model).with_accuracy(set.right(answers), set.clouds.len())
     }
 
     /// `row` with the names of everything that classifies.
-    pub fn named_in(&self, row: Row, model: &Summary) -> Row {
+    pub fn named_in(&self, row: Measurement, model: &Summary) -> Measurement {
         let has_t_nets = model.stn.is_some() || model.fstn.is_some();
-        Row {
+        Measurement {
             model: self.model.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
             model_file: recorded(&self.model),
             sampler: self.sampler.name.to_owned(),

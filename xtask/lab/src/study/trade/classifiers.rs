@@ -5,7 +5,7 @@ use crate::measure::clock::Spread;
 use crate::pi5::{Modelled, Sampler};
 use anyhow::{Context, Result};
 use edgepuck_program::sampler_config::SamplerConfig;
-use edgepuck_program::trade_record::Row;
+use edgepuck_program::trade_record::Measurement;
 use infer_cpu::{Precision, Summary, TNets, inspect};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -46,7 +46,7 @@ impl Sweep {
 /// Rows of one parameter at a time, then of combinations of the promising ones, for
 /// `model` on `set`, with modelled times of a Raspberry Pi 5 unless the run is `quick`;
 /// what the model or the clouds do not allow is left out.
-pub fn rows(model: &Path, set: &TestSet, quick: bool, rounds: usize) -> Result<Vec<Row>> {
+pub fn rows(model: &Path, set: &TestSet, quick: bool, rounds: usize) -> Result<Vec<Measurement>> {
     let sweep = if quick { Sweep::quick() } else { Sweep::whole() };
     let say = |error: &anyhow::Error| eprintln!("No modelled times of a Raspberry Pi: {error:#}");
     let pi = if quick { None } else { Modelled::open(model).inspect_err(say).ok() };
@@ -75,7 +75,7 @@ pub fn rows(model: &Path, set: &TestSet, quick: bool, rounds: usize) -> Result<V
     let from = set.most_points();
     let with_pi =
         |Measured { setting, row, .. }: Measured| with_pi(row, &setting, from, pi.as_ref());
-    let rows: Vec<Vec<Row>> = all.into_par_iter().map(with_pi).collect();
+    let rows: Vec<Vec<Measurement>> = all.into_par_iter().map(with_pi).collect();
     Ok(rows.concat())
 }
 
@@ -83,7 +83,7 @@ pub fn rows(model: &Path, set: &TestSet, quick: bool, rounds: usize) -> Result<V
 struct Measured {
     setting: Classifying,
     answers: Answers,
-    row: Row,
+    row: Measurement,
 }
 
 /// Times all settings in turns, so that a slow minute affects them all.
@@ -119,14 +119,19 @@ fn promising<'a>(
 
 /// The row with its modelled time on a Raspberry Pi 5, and rows for the board's
 /// other numbers of threads: answers do not depend on them.
-fn with_pi(row: Row, setting: &Classifying, from: usize, pi: Option<&Modelled>) -> Vec<Row> {
+fn with_pi(
+    row: Measurement,
+    setting: &Classifying,
+    from: usize,
+    pi: Option<&Modelled>,
+) -> Vec<Measurement> {
     let Some(ms) = pi_ms(setting, from, pi) else { return vec![row] };
     if setting.threads != 1 {
         return vec![row];
     }
     let on_board = |(&threads, ms): (&usize, f64)| {
         let here = threads == setting.threads;
-        Row {
+        Measurement {
             threads: Some(threads),
             ms_here: row.ms_here.filter(|_| here),
             ms_pi5: Some(ms),

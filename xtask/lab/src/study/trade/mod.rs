@@ -2,9 +2,9 @@
 //! accuracy.
 //!
 //! Objects are scanned with the settings of [`sensors`] ([`scans`]) and by all [`casters`];
-//! [`classifiers`] sweep models, samplers, points and precisions. Each setting becomes a [`Row`] of
-//! one CSV file, in which [`pareto`] marks the Pareto-optimal rows. [`page`] shows the rows on a
-//! page, and `cargo xtask advise` reads them.
+//! [`classifiers`] sweep models, samplers, points and precisions. Each setting becomes a
+//! [`Measurement`], a row of one CSV file, in which [`pareto`] marks the Pareto-optimal rows.
+//! [`page`] shows the rows on a page, and `cargo xtask advise` reads them.
 
 mod casters;
 mod classes;
@@ -21,7 +21,7 @@ use anyhow::{Context, Result, ensure};
 use classes::{Classifying, TestSet, agreement};
 use classifiers::bundled;
 use edgepuck_program::flags::need_folder_of_meshes;
-use edgepuck_program::trade_record::{self, Part, Row};
+use edgepuck_program::trade_record::{self, Measurement, Part};
 use edgepuck_program::{Outcome, gen_shapes};
 use formats::cloud::resample;
 use formats::rng::StreamKey;
@@ -133,7 +133,11 @@ fn clouds(args: &TradeArgs) -> Result<Option<TestSet>> {
     Ok(Some(set))
 }
 
-fn scan_rows(args: &TradeArgs, objects: &[Object], model: &Path) -> Result<(Vec<Row>, TestSet)> {
+fn scan_rows(
+    args: &TradeArgs,
+    objects: &[Object],
+    model: &Path,
+) -> Result<(Vec<Measurement>, TestSet)> {
     let (name, rounds) = (name_of_meshes(args), usize::from(args.rounds));
     let mut settings = sensors::one_at_a_time();
     if !args.quick {
@@ -147,11 +151,11 @@ fn scan_rows(args: &TradeArgs, objects: &[Object], model: &Path) -> Result<(Vec<
     let noisy = classifying.answers(&reference.clouds)?;
     let exact = classifying.answers(&cast[0].clouds)?;
     let all = scanned.into_iter().chain(cast);
-    let rows: Result<Vec<Row>> = all
+    let rows: Result<Vec<Measurement>> = all
         .map(|Scanned { row, clouds }| {
             let found = classifying.answers(&clouds)?;
             let answers = if row.part == Part::Caster { &exact } else { &noisy };
-            let row = Row { agreement: Some(agreement(&found, answers)), ..row };
+            let row = Measurement { agreement: Some(agreement(&found, answers)), ..row };
             let row = classifying.named_in(row, &summary);
             Ok(row.with_accuracy(reference.right(&found), clouds.len()))
         })
@@ -171,7 +175,7 @@ fn classifier_rows(
     models: &[PathBuf],
     clouds: Option<TestSet>,
     reference: TestSet,
-) -> Result<Vec<Row>> {
+) -> Result<Vec<Measurement>> {
     let set = clouds.unwrap_or_else(|| {
         let clouds = reference.clouds.iter().map(|cloud| packed(cloud)).collect();
         TestSet { clouds, ..reference }

@@ -5,7 +5,7 @@ use crate::render::chart::{Axis, Chart, Dot, Series};
 use crate::render::page::{self, Chapter};
 use crate::render::table::{Table, digits, percent};
 use anyhow::Result;
-use edgepuck_program::trade_record::{Device, Part, Row};
+use edgepuck_program::trade_record::{Device, Measurement, Part};
 use formats::atomic;
 use maud::{Markup, html};
 use std::collections::BTreeMap;
@@ -16,7 +16,7 @@ use xtask::workspace::command_line;
 const CAPTION: &str = "Filled dots are Pareto-optimal: no other setting is as fast and as accurate. \
      Touch or point at a dot for its figures.";
 
-pub fn write(rows: &[Row], folder: &Path) -> Result<()> {
+pub fn write(rows: &[Measurement], folder: &Path) -> Result<()> {
     for (part, name) in [(Part::Classifier, "classifier"), (Part::Scan, "scan")] {
         let svg = chart(rows, part).file();
         atomic::write_bytes(&folder.join(format!("trade-{name}.svg")), svg.as_bytes())?;
@@ -29,7 +29,7 @@ pub fn write(rows: &[Row], folder: &Path) -> Result<()> {
     Ok(atomic::write_bytes(&folder.join("trade.html"), html.as_bytes())?)
 }
 
-pub fn chapters(rows: &[Row]) -> Vec<Chapter> {
+pub fn chapters(rows: &[Measurement]) -> Vec<Chapter> {
     let classifier = html! {
         (chart(rows, Part::Classifier).figure())
         (pareto_table(rows, Part::Classifier).html())
@@ -59,12 +59,12 @@ pub fn classifier_chapter(body: Markup) -> Chapter {
     Chapter::new("classifier", "Settings", "Which setting fits my time budget?", body)
 }
 
-fn every_setting(rows: &[Row], part: Part, columns: &[Column]) -> Markup {
+fn every_setting(rows: &[Measurement], part: Part, columns: &[Column]) -> Markup {
     let table = table_of(rows, part, columns);
     html! { details { summary { "All " (table.rows.len()) " settings" } (table.html()) } }
 }
 
-fn chart(rows: &[Row], part: Part) -> Chart<'static> {
+fn chart(rows: &[Measurement], part: Part) -> Chart<'static> {
     let device = device_of(rows, part);
     let of_part = || rows.iter().filter(|row| row.part == part);
     let noise_m = of_part().next().and_then(|reference| reference.noise_m);
@@ -92,12 +92,12 @@ fn chart(rows: &[Row], part: Part) -> Chart<'static> {
 }
 
 /// The message of the chart of `part`.
-fn message(rows: &[Row], part: Part, device: Device) -> String {
+fn message(rows: &[Measurement], part: Part, device: Device) -> String {
     let optimal = || rows.iter().filter(|row| row.part == part && row.on_front(device));
-    let by_accuracy = |a: &&Row, b: &&Row| a.accuracy.total_cmp(&b.accuracy);
-    let share = |row: &Row| format!("{} %", percent(row.accuracy));
+    let by_accuracy = |a: &&Measurement, b: &&Measurement| a.accuracy.total_cmp(&b.accuracy);
+    let share = |row: &Measurement| format!("{} %", percent(row.accuracy));
     if part == Part::Classifier {
-        let ms = |row: &Row| digits(row.ms(device).unwrap_or_default());
+        let ms = |row: &Measurement| digits(row.ms(device).unwrap_or_default());
         let fastest = optimal().min_by(by_accuracy);
         return match (optimal().max_by(by_accuracy), fastest) {
             (Some(best), Some(fastest)) => format!(
@@ -110,7 +110,7 @@ fn message(rows: &[Row], part: Part, device: Device) -> String {
             _ => "No setting was measured.".to_owned(),
         };
     }
-    let at = |row: &&Row| row.distance_m.unwrap_or_default();
+    let at = |row: &&Measurement| row.distance_m.unwrap_or_default();
     let best_from = |distance_m: f64| {
         optimal().filter(|row| at(row) == distance_m).max_by(by_accuracy).map(share)
     };
@@ -132,7 +132,7 @@ type SeriesKey = (u64, String, bool);
 
 /// Scans with other noise than `noise_m` are a series of their own: noise is not a
 /// choice, so they are not compared with the others.
-fn series_key(row: &Row, noise_m: Option<f64>) -> SeriesKey {
+fn series_key(row: &Measurement, noise_m: Option<f64>) -> SeriesKey {
     match (row.part, row.distance_m) {
         (Part::Scan, Some(distance_m)) => {
             let joined = row.noise_m == noise_m;
@@ -144,12 +144,12 @@ fn series_key(row: &Row, noise_m: Option<f64>) -> SeriesKey {
 }
 
 /// The board where it was modelled, else the machine of the record.
-fn device_of(rows: &[Row], part: Part) -> Device {
+fn device_of(rows: &[Measurement], part: Part) -> Device {
     let modelled = rows.iter().any(|row| row.part == part && row.ms_pi5.is_some());
     if modelled { Device::Pi5 } else { Device::Here }
 }
 
-fn tip(row: &Row, ms: f64) -> String {
+fn tip(row: &Measurement, ms: f64) -> String {
     format!("{row}\n{} ms, {} %", digits(ms), accuracy(row))
 }
 
@@ -161,24 +161,24 @@ fn count(n: Option<usize>) -> String {
     n.map(|n| n.to_string()).unwrap_or_default()
 }
 
-fn accuracy(row: &Row) -> String {
+fn accuracy(row: &Measurement) -> String {
     let [value, low, high] = [row.accuracy, row.accuracy_low, row.accuracy_high].map(percent);
     format!("{value} ({low} to {high})")
 }
 
-fn agreement(row: &Row) -> String {
+fn agreement(row: &Measurement) -> String {
     row.agreement.map(percent).unwrap_or_default()
 }
 
-fn millions_of_rays(row: &Row) -> String {
+fn millions_of_rays(row: &Measurement) -> String {
     number(row.rays_per_cpu_s.map(|rays| rays * 1e-6))
 }
 
-pub fn pareto_table(rows: &[Row], part: Part) -> Table {
+pub fn pareto_table(rows: &[Measurement], part: Part) -> Table {
     let device = device_of(rows, part);
-    let mut optimal: Vec<&Row> =
+    let mut optimal: Vec<&Measurement> =
         rows.iter().filter(|row| row.part == part && is_optimal(row)).collect();
-    let ms = |row: &Row| row.ms(device).unwrap_or(f64::INFINITY);
+    let ms = |row: &Measurement| row.ms(device).unwrap_or(f64::INFINITY);
     optimal.sort_by(|a, b| ms(a).total_cmp(&ms(b)));
     let heading = ["setting", "ms here", "ms on a Pi 5", "accuracy % (95 % interval)"];
     let title = match part {
@@ -194,7 +194,7 @@ pub fn pareto_table(rows: &[Row], part: Part) -> Table {
 }
 
 /// The values of each parameter that no Pareto-optimal row has.
-pub fn dominated_table(rows: &[Row]) -> Table {
+pub fn dominated_table(rows: &[Measurement]) -> Table {
     let mut table = Table::new("Dominated settings", &["parameter", "value"]);
     for (parameter, value) in dominated_settings(rows) {
         table.push(vec![parameter.to_owned(), value]);
@@ -202,9 +202,9 @@ pub fn dominated_table(rows: &[Row]) -> Table {
     table
 }
 
-type Column = (&'static str, fn(&Row) -> String);
+type Column = (&'static str, fn(&Measurement) -> String);
 
-fn table_of(rows: &[Row], part: Part, columns: &[Column]) -> Table {
+fn table_of(rows: &[Measurement], part: Part, columns: &[Column]) -> Table {
     let of_part = || rows.iter().filter(|row| row.part == part);
     let caption = of_part().next().map_or_else(String::new, |row| {
         format!("On {}, {} clouds; {}", row.test_set, row.clouds, row.machine)

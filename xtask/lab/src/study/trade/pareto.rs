@@ -1,6 +1,6 @@
 //! Pareto-optimal settings: no other setting costs as little and is as good.
 
-use edgepuck_program::trade_record::{Device, Part, Row};
+use edgepuck_program::trade_record::{Device, Measurement, Part};
 use std::collections::BTreeMap;
 
 /// Which of `points` are Pareto-optimal: no other is at most as large in every coordinate
@@ -16,7 +16,7 @@ fn optimal<const N: usize>(points: &[[f64; N]]) -> Vec<bool> {
 ///
 /// Costs are as measured and shares are of clouds: a row is dominated even if the
 /// difference is smaller than the interval of its accuracy.
-pub fn mark(rows: &mut [Row]) {
+pub fn mark(rows: &mut [Measurement]) {
     let mut groups: BTreeMap<GroupKey, Vec<usize>> = BTreeMap::new();
     for (i, row) in rows.iter().enumerate() {
         groups.entry(group_key(row)).or_default().push(i);
@@ -38,13 +38,13 @@ type GroupKey = (Part, String, Option<u64>, Option<u64>);
 
 /// Rows that are compared with each other. Distance and noise are given, not chosen: scans
 /// from 3 m and from 20 m are compared among themselves.
-fn group_key(row: &Row) -> GroupKey {
+fn group_key(row: &Measurement) -> GroupKey {
     let bits = |x: Option<f64>| x.map(f64::to_bits);
     (row.part, row.test_set.clone(), bits(row.distance_m), bits(row.noise_m))
 }
 
 /// Time and errors: of ranges for a caster, of classes for everything else.
-fn costs(row: &Row, device: Device) -> Option<[f64; 3]> {
+fn costs(row: &Measurement, device: Device) -> Option<[f64; 3]> {
     let [first, second] = match row.part {
         Part::Caster => [row.range_rms_m?, row.wrong_rays_per_million?],
         Part::Scan | Part::Classifier => [1.0 - row.accuracy, 0.0],
@@ -53,7 +53,7 @@ fn costs(row: &Row, device: Device) -> Option<[f64; 3]> {
     costs.iter().all(|cost| cost.is_finite()).then_some(costs)
 }
 
-pub fn is_optimal(row: &Row) -> bool {
+pub fn is_optimal(row: &Measurement) -> bool {
     row.front_here || row.front_pi5
 }
 
@@ -61,7 +61,7 @@ pub fn is_optimal(row: &Row) -> bool {
 pub type Choice = (&'static str, String);
 
 /// The values that no Pareto-optimal row has.
-pub fn dominated_settings(rows: &[Row]) -> Vec<Choice> {
+pub fn dominated_settings(rows: &[Measurement]) -> Vec<Choice> {
     let mut all: BTreeMap<Choice, bool> = BTreeMap::new();
     for row in rows {
         for choice in choices_of(row) {
@@ -73,7 +73,7 @@ pub fn dominated_settings(rows: &[Row]) -> Vec<Choice> {
 
 /// The parameters of a row that a user chooses: not the object's place, and not the
 /// number of threads, since cores are not counted as a cost.
-fn choices_of(row: &Row) -> Vec<Choice> {
+fn choices_of(row: &Measurement) -> Vec<Choice> {
     let text = |parameter, value: &String| (!value.is_empty()).then(|| (parameter, value.clone()));
     let count = |parameter, value: Option<usize>| Some((parameter, value?.to_string()));
     let size =
@@ -100,9 +100,13 @@ fn choices_of(row: &Row) -> Vec<Choice> {
 mod tests {
     use super::*;
 
-    fn row(model: &str, ms: f64, right: usize) -> Row {
-        let row = Row { part: Part::Classifier, model: model.to_owned(), ..Row::default() };
-        Row { ms_pi5: Some(ms), ..row }.with_accuracy(right, 100)
+    fn row(model: &str, ms: f64, right: usize) -> Measurement {
+        let row = Measurement {
+            part: Part::Classifier,
+            model: model.to_owned(),
+            ..Measurement::default()
+        };
+        Measurement { ms_pi5: Some(ms), ..row }.with_accuracy(right, 100)
     }
 
     #[test]
@@ -118,7 +122,7 @@ mod tests {
 
     #[test]
     fn times_on_different_devices_are_not_compared() {
-        let here = Row { ms_here: Some(0.1), ms_pi5: None, ..row("x86", 0.0, 99) };
+        let here = Measurement { ms_here: Some(0.1), ms_pi5: None, ..row("x86", 0.0, 99) };
         let mut rows = [row("board", 1.0, 80), here];
         mark(&mut rows);
         assert_eq!(rows.each_ref().map(|row| row.front_pi5), [true, false]);

@@ -4,7 +4,7 @@ use super::sensors::Scanning;
 use crate::measure::clock::{Workload, interleave, workload};
 use crate::study::datasets::keep_at_most;
 use anyhow::{Context, Result, ensure};
-use edgepuck_program::trade_record::{Part, Row};
+use edgepuck_program::trade_record::{Measurement, Part};
 use formats::chamfer::chamfer;
 use formats::hash::Hashing;
 use formats::rng::StreamKey;
@@ -38,7 +38,7 @@ struct Made {
 
 pub struct Scanned {
     /// Costs and geometric errors, without the accuracy of classes.
-    pub row: Row,
+    pub row: Measurement,
     pub clouds: Vec<Cloud>,
 }
 
@@ -105,7 +105,7 @@ fn assess(
     }
     let clouds: Vec<Cloud> = made.into_iter().map(|made| made.scan.positions).collect();
     let n_points: usize = clouds.iter().map(Vec::len).sum();
-    let row = Row {
+    let row = Measurement {
         part: Part::Scan,
         knob: setting.parameter.to_owned(),
         sensor: setting.name.clone(),
@@ -121,7 +121,7 @@ fn assess(
         range_rms_m: (n > 0).then(|| (sum / n as f64).sqrt()),
         range_worst_m: (n > 0).then_some(worst),
         chamfer_m: mean_chamfer(truth, &clouds),
-        ..Row::default()
+        ..Measurement::default()
     };
     Ok(Scanned { row, clouds })
 }
