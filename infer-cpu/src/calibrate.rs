@@ -85,9 +85,6 @@ pub fn on_shapes(path: &Path) -> Result<BTreeMap<String, f32>, Error> {
 }
 
 /// [`on_shapes`] for a model from any source.
-///
-/// # Errors
-/// A source that is not a model.
 pub fn on_shapes_of(model: &ModelSource) -> Result<BTreeMap<String, f32>, Error> {
     let clouds: Vec<_> = (0..4 * SHAPES).map(shape).collect();
     on_clouds_of(model, clouds.iter().map(Vec::as_slice))

@@ -232,9 +232,6 @@ impl<T: Format> Conv<T> {
     }
 
     /// The layer, if its inputs are features.
-    ///
-    /// # Panics
-    /// If they are coordinates.
     pub fn packed(&self) -> &Packed<T> {
         match self {
             Self::Inner(packed) | Self::Turned(packed, _) => packed,

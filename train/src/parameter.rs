@@ -29,9 +29,6 @@ impl Parameter {
     }
 
     /// The weights as a matrix, `[outputs, inputs]`.
-    ///
-    /// # Panics
-    /// If the parameter is not a matrix.
     #[must_use]
     pub fn matrix(&self) -> ArrayView2<'_, f32> {
         let (outputs, inputs) = (self.shape[0], self.shape[1]);

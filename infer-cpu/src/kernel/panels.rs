@@ -70,9 +70,6 @@ impl<W: Copy + Default> Panels<W> {
     }
 
     /// Panels of zeros for matrix-vector products, [`super::Gemv`].
-    ///
-    /// # Panics
-    /// If the weights would not fit in memory.
     pub fn columns(inputs: usize, outputs: usize) -> Self {
         Self::zeros(inputs, outputs, (GEMV_NR, 1, 1))
     }
