@@ -96,20 +96,6 @@ impl Pose {
     }
 }
 
-/// `count` views of `target_m` at equal distance and elevation, spread evenly over the full circle
-/// from the first azimuth on, counterclockwise. None for a count of 0.
-#[must_use]
-pub fn ring_of_views(
-    count: u32,
-    distance_m: f64,
-    elevation_rad: f64,
-    first_azimuth_rad: f64,
-    target_m: DVec3,
-) -> Vec<Pose> {
-    let azimuth_rad = |i| azimuth_on_ring(i, count, first_azimuth_rad);
-    (0..count).map(|i| Pose::view(distance_m, elevation_rad, azimuth_rad(i), target_m)).collect()
-}
-
 /// The azimuth of number `view` of `count` views that are spread evenly from the first on, radians.
 pub(crate) fn azimuth_on_ring(view: u32, count: u32, first_azimuth_rad: f64) -> f64 {
     first_azimuth_rad + TAU * f64::from(view) / f64::from(count)

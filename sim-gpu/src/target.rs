@@ -1,11 +1,9 @@
 //! Meshes prepared for casting.
 
 use crate::bvh::{Builder, Bvh};
-use crate::mesh::frame::{Normalize, to_world};
+use crate::mesh::TriangleMesh;
 use crate::mesh::validate::triangle_stats;
-use crate::mesh::{MeshError, TriangleMesh, load};
 use glam::DVec3;
-use std::path::Path;
 use std::sync::Arc;
 
 pub use crate::mesh::unit_frame::UnitFrame;
@@ -121,14 +119,6 @@ impl Surface {
 }
 
 impl Target {
-    /// Reads the mesh at `path`, turns it z up by the default of its format, applies `normalize`,
-    /// and prepares it for casting.
-    pub fn load(path: &Path, normalize: Normalize) -> Result<Self, MeshError> {
-        let loaded = load(path)?;
-        let world = to_world(&loaded.mesh, loaded.format.default_up(), normalize);
-        Ok(Self::new(Surface::of_mesh(world.mesh), Builder::Sah))
-    }
-
     /// Builds the hierarchy over `surface`.
     #[must_use]
     pub fn new(surface: Surface, builder: Builder) -> Self {

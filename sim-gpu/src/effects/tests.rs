@@ -59,23 +59,17 @@ fn bad_numbers_are_named() {
 }
 
 #[test]
-fn the_sensors_own_quantum_is_filled_in() {
-    let effects: Effects = toml::from_str("quantise_m = true").unwrap();
-    let vlp32c = SensorProfile::builtin("vlp32c").unwrap();
-    let resolved = effects.for_sensor(&vlp32c).unwrap();
+fn the_sensors_own_quantum_and_detection_limit_are_filled_in() {
+    let [vlp32c, kinect] =
+        ["vlp32c", "kinect-v2"].map(|name| SensorProfile::builtin(name).unwrap());
+    let own: Effects = toml::from_str("quantise_m = true").unwrap();
+    let resolved = own.for_sensor(&vlp32c).unwrap();
     assert_eq!(resolved.quantum, Some(Quantum { step_m: Some(0.004) }));
-    let kinect = SensorProfile::builtin("kinect-v2").unwrap();
-    let error = effects.for_sensor(&kinect).unwrap_err();
+    let error = own.for_sensor(&kinect).unwrap_err();
     assert!(error.to_string().contains("kinect-v2"), "{error}");
-}
-
-#[test]
-fn the_sensors_own_detection_limit_is_filled_in() {
-    let effects: Effects = toml::from_str("detection = true").unwrap();
-    let vlp32c = SensorProfile::builtin("vlp32c").unwrap();
-    let limit = effects.for_sensor(&vlp32c).unwrap().detection.unwrap().limit;
+    let own: Effects = toml::from_str("detection = true").unwrap();
+    let limit = own.for_sensor(&vlp32c).unwrap().detection.unwrap().limit;
     assert_eq!(limit, Some(DetectionLimit { reflectivity: 0.8, range_m: 200.0 }));
-    let kinect = SensorProfile::builtin("kinect-v2").unwrap();
-    let error = effects.for_sensor(&kinect).unwrap_err();
+    let error = own.for_sensor(&kinect).unwrap_err();
     assert!(error.to_string().contains("as sensor \"kinect-v2\" has no [detection]"), "{error}");
 }

@@ -1,9 +1,8 @@
 //! Scans of objects.
 //!
-//! [`scan()`] scans one object; [`scan_many`] casts many scans together, which keeps a GPU busy;
-//! [`scan_objects`] scans several objects at once. All three aim the sensor's beams
-//! ([`ScanRequest::aim`]), cast them ([`OpenCaster::cast`]), solve the ranges ([`resolve`]) and
-//! make points of them ([`assemble`]).
+//! [`scan()`] scans one object, and [`scan_objects`] several objects at once. Both aim the sensor's
+//! beams ([`ScanRequest::aim`]), cast them ([`OpenCaster::cast`]), solve the ranges ([`resolve`])
+//! and make points of them ([`assemble`]).
 
 mod assemble;
 mod echo;
@@ -67,81 +66,23 @@ pub fn scan(
     Ok(scan_objects(caster, &[PlacedTarget::new(target)], request)?.scan)
 }
 
-/// As [`scan()`], for many targets and requests, whose rays are cast together.
-/// The scans stand in the order of the requests.
-pub fn scan_many(
-    caster: &OpenCaster,
-    requests: &[(&Target, ScanRequest)],
-) -> Result<Vec<Scanned>, ScanError> {
-    let placed: Vec<_> = requests.iter().map(|(target, _)| [PlacedTarget::new(target)]).collect();
-    let scans: Vec<_> =
-        placed.iter().zip(requests).map(|(placed, (_, request))| (&placed[..], request)).collect();
-    scan_all(caster, &scans)
-}
-
 /// The scan that `request` asks for of several objects: each beam returns from the nearest one.
 pub fn scan_objects(
     caster: &OpenCaster,
     objects: &[PlacedTarget],
     request: &ScanRequest,
 ) -> Result<Scanned, ScanError> {
-    let mut scans = scan_all(caster, &[(objects, request)])?;
-    Ok(scans.pop().expect("invariant: one request gives one scan"))
-}
-
-fn scan_all(
-    caster: &OpenCaster,
-    requests: &[(&[PlacedTarget], &ScanRequest)],
-) -> Result<Vec<Scanned>, ScanError> {
-    let moves = |(_, request): &(&[PlacedTarget], &ScanRequest)| {
-        request.effects.as_ref().unwrap_or(caster.effects()).motion.is_some()
-    };
-    if !requests.iter().any(moves) {
-        return scan_as_asked(caster, requests);
-    }
-    let moved = requests.iter().map(|(_, request)| request.in_motion(caster.effects()));
-    let moved: Vec<ScanRequest> = moved.collect();
-    let objects = requests.iter().map(|(objects, _)| *objects);
-    scan_as_asked(caster, &objects.zip(&moved).collect::<Vec<_>>())
-}
-
-/// The scans of requests whose sensors have their poses.
-fn scan_as_asked(
-    caster: &OpenCaster,
-    requests: &[(&[PlacedTarget], &ScanRequest)],
-) -> Result<Vec<Scanned>, ScanError> {
-    let targets = requests.iter().flat_map(|(objects, _)| *objects).map(|object| object.target);
-    let fits = targets.into_iter().all(|target| caster.fits(target));
+    let request = &request.in_motion(caster.effects());
+    let fits = objects.iter().all(|object| caster.fits(object.target));
     if !fits || matches!(caster, OpenCaster::Cpu(_)) {
-        let scan = |(objects, request): &(&[PlacedTarget], &ScanRequest)| {
-            let (jobs, hits) = cast_nearest_first(objects, request);
-            finish(caster, objects, request, &jobs, hits, !fits)
-        };
-        return requests.par_iter().map(scan).collect();
+        let (jobs, hits) = cast_nearest_first(objects, request);
+        return finish(caster, objects, request, &jobs, hits, !fits);
     }
-    let aim = |(objects, request): &(&[PlacedTarget], &ScanRequest)| {
-        objects.iter().map(|object| request.aim(object)).collect::<Vec<_>>()
-    };
-    let jobs: Vec<CastJob> = requests.par_iter().flat_map(aim).collect();
+    let jobs: Vec<CastJob> = objects.par_iter().map(|object| request.aim(object)).collect();
     let casts = caster.cast(&jobs)?;
-
-    let (mut jobs, mut casts) = (&jobs[..], &casts[..]);
-    let mut parts = Vec::with_capacity(requests.len());
-    for &(objects, request) in requests {
-        let (own_jobs, own_casts);
-        (own_jobs, jobs) = jobs.split_at(objects.len());
-        (own_casts, casts) = casts.split_at(objects.len());
-        parts.push((objects, request, own_jobs, own_casts));
-    }
-    parts
-        .into_par_iter()
-        .map(|(objects, request, jobs, casts)| {
-            let hits = jobs.iter().zip(casts);
-            let hits =
-                hits.map(|(job, cast)| resolve(job, cast, request.pattern, caster.effects()));
-            finish(caster, objects, request, jobs, hits.collect(), false)
-        })
-        .collect()
+    let answered = jobs.par_iter().zip(&casts);
+    let hits = answered.map(|(job, cast)| resolve(job, cast, request.pattern, caster.effects()));
+    finish(caster, objects, request, &jobs, hits.collect(), false)
 }
 
 /// Casts on the CPU at the nearest object first, so that a beam that ends there is not cast at

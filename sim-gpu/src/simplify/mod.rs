@@ -19,6 +19,7 @@
 mod decimate;
 mod distance;
 mod resolution;
+#[cfg(feature = "simplify")]
 mod within;
 
 use std::str::FromStr;
@@ -31,7 +32,6 @@ use crate::target::Surface;
 
 pub use distance::{distance_to_surface, distance_to_triangle};
 pub use resolution::{FOOTPRINTS_PER_STEP, Viewpoint, resolved_m};
-pub use within::lies_within;
 
 /// The bound of the distance between a simplified surface and the mesh's own.
 ///

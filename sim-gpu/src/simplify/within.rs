@@ -21,14 +21,8 @@ const SHORTEST_PIECE: f64 = 1.0 / 16.0;
 /// The limit of pieces in a proof, per triangle of both surfaces; a proof that needs more fails.
 const PIECES_PER_TRIANGLE: usize = 256;
 
-/// Whether every point of `surface` is proven to lie within `bound` of the surface of `target`, all
-/// in the same units.
-#[must_use]
-pub fn lies_within(surface: &Surface, target: &Target, bound: f64) -> bool {
-    beyond(surface, target, bound).is_empty()
-}
-
-/// The triangles of `surface` without such a proof, ascending.
+/// The triangles of `surface` that are not proven to lie, with all of their points, within `bound`
+/// of the surface of `target`, ascending; all in the same units.
 #[must_use]
 pub fn beyond(surface: &Surface, target: &Target, bound: f64) -> Vec<u32> {
     const TRIANGLES_PER_TASK: usize = 64;
@@ -174,7 +168,7 @@ mod tests {
     }
 
     fn proven(surface: &Surface, of: Surface, bound: f64) -> bool {
-        lies_within(surface, &Target::new(of, Builder::Morton), bound)
+        beyond(surface, &Target::new(of, Builder::Morton), bound).is_empty()
     }
 
     #[test]

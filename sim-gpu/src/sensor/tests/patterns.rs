@@ -119,23 +119,17 @@ fn the_vlp32c_steps_by_a_fifth_of_a_degree_clockwise() {
 }
 
 #[test]
-fn an_azimuth_quantum_moves_beams_to_its_multiples() {
+fn a_quantum_rounds_azimuths_or_the_starts_of_sequences_alone() {
     let mut coarse = sensor("vlp32c");
     let Layout::Rotating(rotating) = &mut coarse.layout else { panic!("it rotates") };
     rotating.azimuth_quantum_deg = Some(0.01);
-    let pattern = coarse.pattern();
     // 0.1990656 degrees become 0.20: laser 0 points to -1.4 - 0.2.
-    assert_near(pattern.directions[32], at(-25.0, -1.6));
-}
-
-#[test]
-fn a_sequence_quantum_rounds_the_start_of_each_sequence_alone() {
-    let mut coarse = sensor("vlp32c");
+    assert_near(coarse.pattern().directions[32], at(-25.0, -1.6));
     let Layout::Rotating(rotating) = &mut coarse.layout else { panic!("it rotates") };
-    rotating.sequence_quantum_deg = Some(0.01);
+    rotating.sequence_quantum_deg = rotating.azimuth_quantum_deg.take();
     let pattern = coarse.pattern();
-    // 0.1990656 degrees become 0.20, and the head turns on at 3600 degrees/s.
     assert_near(pattern.directions[32], at(-25.0, -1.6));
+    // The head turns on at 3600 degrees/s.
     assert_near(pattern.directions[34], at(-1.667, -1.4 - 0.2 - 3600.0 * 2.304e-6));
 }
 

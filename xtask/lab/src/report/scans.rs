@@ -7,7 +7,6 @@ use glam::DVec3;
 use maud::{Markup, html};
 use sim_gpu::effects::{Effects, Noise, NoiseModel};
 use sim_gpu::internals::caster::OpenCaster;
-use sim_gpu::internals::mesh::frame::Normalize;
 use sim_gpu::internals::mesh::tree::discover;
 use sim_gpu::internals::pose::Pose;
 use sim_gpu::internals::scan::ScanRequest;
@@ -34,11 +33,12 @@ pub fn body(assets: &Path) -> Result<Markup> {
     let Some(entry) = entries.into_iter().next() else {
         return Ok(html! { p { "There is no mesh under " (folder.display()) "." } });
     };
-    let target = Target::load(&entry.path, Normalize::default())
-        .with_context(|| format!("cannot scan {}", entry.relative))?;
+    let mesh = sim_gpu::Mesh::read(&entry.path)
+        .with_context(|| format!("cannot scan {}", entry.relative))?
+        .unit_sphere();
     let clouds: Vec<_> = SENSORS
         .into_iter()
-        .map(|(sensor, noise_m)| Ok((sensor, noise_m, scan(&target, sensor, noise_m)?)))
+        .map(|(sensor, noise_m)| Ok((sensor, noise_m, scan(mesh.target(), sensor, noise_m)?)))
         .collect::<Result<_>>()?;
     Ok(html! {
         p { (file_name(&entry.path)) ", in the unit sphere, " (DISTANCE_M) " m from the sensor and "

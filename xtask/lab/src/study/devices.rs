@@ -18,7 +18,7 @@ use sim_gpu::internals::mesh::frame::{Normalize, Up, to_world};
 use sim_gpu::internals::pose::Pose;
 use sim_gpu::internals::ray::RayFrame;
 use sim_gpu::internals::resolve::{Hit, Hits};
-use sim_gpu::internals::scan::{ScanRequest, scan_many};
+use sim_gpu::internals::scan::{PlacedTarget, ScanRequest, scan_objects};
 use sim_gpu::internals::target::Target;
 
 /// From the middle of a mesh of the unit sphere, metres.
@@ -81,8 +81,8 @@ struct View<'a> {
 
 impl View<'_> {
     fn cast(&self, backend: &Backend) -> Result<Hits> {
-        let mut scans = scan_many(&backend.caster, &[(self.target, self.request.clone())])?;
-        Ok(scans.swap_remove(0).hits.swap_remove(0))
+        let object = PlacedTarget::new(self.target);
+        Ok(scan_objects(&backend.caster, &[object], &self.request)?.hits.swap_remove(0))
     }
 
     fn compare(

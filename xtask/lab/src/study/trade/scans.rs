@@ -13,10 +13,9 @@ use formats::scan_file::{ScanFormat, write_scan};
 use glam::DVec3;
 use rayon::prelude::*;
 use sim_gpu::internals::caster::OpenCaster;
-use sim_gpu::internals::mesh::frame::Normalize;
 use sim_gpu::internals::mesh::tree::{MeshEntry, discover};
 use sim_gpu::internals::pose::Pose;
-use sim_gpu::internals::scan::{ScanRequest, scan_many};
+use sim_gpu::internals::scan::{PlacedTarget, ScanRequest, scan_objects};
 use sim_gpu::internals::sensor::{BeamPattern, Views};
 use sim_gpu::internals::target::Target;
 use std::collections::btree_map::Entry;
@@ -126,19 +125,18 @@ fn assess(
     Ok(Scanned { row, clouds })
 }
 
-fn scan<'a>(
-    places: &[Place<'a>],
+fn scan(
+    places: &[Place<'_>],
     setting: &Scanning,
     pattern: &BeamPattern,
     attributes: &AttributeSet,
 ) -> Result<Vec<Made>> {
-    let request = |place: &Place<'a>| {
+    let caster = OpenCaster::Cpu(setting.effects());
+    let made = |place: &Place<'_>| {
         let mut request = ScanRequest::new(&setting.sensor, pattern, place.pose);
         (request.attributes, request.stream) = (attributes.clone(), place.stream);
-        (&place.object.target, request)
-    };
-    let made = |sim_gpu::internals::scan::Scanned { scan, hits, .. }| {
-        let hits = &hits[0].hits;
+        let scanned = scan_objects(&caster, &[PlacedTarget::new(&place.object.target)], &request)?;
+        let (scan, hits) = (scanned.scan, &scanned.hits[0].hits);
         let exact = |beam: &u32| {
             // That in the middle of a wide beam.
             let ray = beam * pattern.rays_per_beam;
@@ -146,11 +144,9 @@ fn scan<'a>(
             at.map_or(f64::NAN, |at| hits[at].range_m)
         };
         let exact_m = scan.beam.iter().flatten().map(exact).collect();
-        Made { scan, exact_m }
+        Ok(Made { scan, exact_m })
     };
-    let requests: Vec<_> = places.iter().map(request).collect();
-    let scans = scan_many(&OpenCaster::Cpu(setting.effects()), &requests)?;
-    Ok(scans.into_iter().map(made).collect())
+    places.par_iter().map(made).collect()
 }
 
 fn file_bytes(clouds: &[Cloud]) -> Result<f64> {
@@ -217,8 +213,9 @@ pub fn read(folder: &Path, per_class: u32) -> Result<Vec<Object>> {
         folder.display()
     );
     let object = |entry: &MeshEntry| {
-        let target = Target::load(&entry.path, Normalize::default())
+        let mesh = sim_gpu::Mesh::read(&entry.path)
             .with_context(|| format!("cannot scan {}", entry.relative))?;
+        let target = mesh.unit_sphere().target().clone();
         let id = format!("{}/{}", entry.class, entry.name);
         Ok(Object { class: entry.class.clone(), id, target })
     };
