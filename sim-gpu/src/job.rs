@@ -57,7 +57,6 @@ impl CastJob {
         )
     }
 
-    /// Some of the rays of `pattern`.
     #[inline(always)]
     pub(crate) fn rays_of<const N: usize>(
         &self,

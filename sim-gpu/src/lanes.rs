@@ -18,7 +18,6 @@ pub(crate) fn each<T: Copy + Default, const N: usize>(of: impl Fn(usize) -> T) -
 /// How many rays are aimed, or ranges computed, at once.
 pub(crate) const LANES: usize = 8;
 
-/// `N` vectors.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Vectors<const N: usize> {
     pub x: [f64; N],

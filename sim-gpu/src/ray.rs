@@ -87,7 +87,6 @@ impl RayFrame {
         Ray { origin: ray.origin.lane(0), direction: ray.direction.lane(0) }
     }
 
-    /// Some of the rays of `pattern`.
     #[inline(always)]
     pub(crate) fn beams<const N: usize>(&self, pattern: &BeamPattern, beams: [u32; N]) -> Rays<N> {
         self.rays(&pattern.directions, &pattern.starts_m, beams)

@@ -111,7 +111,6 @@ impl Journal {
     }
 }
 
-/// Reads a JSON file.
 pub(crate) fn read_json<T: DeserializeOwned>(file: &Path) -> Result<T, DatasetError> {
     let text = std::fs::read(file).map_err(|error| DatasetError::io(file, error))?;
     serde_json::from_slice(&text).map_err(|error| DatasetError::malformed(file, error))

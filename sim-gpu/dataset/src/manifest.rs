@@ -174,7 +174,6 @@ impl Manifest {
         })
     }
 
-    /// The hashes of all meshes and files.
     fn hashes(&self) -> impl Iterator<Item = &Option<FileHash>> {
         let meshes = self.meshes.iter().map(|mesh| &mesh.hash);
         let scans = self.scan_files().map(|(_, file, _)| &file.hash);

@@ -123,7 +123,6 @@ impl Facts {
     }
 }
 
-/// A file's name and its SHA-256.
 fn named_hash(path: &Path) -> Result<(String, String), DatasetError> {
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let hash = Hashing::Sha256.of_file(path)?.expect("invariant: SHA-256 was asked for");

@@ -66,7 +66,6 @@ pub(crate) fn find_adapter(wanted: &str) -> Result<wgpu::Adapter, CastError> {
     }
 }
 
-/// The description of `adapter`.
 pub(crate) fn summary(adapter: &wgpu::Adapter) -> AdapterSummary {
     let info = adapter.get_info();
     AdapterSummary {
@@ -92,7 +91,6 @@ pub(crate) fn adapters() -> Vec<wgpu::Adapter> {
     adapters
 }
 
-/// The kind of `adapter`.
 pub(crate) fn kind(adapter: &wgpu::Adapter) -> AdapterKind {
     match adapter.get_info().device_type {
         wgpu::DeviceType::DiscreteGpu => AdapterKind::Discrete,

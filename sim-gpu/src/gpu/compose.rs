@@ -47,7 +47,6 @@ pub fn compose(effects: &Effects) -> String {
     wgsl
 }
 
-/// Whether any of `effects` reads `input`.
 fn reads(effects: &Effects, input: RayInput) -> bool {
     effects.per_ray().any(|effect| effect.input() == input)
 }

@@ -233,7 +233,6 @@ impl Slot {
         self.mapped = Some(receive);
     }
 
-    /// Waits for the answer for the batch.
     pub(super) fn wait(&self, pipeline: &Pipeline) -> Result<Answer, String> {
         let mapped = self.mapped.as_ref().ok_or("nothing was dispatched")?;
         // Waits for this batch alone: the next may be in flight already.

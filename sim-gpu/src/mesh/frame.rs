@@ -99,7 +99,6 @@ pub(super) fn named_vertices(mesh: &TriangleMesh) -> Vec<bool> {
     named
 }
 
-/// `position`, turned z up.
 pub(crate) fn z_up(position: DVec3, up: Up) -> DVec3 {
     match up {
         Up::Y => DVec3::new(position.x, -position.z, position.y),

@@ -92,7 +92,6 @@ pub(super) fn integer(token: &[u8], expected: &str) -> Result<i64, Malformed> {
     number.ok_or_else(|| Malformed::expected(expected, token))
 }
 
-/// Parses `token` as a coordinate.
 fn coordinate(token: &[u8]) -> Result<f64, Malformed> {
     let number = std::str::from_utf8(token).ok().and_then(|text| text.parse::<f64>().ok());
     let finite = number.filter(|number| number.is_finite());

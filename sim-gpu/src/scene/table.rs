@@ -87,7 +87,6 @@ pub(super) struct SensorTable {
 /// per second.
 const PERIOD_S: f64 = 0.1;
 
-/// A pose and its time.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct TimedPose {

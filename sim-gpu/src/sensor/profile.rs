@@ -49,7 +49,6 @@ impl Profile {
     }
 }
 
-/// Parses the profile `text`, which is in `file`.
 pub(super) fn parse(text: &str, file: &Path) -> Result<SensorProfile, ConfigError> {
     let profile: Profile = config::parse(text, file)?;
     SensorProfile::try_from(profile).map_err(|invalid| invalid.in_file(file))
