@@ -130,7 +130,7 @@ impl Bench<'_> {
             let aim = || request.aim(&PlacedTarget::new(target));
             let resolve =
                 |job: &CastJob, cast: &Cast| resolve(job, cast, pattern, &Effects::default());
-            // As `scan_many`: a CPU takes one scan after another, a GPU all at once.
+            // A CPU takes one scan after another, a GPU all at once.
             if matches!(caster, OpenCaster::Cpu(_)) {
                 let scan = |_| -> Result<Hits> {
                     let job = aim();
