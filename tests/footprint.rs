@@ -81,15 +81,6 @@ fn plate(at_m: f64, from_m: f64) -> TriangleMesh {
     TriangleMesh { vertices, triangles: vec![[0, 2, 1], [0, 3, 2]] }
 }
 
-fn together(a: &TriangleMesh, b: &TriangleMesh) -> TriangleMesh {
-    let n = a.vertices.len() as u32;
-    let shifted = b.triangles.iter().map(|corners| corners.map(|corner| corner + n));
-    TriangleMesh {
-        vertices: [&a.vertices[..], &b.vertices].concat(),
-        triangles: a.triangles.iter().copied().chain(shifted).collect(),
-    }
-}
-
 #[test]
 fn one_ray_is_the_beam_without_width_to_the_bit() {
     let noise = Some(Noise { mean_m: 0.0, sigma_m: 0.02, model: NoiseModel::Range });
@@ -120,7 +111,7 @@ fn the_clean_scan_of_wide_beams_is_that_of_their_centres() {
 fn all_casters_agree() {
     let pattern =
         SensorProfile::builtin("vlp32c").unwrap().decimated(7.try_into().unwrap()).pattern();
-    let mesh = together(&plate(10.0, 0.0), &plate(12.0, -9.0));
+    let mesh = meshes::together(&[plate(10.0, 0.0), plate(12.0, -9.0)]);
     let effects = dual(19);
     let scans = adapter::casters(&effects).into_iter().map(|caster| scan(caster, &pattern, &mesh));
     let scans: Vec<_> = scans.collect();
@@ -177,7 +168,7 @@ fn a_slope_is_one_return_at_the_range_of_its_middle() {
 
 #[test]
 fn surfaces_nearer_than_the_separation_are_one_return_between_them() {
-    let edge = |behind_m: f64| together(&plate(10.0, 0.0), &plate(10.0 + behind_m, -9.0));
+    let edge = |behind_m: f64| meshes::together(&[plate(10.0, 0.0), plate(10.0 + behind_m, -9.0)]);
     let mixed = on_cpu(&dual(19), &edge(0.99));
     assert_eq!(mixed.len(), 601);
     let between = ranges(&mixed).into_iter().filter(|range_m| (10.05..10.9).contains(range_m));
@@ -194,7 +185,7 @@ fn surfaces_nearer_than_the_separation_are_one_return_between_them() {
 
 #[test]
 fn each_mode_tells_the_returns_that_it_names() {
-    let mesh = together(&plate(10.0, 0.0), &plate(12.0, -9.0));
+    let mesh = meshes::together(&[plate(10.0, 0.0), plate(12.0, -9.0)]);
     let in_mode = |mode| on_cpu(&Effects { returns: Some(mode), ..wide(19) }, &mesh);
     let (first, last) = (in_mode(ReturnMode::First), in_mode(ReturnMode::Last));
     let strongest = in_mode(ReturnMode::Strongest);
@@ -224,7 +215,7 @@ fn thirty_seven_rays_measure_what_a_hundred_thousand_do() {
     // Columns that a beam is as wide as, before a wall too near to be told from them.
     let columns = (-20..20).map(|i| f64::from(i) * 0.07).fold(plate(10.6, -9.0), |mesh, y_m| {
         let low = DVec3::new(10.0, y_m, -9.0);
-        together(&mesh, &meshes::cuboid(low, low + DVec3::new(0.1, 0.03, 18.0)))
+        meshes::together(&[mesh, meshes::cuboid(low, low + DVec3::new(0.1, 0.03, 18.0))])
     });
     let beam = DVec3::new(1.0, 0.012, 0.003).normalize();
     let across = DVec3::Z.cross(beam).normalize();

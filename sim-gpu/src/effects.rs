@@ -21,6 +21,7 @@ use serde::{Deserialize, Serialize};
 use crate::config::{InvalidValue, positive, within};
 use crate::sensor::{BeamPattern, LARGEST_M, SensorProfile};
 
+pub use crate::sensor::DetectionLimit;
 pub use detection::Detection;
 pub use footprint::{Footprint, ReturnMode};
 pub use motion::EvenMotion;
@@ -45,7 +46,8 @@ pub struct Effects {
     pub footprint: Option<Footprint>,
     /// The returns of a beam that the sensor reports; `None` is the strongest.
     pub returns: Option<ReturnMode>,
-    /// Rain, snow, fog, haze, dust and spray. Weather needs a detection limit.
+    /// Rain, snow, fog, haze, dust and spray. Weather needs a detection limit: that of `detection`, or
+    /// else the sensor's own.
     pub weather: Option<Box<Weather>>,
     /// The motion of a sensor without a trajectory.
     pub motion: Option<Box<EvenMotion>>,

@@ -63,6 +63,15 @@ pub use material::Materials;
 pub use pose::{Pose, Trajectory};
 pub use scan::{Glass, Tally};
 
+/// The errors that [`Error`] holds.
+pub mod errors {
+    pub use crate::cast_error::CastError;
+    pub use crate::config::{ConfigError, InvalidValue};
+    pub use crate::material::MaterialError;
+    pub use crate::mesh::{MeshError, ParseError};
+    pub use crate::simplify::NotBuilt;
+}
+
 /// What Edgepuck's own crates, tests and measurements use beyond the types at the root. It is no
 /// promise: any release may change it.
 #[doc(hidden)]

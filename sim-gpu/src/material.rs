@@ -191,6 +191,7 @@ impl Materials {
     /// # Errors
     /// If a file is not OBJ or cannot be read, a name is not used by the mesh, an MTL file is
     /// missing or malformed, or a colour or an image cannot be used.
+    #[doc(hidden)]
     pub fn load(
         path: &Path,
         choice: &MaterialChoice,
@@ -256,6 +257,7 @@ impl Materials {
     /// The material of triangle `index` of the mesh, at a point whose barycentric coordinates are
     /// computed if they matter.
     #[must_use]
+    #[doc(hidden)]
     pub fn at(&self, index: u32, barycentric: impl FnOnce() -> DVec3) -> Material {
         match self.of_triangle[index as usize] {
             Paint::Even(place) => self.even[place as usize],

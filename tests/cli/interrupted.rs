@@ -1,9 +1,9 @@
 //! A run that is killed at any time resumes, and gives the same bytes.
 
-use crate::{Folder, meshes, terminate};
+use crate::{Folder, meshes, run_for, terminate};
 use formats::rng::StreamKey;
 use std::process::Stdio;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Number `n` of this process.
 fn random_below_300(n: u64) -> u64 {
@@ -21,14 +21,7 @@ fn a_killed_run_resumes_to_the_same_bytes() {
     println!("random moments, ms: {random:?}");
     let fixed = [2, 5, 9, 14, 20, 30, 40, 60, 90, 130, 180, 240, 320];
     for milliseconds in fixed.into_iter().chain(random).chain([60_000]) {
-        let mut child = folder.edgepuck(words).stderr(Stdio::null()).spawn().unwrap();
-        let killed_at = Instant::now() + Duration::from_millis(milliseconds);
-        while child.try_wait().unwrap().is_none() && Instant::now() < killed_at {
-            std::thread::sleep(Duration::from_millis(1));
-        }
-        // After SIGKILL, the program cannot clean up.
-        let _ = child.kill();
-        child.wait().unwrap();
+        run_for(&mut folder.edgepuck(words), milliseconds);
     }
     folder.assert_same_tree("unbroken", "broken");
     let again = folder.succeeds(words);

@@ -33,7 +33,8 @@ use formats::Scan;
 use formats::scan_file::read_scan;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
 /// A folder in which `edgepuck` runs; it is removed when dropped.
@@ -115,6 +116,18 @@ impl Folder {
 fn terminate(child: &std::process::Child) -> bool {
     let kill = format!("kill {}", child.id());
     Command::new("sh").args(["-c", &kill]).status().unwrap().success()
+}
+
+/// Runs `command` and kills it with SIGKILL, after which it cannot clean up, if it is still running
+/// after `milliseconds`.
+fn run_for(command: &mut Command, milliseconds: u64) {
+    let mut child = command.stderr(Stdio::null()).spawn().unwrap();
+    let killed_at = Instant::now() + Duration::from_millis(milliseconds);
+    while child.try_wait().unwrap().is_none() && Instant::now() < killed_at {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let _ = child.kill();
+    child.wait().unwrap();
 }
 
 fn said(output: &Output) -> String {

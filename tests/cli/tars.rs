@@ -1,9 +1,9 @@
 //! Tars of samples are the same for any number of tasks, and are handed over once.
 
-use crate::{Folder, meshes, terminate};
+use crate::{Folder, meshes, run_for, terminate};
 use std::fs;
 use std::process::Stdio;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 const WORDS: &str = "gen-dataset meshes --adapter cpu --layout webdataset --sensor vlp32c --views 3 \
                      --points 64 --azimuth-jitter 180 --tar-clouds 4";
@@ -16,14 +16,7 @@ fn parts_that_are_killed_and_gone_on_with_are_the_whole() {
         let words = format!("{WORDS} --out parts --resume --shard auto/3");
         for milliseconds in [5, 20, 60, 60_000] {
             let mut run = folder.edgepuck(&words);
-            let run = run.env("SLURM_ARRAY_TASK_ID", part.to_string()).stderr(Stdio::null());
-            let mut child = run.spawn().unwrap();
-            let killed_at = Instant::now() + Duration::from_millis(milliseconds);
-            while child.try_wait().unwrap().is_none() && Instant::now() < killed_at {
-                std::thread::sleep(Duration::from_millis(1));
-            }
-            let _ = child.kill();
-            child.wait().unwrap();
+            run_for(run.env("SLURM_ARRAY_TASK_ID", part.to_string()), milliseconds);
         }
     }
     let tars = |out: &str| {

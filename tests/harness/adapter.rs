@@ -16,9 +16,6 @@ pub fn casters(effects: &Effects) -> Vec<&'static OpenCaster> {
 }
 
 /// The best adapter, which may be software Vulkan.
-///
-/// # Errors
-/// If there is none.
 pub fn adapter(effects: &Effects) -> Result<&'static OpenCaster, String> {
     static BEST: LazyLock<Option<AdapterRequest>> = LazyLock::new(|| {
         let best = list_adapters().into_iter().next();

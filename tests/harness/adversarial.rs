@@ -66,9 +66,6 @@ pub fn from_inside(target: &Target) -> impl Iterator<Item = (CastJob, BeamPatter
 
 /// How many beams of `pattern` miss when `caster` casts `job`: before f64 has its say on any
 /// ray, and after.
-///
-/// # Errors
-/// As [`OpenCaster::cast`].
 pub fn missed(
     caster: &OpenCaster,
     job: &CastJob,

@@ -6,9 +6,6 @@ use test_support::shared_data;
 
 /// What a `tar.xz` below `../shared/data` holds, in a folder that is removed
 /// when dropped.
-///
-/// # Errors
-/// If it is missing or cannot be unpacked here.
 pub fn unpacked(relative: &str) -> Result<TempDir, String> {
     let archive = shared_data(relative)?;
     let folder = tempfile::tempdir().expect("a temporary folder");

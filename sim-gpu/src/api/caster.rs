@@ -48,7 +48,7 @@ impl Caster {
         Self { why_no_gpu, ..Self::of(best) }
     }
 
-    /// The first adapter whose name holds this text, letter case ignored; `auto` and `cpu` are
+    /// The first adapter whose name contains this text, in upper or lower case; `auto` and `cpu` are
     /// [`Caster::auto`] and [`Caster::cpu`].
     ///
     /// # Errors

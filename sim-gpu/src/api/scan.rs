@@ -4,14 +4,23 @@ use super::{Error, Sensor};
 use crate::effects::Effects;
 use crate::packets;
 use crate::scan::Tally;
+use formats::FormatError;
 use formats::hash::Hashing;
 use formats::scan_file::{ScanFormat, write_scan};
 use formats::vlp32c;
 use std::ops::Deref;
 use std::path::Path;
 
-/// What a sensor measured of a scene: the points of [`formats::Scan`], which it dereferences to,
-/// and what became of its beams.
+/// What a sensor measured of a scene. It dereferences to [`formats::Scan`], which has the columns:
+///
+/// | field | type | of each point |
+/// | --- | --- | --- |
+/// | `positions` | `Vec<[f32; 3]>` | metres in the world, less `origin` |
+/// | `origin` | `[f64; 3]` | what to add to each position, metres; 0 near the world's origin |
+/// | `range_m`, `time_s`, `intensity` | `Option<Vec<f32>>` | distance, seconds since the scan began, 0 to 1 |
+/// | `beam`, `object`, `triangle` | `Option<Vec<u32>>` | number of the beam, instance and triangle |
+/// | `ring` | `Option<Vec<u16>>` | row of the beam, from below |
+/// | `normal` | `Option<Vec<[f32; 3]>>` | unit normal of the surface |
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Scan {
@@ -37,7 +46,7 @@ impl Scan {
     }
 
     /// Writes the scan in the format that the extension names: `.npz` (NumPy, Open3D), `.ply`,
-    /// `.csv`, or `.pcap`, the packets of a VLP-32C.
+    /// `.csv`, or `.pcap`, the packets of a VLP-32C. Missing folders are created.
     ///
     /// # Errors
     /// The extension names no format, or the file cannot be written. For `.pcap`: the sensor is
@@ -47,8 +56,16 @@ impl Scan {
         let path = path.as_ref();
         match ScanFormat::of_path(path)? {
             ScanFormat::Pcap => {
-                let returns = packets::returns(&self.effects, None)?;
-                let revolution = packets::revolution(self.sensor.profile())?;
+                let of_file = |cause: String| FormatError::malformed(path, "packets", cause);
+                let returns = packets::returns(&self.effects, None);
+                let returns = returns.map_err(|invalid| of_file(invalid.to_string()))?;
+                let revolution = packets::revolution(self.sensor.profile()).map_err(|invalid| {
+                    of_file(format!("expected the beams of Sensor::as_packets_tell: {invalid}"))
+                })?;
+                if self.beam.is_none() || self.range_m.is_none() {
+                    let cause = "expected a scan with the attributes beam and range";
+                    return Err(of_file(cause.to_owned()).into());
+                }
                 vlp32c::write(path, Hashing::None, &revolution, returns, &self.points)?;
             }
             format => {

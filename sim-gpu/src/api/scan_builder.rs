@@ -1,7 +1,7 @@
 //! What is wanted of a scan.
 
 use super::{Caster, Error, Scan, Scene, Sensor};
-use crate::config::{positive, within};
+use crate::config::{InvalidValue, positive, within};
 use crate::effects::{Effects, Intensity};
 use crate::job::Culling;
 use crate::pose::{Pose, Trajectory};
@@ -10,7 +10,7 @@ use formats::rng::StreamKey;
 use formats::scan::{Attribute, AttributeSet};
 use std::sync::Arc;
 
-/// A scan that [`ScanBuilder::run`] makes. What is not set is as the [`Scene`] has it.
+/// A scan that [`ScanBuilder::run`] makes. Settings that are not given come from the [`Scene`].
 #[derive(Clone)]
 #[must_use = "`run` makes the scan"]
 pub struct ScanBuilder<'a> {
@@ -130,7 +130,7 @@ impl<'a> ScanBuilder<'a> {
     /// Makes the scan.
     ///
     /// # Errors
-    /// An effect or an instance has a number that is out of its bounds; the sensor lacks what an
+    /// An effect, an instance or a pose has a number that is out of its bounds; the sensor lacks what an
     /// effect takes from its profile; the adapter failed.
     pub fn run(self) -> Result<Scan, Error> {
         let mut effects = self.effects.clone();
@@ -139,6 +139,7 @@ impl<'a> ScanBuilder<'a> {
         }
         effects.validate()?;
         effects.for_sensor(self.sensor.profile())?;
+        check_pose("pose", self.pose)?;
         self.check_instances()?;
         let cpu = Caster::cpu();
         let caster = self.caster.unwrap_or(&cpu).for_effects(&effects)?;
@@ -164,6 +165,7 @@ impl<'a> ScanBuilder<'a> {
     fn check_instances(&self) -> Result<(), Error> {
         for (i, instance) in self.scene.instances().iter().enumerate() {
             let key = |field: &str| format!("instance[{i}].{field}");
+            check_pose(&key("pose"), instance.pose)?;
             within(&key("reflectivity"), instance.reflectivity, 0.0..=1.0)?;
             within(&key("retroreflection"), instance.retroreflection, 0.0..=1.0)?;
             for factor in instance.scale.to_array() {
@@ -172,4 +174,20 @@ impl<'a> ScanBuilder<'a> {
         }
         Ok(())
     }
+}
+
+/// That `pose`, which stands at `key`, is a place and a rotation.
+fn check_pose(key: &str, pose: Pose) -> Result<(), InvalidValue> {
+    let numbers = pose.position_m.to_array().into_iter().chain(pose.rotation.to_array());
+    if let Some(number) = numbers.into_iter().find(|number| !number.is_finite()) {
+        let cause = format!("expected finite numbers, found {number}");
+        return Err(InvalidValue::new(key, cause));
+    }
+    // Rounding moves the length of a product of rotations by a few ulps.
+    if !pose.rotation.is_normalized() {
+        let length = pose.rotation.length();
+        let cause = format!("expected a rotation of length 1, found length {length}");
+        return Err(InvalidValue::new(key, cause));
+    }
+    Ok(())
 }

@@ -52,7 +52,7 @@ pub struct Scene {
     instances: Vec<Instance>,
 }
 
-/// The handle of an [`Instance`] of a [`Scene`], which the scene is indexed by.
+/// The handle of an [`Instance`] of a [`Scene`]: `scene[id]` is the instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct InstanceId(u32);
 

@@ -63,9 +63,6 @@ pub fn skip(reason: &str) {
 
 /// A path in the folder of the developers' data: `../shared/data` beside the
 /// workspace, or the folder that [`SHARED_DATA`] names.
-///
-/// # Errors
-/// If there is no such path; the error names it.
 pub fn shared_data(relative: &str) -> Result<PathBuf, String> {
     let folder = env::var_os(SHARED_DATA).map_or_else(
         || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),
@@ -76,9 +73,6 @@ pub fn shared_data(relative: &str) -> Result<PathBuf, String> {
 }
 
 /// The adapter that was found.
-///
-/// # Errors
-/// If none was found.
 ///
 /// # Panics
 /// If none was found and [`REQUIRE_ADAPTER`] is 1.
