@@ -21,9 +21,7 @@ fn patterns() -> [BeamPattern; 3] {
     [builtin("vlp32c"), builtin("generic-static"), anywhere]
 }
 
-/// Compares every beam of every pattern and caster with `truth`, which tells
-/// the range of a beam in the world, or that it is too near a silhouette or
-/// too grazing to tell.
+/// `truth` tells the range of a beam in the world, or that it is too near a silhouette to tell.
 fn check(mesh: &TriangleMesh, poses: &[Pose], truth: impl Fn(DVec3, DVec3) -> Truth) {
     let target = target(mesh);
     for pattern in &patterns() {

@@ -20,8 +20,6 @@ fn point() -> impl Strategy<Value = DVec3> {
     prop::array::uniform3(-1.0..1.0f64).prop_map(DVec3::from_array)
 }
 
-/// Random, all equal, with collinear centres, clustered by powers of ten, flat
-/// on one plane.
 fn soups() -> impl Strategy<Value = Vec<[DVec3; 3]>> {
     let triangle = || prop::array::uniform3(point());
     let anywhere = prop::collection::vec(triangle(), 0..300);
@@ -46,7 +44,6 @@ fn rounded(soup: &[[DVec3; 3]]) -> Vec<Corners> {
     soup.iter().map(|t| t.map(|v| v.as_vec3().to_array())).collect()
 }
 
-/// The triangles of a tree, as sets of corners with their index.
 fn contents(bvh: &Bvh) -> Vec<(u32, [u32; 9])> {
     let mut all: Vec<_> = bvh.triangles.iter().map(|t| (t.index, bits([t.a, t.b, t.c]))).collect();
     all.sort_unstable();
@@ -150,7 +147,6 @@ fn shrinking_triangles_make_no_deep_tree() {
     }
 }
 
-/// Determinism: the same triangles give the same bytes, whatever the threads.
 #[test]
 fn a_tree_is_the_same_on_every_run_and_number_of_threads() {
     let mesh = tests::meshes::torus(160);

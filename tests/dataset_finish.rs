@@ -14,7 +14,6 @@ use std::path::Path;
 use tests::tree::files;
 use tests::written_dataset::{MIN_POINTS, PACKED_POINTS, config, entry, failure, terms, write};
 
-/// Eleven meshes of two classes, one name in both splits.
 fn entries() -> Vec<Entry> {
     let mut entries =
         vec![entry("cup", Test, "cup_1"), entry("cup", Train, "X"), entry("cup", Train, "cup_x")];
@@ -86,7 +85,6 @@ fn a_finished_dataset_is_what_its_manifest_says() {
 fn packed_sets_hold_all_scans_of_enough_points() {
     let folder = tempfile::tempdir().unwrap();
     let manifest = make(folder.path());
-    // Two sets, two variants, two splits.
     assert_eq!(manifest.packed.len(), 8);
     for packed in &manifest.packed {
         let set = read_labelled(&folder.path().join(&packed.file)).unwrap();

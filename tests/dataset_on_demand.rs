@@ -14,7 +14,6 @@ use std::path::Path;
 
 const CACHE_BYTES: usize = 1 << 20;
 
-/// Two noisy views of each mesh, from random places.
 fn settings(seed: u64) -> DatasetConfig {
     let noise = Noise { mean_m: 0.0, sigma_m: 0.02, model: NoiseModel::Range };
     let views = Views {
@@ -40,7 +39,6 @@ fn settings(seed: u64) -> DatasetConfig {
     }
 }
 
-/// Meshes of all built-in classes, two to train with and one to test with.
 fn meshes(folder: &Path) -> Vec<MeshEntry> {
     edgepuck_shapes::write_tree(folder, 3, 2, 1).expect("meshes are written");
     discover(folder, 0).expect("meshes are there")

@@ -27,12 +27,10 @@ fn noisy(noise: Noise) -> Effects {
     Effects { noise: Some(noise), ..Effects::default() }
 }
 
-/// A job of which every ray hits: a sensor in a cube.
 fn all_hit(stream: StreamKey, pattern: &BeamPattern) -> CastJob {
     CastJob { stream, ..job(&target(&cube()), &at(DVec3::new(0.1, 0.2, 0.3)), pattern) }
 }
 
-/// What `caster` answers for jobs of several streams, in all of which every ray hits.
 fn cast_all_hit(caster: &OpenCaster, pattern: &BeamPattern) -> Vec<(CastJob, Cast)> {
     let names = ["", "chair_0001", "chair_0002"];
     let answer = |(i, name)| {

@@ -36,7 +36,6 @@ fn fan() -> BeamPattern {
     }))
 }
 
-/// What a sensor at the origin measures of `mesh` with the effects of `caster`.
 fn scan(caster: &OpenCaster, pattern: &BeamPattern, mesh: &TriangleMesh) -> (Scan, Tally) {
     let sensor = SensorProfile::builtin("vlp32c").unwrap();
     let pattern = caster.effects().widen(pattern.clone(), &sensor).unwrap();

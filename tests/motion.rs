@@ -42,7 +42,6 @@ fn swerving() -> Option<Arc<Trajectory>> {
     ])
 }
 
-/// An object that turns as it goes by.
 fn passing() -> Option<Arc<Trajectory>> {
     moving(&[
         (0.0, pose([4.0, -1.0, 0.0], DVec3::Z, 0.0)),
@@ -58,7 +57,6 @@ fn everything() -> std::collections::BTreeSet<Attribute> {
     Attribute::ALL.into_iter().filter(|of| *of != Attribute::Intensity).collect()
 }
 
-/// A room, which stands still, and a lump that is scaled unevenly.
 fn targets() -> [Target; 2] {
     let lump = meshes::mapped(&meshes::icosphere(3), |p| p * DVec3::new(1.0, 0.6, 0.8));
     [meshes::cuboid(DVec3::splat(-9.0), DVec3::splat(9.0)), lump].map(|mesh| casting::target(&mesh))

@@ -21,7 +21,6 @@ const N: u32 = 10_000_000;
 /// Standard errors that a statistic may be off: 6e-7 of all seeds are.
 const STANDARD_ERRORS: f64 = 5.0;
 
-/// The normal distribution function.
 fn normal_cdf(z: f64) -> f64 {
     0.5 * libm::erfc(-z / SQRT_2)
 }

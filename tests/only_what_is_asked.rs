@@ -40,9 +40,7 @@ const PLAIN: &str = "plain";
 /// One thing that a scene may ask for.
 struct Asked {
     name: &'static str,
-    /// The effects that are there without it.
     without: Effects,
-    /// The effects that are there with it.
     effects: Effects,
     attributes: AttributeSet,
     /// Beginnings of the rows that it may change.
@@ -147,8 +145,7 @@ fn rows(effects: &Effects, attributes: &AttributeSet) -> Rows {
     rows
 }
 
-/// The rows of `other` that `plain` lacks or has otherwise; 0 for one that
-/// `other` lacks.
+/// The rows of `other` that `plain` lacks or has otherwise; 0 for one that `other` lacks.
 fn difference(plain: &Rows, other: &Rows) -> Rows {
     let mut differ: Rows = other
         .iter()
@@ -159,7 +156,6 @@ fn difference(plain: &Rows, other: &Rows) -> Rows {
     differ
 }
 
-/// What was measured, once for all tests.
 static MEASURED: LazyLock<Table> = LazyLock::new(|| {
     let none = AttributeSet::new();
     let cost = |asked: Asked| {

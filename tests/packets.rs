@@ -31,7 +31,6 @@ fn head_of(sensor: &mut SensorProfile) -> &mut Rotating {
     rotating
 }
 
-/// A VLP-32C of packets, at this many revolutions a minute.
 fn turning(rpm: f64) -> SensorProfile {
     let mut sensor = vlp32c();
     head_of(&mut sensor).rpm = rpm;
@@ -46,7 +45,6 @@ fn pose(distance_m: f64) -> Pose {
     Pose { rotation: looking.rotation * tilted, ..looking }
 }
 
-/// What `sensor` sees of `mesh`, with all that packets and this test need.
 fn scan(
     caster: &OpenCaster,
     sensor: &SensorProfile,
@@ -111,7 +109,6 @@ fn packets_of(sensor: &SensorProfile, returns: Returns, scan: &Scan) -> Vec<Deco
     decode(&std::fs::read(&path).unwrap(), returns, head_of(&mut sensor.clone()))
 }
 
-/// The scan's points in the sensor's frame.
 fn in_sensor<'a>(scan: &'a Scan, pose: &'a Pose) -> impl Iterator<Item = DVec3> + 'a {
     let sensor_from_world = pose.rotation.inverse();
     scan.positions

@@ -21,7 +21,6 @@ use tests::judge::{
 use tests::meshes::{cube, icosphere, soup, together, torus};
 use tests::random::Random;
 
-/// Surfaces of many kinds: smooth, edged, open, overlapping, enclosing.
 fn surfaces() -> Vec<(&'static str, TriangleMesh)> {
     let room = tests::meshes::cuboid(DVec3::splat(-8.0), DVec3::splat(8.0));
     vec![
@@ -34,7 +33,6 @@ fn surfaces() -> Vec<(&'static str, TriangleMesh)> {
     ]
 }
 
-/// Sensors far, near and within.
 fn poses() -> Vec<Pose> {
     let from = [DVec3::new(5.0, 0.0, 0.5), DVec3::new(1.2, 1.1, 1.3), DVec3::new(0.1, -0.2, 0.05)];
     from.iter().map(|&p| Pose::look_at(p, DVec3::ZERO).expect("two places")).collect()

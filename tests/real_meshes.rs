@@ -27,8 +27,7 @@ const MOST_AMBIGUOUS: f64 = 0.5;
 /// The most of all hits of a folder: 0.43 % were measured over those meshes.
 const MOST_AMBIGUOUS_OF_ALL: f64 = 0.02;
 
-/// Reads the meshes under `root` and checks what is true of each once it stands
-/// in the world.
+/// Reads the meshes under `root` and checks each as it stands in the world.
 fn read_in_full(root: &Path, n_meshes: usize) -> Vec<(MeshEntry, TriangleMesh, LoadedMesh)> {
     let read = |entry: MeshEntry| {
         let name = &entry.relative;

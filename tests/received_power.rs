@@ -16,7 +16,6 @@ use sim_gpu::internals::sensor::{DetectionLimit, SensorProfile};
 use std::fs;
 use tests::{adapter, casting, meshes};
 
-/// How far the wall is, metres.
 const WALL_M: f64 = 10.0;
 
 /// A surface, from a sensor at the origin.
@@ -33,7 +32,6 @@ impl Seen {
         Self { mesh, world_from_object, reflectivity: 1.0, retroreflection: 0.0 }
     }
 
-    /// A wall across the x axis.
     fn wall(reflectivity: f32) -> Self {
         let low = DVec3::new(WALL_M, -60.0, -20.0);
         let mesh = meshes::cuboid(low, DVec3::new(WALL_M + 1.0, 60.0, 20.0));

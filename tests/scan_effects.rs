@@ -15,7 +15,6 @@ use tests::{adapter, casting, meshes};
 
 const STREAM: StreamKey = StreamKey([7, 11]);
 
-/// Where the sensor stands.
 const SENSOR: DVec3 = DVec3::new(3.0, 0.0, 0.0);
 
 /// What `sensor` measures of a unit sphere with all effects of `caster`.
@@ -37,12 +36,10 @@ fn vlp32c() -> SensorProfile {
     SensorProfile::builtin("vlp32c").unwrap()
 }
 
-/// What a VLP-32C measures with `effects` by the CPU.
 fn on_cpu(effects: &Effects) -> (Scan, Tally) {
     scan(&OpenCaster::Cpu(effects.clone()), &vlp32c())
 }
 
-/// A point from the sensor.
 fn from_sensor(point: &[f32; 3]) -> DVec3 {
     DVec3::from_array(point.map(f64::from)) - SENSOR
 }

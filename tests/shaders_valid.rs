@@ -14,7 +14,6 @@ use sim_gpu::internals::cpu::effects::append_outputs;
 use sim_gpu::internals::gpu::{View, compose};
 use sim_gpu::internals::ray::TraceRay;
 
-/// What every variant is made of.
 const TRACE: [&str; 6] = [
     "shared/bvh.wgsl",
     "shared/ray.wgsl",
@@ -75,7 +74,6 @@ fn read(file: &str) -> String {
     std::fs::read_to_string(root().join("shaders").join(file)).expect("a shader is text")
 }
 
-/// All files under `shaders`, by their path there.
 fn all_files() -> BTreeSet<String> {
     let mut files = BTreeSet::new();
     for folder in ["", "shared/", "effects/"] {
@@ -89,8 +87,7 @@ fn all_files() -> BTreeSet<String> {
     files
 }
 
-/// The functions, overrides and global variables that a file declares: all start
-/// a line.
+/// The functions, overrides and global variables of a file: all start a line.
 fn declared(wgsl: &str) -> BTreeSet<String> {
     let name = |line: &str| {
         let starts = [("@group", "> "), ("var<", "> "), ("override ", "override "), ("fn ", "fn ")];

@@ -53,7 +53,6 @@ fn farthest_m(points: &[DVec3], target: &Target) -> f64 {
     points.par_iter().map(distance).reduce(|| 0.0, f64::max)
 }
 
-/// Points drawn evenly from the surface of a target, in metres.
 fn drawn(target: &Target, n: usize) -> Vec<DVec3> {
     area_uniform(&target.surface, n, StreamKey::new(3, "drawn", 0)).unwrap()
 }
@@ -73,7 +72,6 @@ fn assert_near(
     (whole, fewer)
 }
 
-/// The points of a scan of `target` from `pose`, metres.
 fn scanned(target: &Target, pose: &Pose) -> Vec<DVec3> {
     let pattern = builtin("vlp32c");
     let job = job(target, pose, &pattern);
@@ -99,8 +97,7 @@ fn a_fine_sphere_becomes_a_coarse_one_within_the_bound() {
     assert!(compared > 10_000, "{compared} rays");
 }
 
-/// A range differs by the bound over the cosine of incidence at most; returns how
-/// many were compared.
+/// A range differs by the bound over the cosine of incidence at most. Returns the number compared.
 fn assert_ranges_near(whole: &Target, fewer: &Target, pose: &Pose, bound_m: f64) -> usize {
     let pattern = builtin("vlp32c");
     let [whole_job, fewer_job] = [whole, fewer].map(|target| job(target, pose, &pattern));
@@ -123,8 +120,7 @@ fn assert_ranges_near(whole: &Target, fewer: &Target, pose: &Pose, bound_m: f64)
     compared
 }
 
-/// Simplifies every `every`-th mesh under `root`, and holds what one scan of it
-/// finds, and points drawn of it, to the bound.
+/// Holds every `every`-th mesh under `root` to the bound, by one scan and by points drawn of it.
 fn hold_to_the_bound(root: &Path, every: usize) {
     let entries = discover(root, 0).unwrap();
     let (mut n_simplified, mut worst) = (0, 0f64);

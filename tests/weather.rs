@@ -169,7 +169,6 @@ fn what_is_in_the_air_is_no_surface() {
     assert!(count(&on_cpu(&last, 1.0).0, Medium::Surface) > 50_000);
 }
 
-/// The effects of fog by Hahner's model for a sensor that detects everything.
 fn in_hahners_fog(visibility_m: f64, footprint: Option<Footprint>) -> Effects {
     let limit = Some(DetectionLimit { reflectivity: 1e-9, range_m: 1e9 });
     let detection = Some(Detection { limit, ..Detection::default() });
@@ -220,7 +219,6 @@ fn rays_for_scans_of_wide_beams_are_none_of_narrow_ones_in_weather() {
     }
 }
 
-/// The ranges of both returns of each beam that has two.
 fn pairs(scan: &Scan) -> std::collections::BTreeMap<u32, [f64; 2]> {
     let mut pairs = std::collections::BTreeMap::new();
     let (beams, numbers) = (scan.beam.as_ref().unwrap(), scan.return_number.as_ref().unwrap());

@@ -6,7 +6,6 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-/// Writes `tensors` as a bare state dict.
 pub fn write(path: &Path, tensors: &BTreeMap<String, Tensor>) {
     let mut pickle = b"\x80\x02}(".to_vec();
     for (key, (name, tensor)) in tensors.iter().enumerate() {

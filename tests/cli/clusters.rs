@@ -10,7 +10,6 @@ fn job_file(folder: &Folder, scheduler: &str, words: &str) -> String {
     folder.succeeds(&format!("cluster {scheduler} {words}"))
 }
 
-/// Whether a shell can read `script`.
 fn is_script(script: &str) -> bool {
     let mut shell = Command::new("sh").arg("-n").stdin(Stdio::piped()).spawn().unwrap();
     shell.stdin.take().unwrap().write_all(script.as_bytes()).unwrap();
@@ -64,7 +63,6 @@ fn words_that_the_job_file_settles_are_refused() {
     folder.refuses(2, &cases);
 }
 
-/// Runs the script of the tasks of Kubernetes with the program of this build.
 #[test]
 #[cfg(unix)]
 fn tasks_of_kubernetes_make_the_whole() {

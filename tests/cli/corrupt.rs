@@ -12,7 +12,6 @@ const STREET: &str = "attributes = [\"range\", \"ring\", \"time\", \"intensity\"
 const GROUND: &str = "OFF\n4 1 0\n-50 -50 0\n50 -50 0\n50 50 0\n-50 50 0\n4 0 1 2 3\n";
 const WALL: &str = "OFF\n4 1 0\n20 -30 0\n20 30 0\n20 30 6\n20 -30 6\n4 0 3 2 1\n";
 
-/// The numbers of points or clouds of each file, by `corruptions.csv`.
 fn counts(folder: &Folder, file: &str) -> BTreeMap<String, usize> {
     let text = folder.text(file);
     let line = |line: &str| {

@@ -8,7 +8,6 @@ use serde_json::Value;
 
 use crate::Folder;
 
-/// A row of walls, without noise.
 const WALLS: &str = r#"
 variants = 2
 [ground]

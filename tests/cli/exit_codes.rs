@@ -4,7 +4,6 @@ use crate::{Folder, said};
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 
-/// Runs `edgepuck train` with a training program that is this shell script.
 fn train(script: &str) -> (Option<i32>, String) {
     let folder = Folder::new();
     folder.write("train.sh", format!("#!/bin/sh\n{script}\n"));

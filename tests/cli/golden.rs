@@ -36,7 +36,6 @@ fn check(found: &[(&str, String)]) {
     }
 }
 
-/// The hash of all files of a folder, names included.
 fn tree(folder: &Path) -> String {
     let files = files(folder);
     assert!(!files.is_empty(), "{} has no file", folder.display());
@@ -46,7 +45,6 @@ fn tree(folder: &Path) -> String {
     }))
 }
 
-/// A folder with four small shapes in `shapes`, and the options that choose them.
 fn with_shapes() -> Folder {
     let folder = Folder::new();
     folder.succeeds("gen-shapes --out shapes --seed 5 --train 1 --test 1");

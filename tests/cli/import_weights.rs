@@ -30,13 +30,11 @@ fn read(path: &Path) -> (Tensors, ModelCard) {
     (names.map(|name| (name.clone(), file.read(&name).unwrap())).collect(), card)
 }
 
-/// The command line that imports a checkpoint.
 fn words(checkpoint: &Path, flags: &str) -> String {
     format!("import-weights {} --out m.safetensors {flags}", checkpoint.display())
 }
 
 impl Folder {
-    /// Imports a checkpoint with these flags. Returns its tensors and its card.
     fn imports(&self, checkpoint: &Path, flags: &str) -> (Tensors, ModelCard) {
         self.succeeds(&words(checkpoint, flags));
         read(&self.at("m.safetensors"))

@@ -5,7 +5,6 @@ use formats::rng::StreamKey;
 use std::process::Stdio;
 use std::time::Duration;
 
-/// Number `n` of this process.
 fn random_below_300(n: u64) -> u64 {
     StreamKey::new(u64::from(std::process::id()), "kill", 0).below(300, n)
 }

@@ -41,12 +41,10 @@ use tempfile::TempDir;
 struct Folder(TempDir);
 
 impl Folder {
-    /// An empty folder.
     fn new() -> Self {
         Self(tempfile::tempdir().unwrap())
     }
 
-    /// A folder with nine small meshes in `meshes`.
     fn with_meshes() -> Self {
         let folder = Self::new();
         meshes::write_tree(&folder);
@@ -57,7 +55,6 @@ impl Folder {
         self.0.path().join(file)
     }
 
-    /// Writes a file and creates its folders.
     fn write(&self, file: &str, content: impl AsRef<[u8]>) {
         let path = self.at(file);
         fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -76,27 +73,23 @@ impl Folder {
         read_scan(&self.at(file)).unwrap_or_else(|error| panic!("{error}"))
     }
 
-    /// `edgepuck` with these arguments, separated by spaces.
     fn edgepuck(&self, words: &str) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_edgepuck"));
         command.current_dir(&self.0).args(words.split_whitespace());
         command
     }
 
-    /// Runs the arguments and expects success. Returns the output.
     fn succeeds(&self, words: &str) -> String {
         self.exits(0, words)
     }
 
-    /// Runs the arguments and expects this exit code. Returns the output.
     fn exits(&self, code: i32, words: &str) -> String {
         let output = self.edgepuck(words).output().unwrap();
         assert_eq!(output.status.code(), Some(code), "{words}\n{}", said(&output));
         said(&output)
     }
 
-    /// Expects that the arguments of each of `cases` end with this exit code and a message that
-    /// contains the second part.
+    /// Each of `cases` has arguments and a part of the message.
     fn refuses(&self, code: i32, cases: &[(&str, &str)]) {
         for (words, part) in cases {
             let said = self.exits(code, words);
@@ -110,16 +103,14 @@ impl Folder {
     }
 }
 
-/// Sends SIGTERM to `child`, and returns whether it was running. The shell has `kill` even if there
-/// is no program of that name.
+/// Sends SIGTERM through the shell, which has `kill` even if there is no program of that name.
 #[cfg(unix)]
 fn terminate(child: &std::process::Child) -> bool {
     let kill = format!("kill {}", child.id());
     Command::new("sh").args(["-c", &kill]).status().unwrap().success()
 }
 
-/// Runs `command` and kills it with SIGKILL, after which it cannot clean up, if it is still running
-/// after `milliseconds`.
+/// Kills `command` with SIGKILL if it is still running after `milliseconds`.
 fn run_for(command: &mut Command, milliseconds: u64) {
     let mut child = command.stderr(Stdio::null()).spawn().unwrap();
     let killed_at = Instant::now() + Duration::from_millis(milliseconds);
@@ -135,7 +126,6 @@ fn said(output: &Output) -> String {
     text(&output.stdout) + &text(&output.stderr)
 }
 
-/// A file of the repository.
 fn in_repository(file: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(file)
 }

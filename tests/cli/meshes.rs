@@ -1,5 +1,3 @@
-//! Small meshes to scan.
-
 use crate::Folder;
 use std::fmt::Write;
 
@@ -13,7 +11,6 @@ pub fn write_tree(folder: &Folder) {
     }
 }
 
-/// A torus with `segments` x `segments` quads, as OFF.
 pub fn off(segments: usize, thickness: f64) -> String {
     let n = segments;
     let mut text = format!("OFF\n{} {} 0\n", n * n, n * n);

@@ -6,7 +6,6 @@ use formats::velodyne::count_returns;
 const DATASET: &str =
     "gen-dataset meshes --sensor vlp32c --views 2 --format pcap --returns dual --adapter cpu";
 
-/// A folder with a scene that this sensor sees.
 fn scene(profile: &str) -> Folder {
     let folder = Folder::new();
     folder.write("torus.off", meshes::off(40, 0.3));

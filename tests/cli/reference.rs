@@ -9,7 +9,6 @@ use infer_cpu::{Classifier, Normalization, Options, Precision};
 use ndarray::Array2;
 use test_support::{need, shared_data};
 
-/// The clouds of the references, and an imported checkpoint in a folder.
 fn imported(checkpoint: &str) -> Result<(LabelledSet, Folder), String> {
     let checkpoint = shared_data(&format!("checkpoints/{checkpoint}.pth"))?;
     let clouds = shared_data("modelnet40-clouds/dev.npz")?;

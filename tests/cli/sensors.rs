@@ -2,7 +2,6 @@
 
 use crate::Folder;
 
-/// The metadata of an Ouster with two beams.
 const METADATA: &str = r#"{
   "beam_altitude_angles": [10.0, -10.0], "beam_azimuth_angles": [3.0, -3.0],
   "lidar_origin_to_beam_origin_mm": 15.8, "lidar_mode": "512x10",

@@ -2,7 +2,6 @@
 
 use crate::Folder;
 
-/// A wall across the x axis.
 const WALL: &str = "OFF\n4 1 0\n20 -30 -10\n20 30 -10\n20 30 10\n20 -30 10\n4 0 3 2 1\n";
 
 fn scene(effects: &str) -> String {

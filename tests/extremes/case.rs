@@ -13,16 +13,12 @@ use crate::scan::Scan;
 use crate::scene::ManyObjects;
 use crate::sweep::Sweep;
 
-/// The environment variable that enables heavy cases if it is 1.
 const HEAVY: &str = "EDGEPUCK_HEAVY";
 
-/// The file of a case of any kind, with the derivation of its outcome.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
-    /// The derivation of the expected outcome.
     derivation: String,
-    /// Whether the case needs gigabytes or minutes.
     #[serde(default)]
     heavy: bool,
     scan: Option<Scan>,
@@ -33,10 +29,8 @@ struct File {
     sweep: Option<Sweep>,
 }
 
-/// A case of any kind, as a test.
 type Check = Box<dyn FnOnce() + Send>;
 
-/// A test for each file. A file that cannot be read is a failing test.
 pub fn trials() -> Vec<Trial> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("extremes/cases");
     let mut trials = vec![Trial::test("what_is_misspelt_is_named", what_is_misspelt_is_named)];
@@ -83,7 +77,6 @@ fn parse(text: &str, path: &Path) -> Result<(bool, Check), String> {
     }
 }
 
-/// Refuses a case that expects nothing, or whose keys have no effect.
 fn what_is_misspelt_is_named() -> Result<(), libtest_mimic::Failed> {
     let sample = "[sample]\npoints = [[0, 0, 0]]\nsampler = \"voxel\"\nvoxel_size = 1\n";
     let whole = format!("derivation = \"one\"\n{sample}kept = [0]\n");

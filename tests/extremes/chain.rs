@@ -15,7 +15,6 @@ use tests::adapter::casters;
 const WITHIN_M: f64 = 1e-4;
 /// Largest difference of logits in f32, as a share of the largest logit.
 const LOGITS_WITHIN: f64 = 1e-3;
-/// Number of points that farthest point sampling selects.
 const POINTS: usize = 16;
 
 /// A chair with a radius of 40 m, 1e7 m from the origin of the world, is scanned from 200 m with
@@ -75,7 +74,6 @@ fn assets() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets")
 }
 
-/// The points in the frame of the world.
 fn scan(scene: &SceneFile, caster: &OpenCaster) -> Vec<DVec3> {
     let caster = Caster::named(caster.name()).unwrap();
     let scan = Scene::try_from(scene).unwrap().scan_mounted(0).with(&caster).run().unwrap();

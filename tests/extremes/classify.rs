@@ -8,7 +8,6 @@ use serde::Deserialize;
 use crate::cloud::Cloud;
 use crate::model::{Model, ModelFile};
 
-/// A cloud, a model, and the expected answer.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Classify {
@@ -18,7 +17,6 @@ pub struct Classify {
     other: Option<Cloud>,
     /// Samplers, by their names on the command line. If absent, the sampler of the training.
     samplers: Option<Vec<String>>,
-    /// Number of points that samplers select.
     points: Option<usize>,
     /// Precisions, by their names on the command line. If absent, all precisions.
     precisions: Option<Vec<String>>,
@@ -26,13 +24,10 @@ pub struct Classify {
     expect: Expect,
 }
 
-/// A parameter and its values. Each value must give the expected answer.
 #[derive(Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum Knob {
-    /// Factors for all coordinates.
     Scale(Vec<f64>),
-    /// Offsets of all coordinates.
     Offset(Vec<[f64; 3]>),
 }
 
@@ -49,16 +44,13 @@ struct Expect {
     confidence: Option<f64>,
     /// The precision of the computation, if the wanted precision overflowed.
     computed_in: Option<String>,
-    /// Whether int8 clips activations.
     clipped: Option<bool>,
-    /// The largest logit has a larger magnitude than this.
     logits_above: Option<f64>,
     /// Largest difference between the logits of the cloud and those of the other cloud or of a
     /// value of the parameter, as a share of the largest logit. 0 requires equal bits.
     same: Option<f64>,
 }
 
-/// A combination of precision and kernels.
 #[derive(Clone)]
 struct Way {
     precision: Precision,
@@ -67,7 +59,6 @@ struct Way {
 }
 
 impl Classify {
-    /// Classifies with all combinations.
     pub fn check(&self) {
         let model = self.model.file();
         let cloud = self.cloud.points();
@@ -141,7 +132,6 @@ impl Classify {
 }
 
 impl Expect {
-    /// Checks the answer, and returns its logits.
     fn check(&self, what: &str, found: Result<&Prediction, Error>) -> Option<Vec<f32>> {
         if let Some(part) = &self.refused {
             let error = found.err().unwrap_or_else(|| panic!("{what}: not refused"));

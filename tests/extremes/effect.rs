@@ -25,10 +25,14 @@ pub struct InCube {
 #[derive(Deserialize)]
 #[serde(untagged, deny_unknown_fields)]
 enum Expect {
-    /// A part of the error, if all effects are refused.
-    Refused { refused: String },
+    Refused {
+        refused: String,
+    },
     /// The limits of the number of points, and their position.
-    Points { points: [usize; 2], range_m: Option<[f32; 2]> },
+    Points {
+        points: [usize; 2],
+        range_m: Option<[f32; 2]>,
+    },
 }
 
 fn white() -> f32 {
@@ -36,7 +40,6 @@ fn white() -> f32 {
 }
 
 impl InCube {
-    /// Scans with all casters.
     pub fn check(&self) {
         for table in &self.effects {
             let parsed: Result<Effects, _> = table.clone().try_into();

@@ -10,14 +10,12 @@ use tempfile::TempDir;
 
 use crate::tiny_model;
 
-/// A model with changes.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Model {
     /// A bundled model. If absent, a small model with weights by a rule, both T-Nets and the
     /// classes a, b, c and d.
     bundled: Option<String>,
-    /// Factors of tensors, by the names of the tensors.
     #[serde(default)]
     scale: BTreeMap<String, f32>,
     /// The variance of a batch norm that is added after each layer that can have one.
@@ -26,15 +24,12 @@ pub struct Model {
     activation_range: Option<f32>,
 }
 
-/// The file of a model, which is removed when this is dropped.
 pub struct ModelFile {
-    /// The path.
     pub path: PathBuf,
     _folder: Option<TempDir>,
 }
 
 impl Model {
-    /// Writes the model with its changes.
     pub fn file(&self) -> ModelFile {
         let bundled = self.bundled.as_ref().map(|name| {
             Path::new(env!("CARGO_MANIFEST_DIR"))

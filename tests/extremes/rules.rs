@@ -22,7 +22,6 @@ use tests::random::Random;
 
 use crate::chain::a_chair_far_away_and_noisy_is_classified_as_at_the_origin;
 
-/// Tests by the names of their functions.
 macro_rules! trials {
     ($($rule:path),* $(,)?) => {
         vec![$(Trial::test(stringify!($rule), || {
@@ -32,7 +31,6 @@ macro_rules! trials {
     };
 }
 
-/// A test for each relation.
 pub fn trials() -> Vec<Trial> {
     trials![
         a_sensor_on_a_surface_is_blind_or_looks_past_it,
@@ -96,8 +94,6 @@ fn a_sensor_on_a_surface_is_blind_or_looks_past_it() {
     }
 }
 
-/// An object without triangles among others in one batch. It must not get the triangles of other
-/// objects.
 fn an_empty_object_in_a_batch_has_no_hits() {
     let pattern = builtin("generic-static");
     let [empty, full] = [TriangleMesh::default(), torus(20)].map(|mesh| target(&mesh));
@@ -151,7 +147,6 @@ fn of_coincident_triangles_the_lowest_index_is_hit() {
     }
 }
 
-/// Compares an object with a non-uniform scale with a mesh that has this scale.
 fn a_squeezed_object_is_seen_as_its_squeezed_mesh() {
     let mesh = torus(40);
     let pattern = builtin("vlp32c");

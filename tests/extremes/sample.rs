@@ -1,9 +1,6 @@
-//! Cases of samplers.
-
 use infer_cpu::sampler::{SamplerKind, SamplerSpec};
 use serde::Deserialize;
 
-/// A cloud, a sampler and the selected points.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sample {
@@ -11,7 +8,6 @@ pub struct Sample {
     sampler: Kind,
     /// The edge of a voxel in the unit of the cloud.
     voxel_size: Option<f64>,
-    /// The number of points to select.
     m: Option<usize>,
     /// The expected indices, in the order of the sampler.
     kept: Vec<u32>,
@@ -25,7 +21,6 @@ enum Kind {
 }
 
 impl Sample {
-    /// Samples the cloud.
     pub fn check(&self) {
         let spec = SamplerSpec {
             kind: match self.sampler {

@@ -21,7 +21,6 @@ use tests::random::Random;
 
 use crate::shape::Shape;
 
-/// A mesh, a sensor, its beams and the expected hits.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scan {
@@ -34,7 +33,6 @@ pub struct Scan {
     expect: Expect,
 }
 
-/// The pose of the sensor.
 #[derive(Deserialize)]
 #[serde(untagged, expecting = "a sensor has `at_m` or `distance_m`", deny_unknown_fields)]
 enum Place {
@@ -45,27 +43,27 @@ enum Place {
 #[derive(Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum Beams {
-    /// The beams of a built-in sensor.
     Sensor(String),
-    /// Beams in these directions.
     Directions(Vec<DVec3>),
-    /// A number of beams in random directions.
     Random(usize),
-    /// Beams to these points.
     AtPoints(Vec<DVec3>),
-    /// Beams to random points in a box.
-    AtBox { n: usize, low: DVec3, high: DVec3 },
+    AtBox {
+        n: usize,
+        low: DVec3,
+        high: DVec3,
+    },
     /// Beams to equidistant points from one point to another, both included.
-    AtSegment { n: u32, from: DVec3, to: DVec3 },
-    /// Beams to the vertices of the mesh and to the middles of its edges.
+    AtSegment {
+        n: u32,
+        from: DVec3,
+        to: DVec3,
+    },
     AtCornersAndEdges {},
 }
 
-/// A parameter and its values. Each value must give the expected hits.
 #[derive(Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum Knob {
-    /// Factors for all lengths.
     Scale(Vec<f64>),
     /// Offsets of the mesh and the sensor, metres.
     OffsetM(Vec<DVec3>),
@@ -105,7 +103,6 @@ enum Rule {
     Aim,
     /// All beams end at the cube from -1 to 1, in which the sensor is.
     LeavesCube,
-    /// No beam hits.
     Miss,
 }
 
@@ -127,7 +124,6 @@ fn yes() -> bool {
     true
 }
 
-/// One value of the parameter.
 #[derive(Clone, Copy, Debug)]
 enum Setting {
     Plain,
@@ -136,7 +132,6 @@ enum Setting {
     DistanceM(f64),
 }
 
-/// A setting that is ready to cast, with the expected range of each beam, if there is one.
 struct Scene {
     target: Target,
     pose: Pose,
@@ -145,7 +140,6 @@ struct Scene {
 }
 
 impl Scan {
-    /// Casts all settings with all casters.
     pub fn check(&self) {
         let settings = self.knob.as_ref().map_or(vec![Setting::Plain], Knob::settings);
         let reference = self.expect.same.as_ref().map(|same| (same, self.cast_all(Setting::Plain)));
@@ -159,7 +153,6 @@ impl Scan {
         }
     }
 
-    /// The checked hits of all casters.
     fn cast_all(&self, setting: Setting) -> (Scene, Vec<Hits>) {
         let scene = self.scene(setting);
         let check = |caster: &&OpenCaster| {
@@ -235,7 +228,6 @@ impl Place {
 }
 
 impl Beams {
-    /// The pattern, and the targets of its beams, if there are any.
     fn pattern(
         &self,
         mesh: &TriangleMesh,

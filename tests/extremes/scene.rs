@@ -16,7 +16,6 @@ use tests::meshes::cuboid;
 #[serde(deny_unknown_fields)]
 pub struct ManyObjects {
     objects: usize,
-    /// Distance between adjacent cubes, metres.
     apart_m: f64,
     /// Height of the sensor above the middles of the cubes, metres.
     height_m: f64,
@@ -39,7 +38,6 @@ struct Expect {
 const JUDGED: usize = 500;
 
 impl ManyObjects {
-    /// Scans the scene on every caster.
     pub fn check(&self) {
         let folder = tempfile::tempdir().expect("a folder");
         let cube = cuboid(DVec3::splat(-0.5), DVec3::splat(0.5));

@@ -5,7 +5,6 @@ use std::path::Path;
 
 use formats::cloud_file::{CloudFormat, read_cloud_from};
 
-/// Reads the n points of a stream.
 pub fn read(n: usize) -> Vec<[f64; 3]> {
     // Before the first record is an empty rest.
     let mut rest = Cursor::new([0; RECORD]);
@@ -17,7 +16,6 @@ pub fn read(n: usize) -> Vec<[f64; 3]> {
 /// Number of bytes of x, y, z and intensity.
 const RECORD: usize = 16;
 
-/// Records that are generated while they are read.
 struct Made {
     n: usize,
     next: usize,

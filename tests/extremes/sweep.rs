@@ -1,9 +1,6 @@
-//! Cases of segmentation.
-
 use edgepuck_segment::{Label, Segmenter, Settings, Sweep as Input};
 use serde::Deserialize;
 
-/// A sweep, listed or made by rules, and the expected numbers of points of each kind.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sweep {
@@ -17,16 +14,12 @@ pub struct Sweep {
     /// Number of firings of each ring in a revolution.
     #[serde(default = "columns")]
     columns: usize,
-    /// Whether the points have rings.
     #[serde(default = "yes")]
     rings: bool,
-    /// Expected number of ground points.
     ground: usize,
-    /// Expected number of points of each cluster.
     clusters: Vec<usize>,
     /// Expected number of points in no cluster, because it would be too small or too large.
     small: usize,
-    /// Expected number of invalid points.
     invalid: usize,
 }
 

@@ -52,8 +52,7 @@ pub fn aimed(target: &Target, sensor: DVec3, points: &[DVec3]) -> (CastJob, Beam
     (job(target, &at(sensor * frame.scale + frame.centre), &pattern), pattern)
 }
 
-/// From each of [`SENSORS`] places within `target`, a beam through each corner and each edge's
-/// midpoint.
+/// A beam from each of [`SENSORS`] places within `target` to each corner and edge midpoint.
 pub fn from_inside(target: &Target) -> impl Iterator<Item = (CastJob, BeamPattern)> {
     let points = corners_and_midpoints(target);
     let mut random = Random::new("inside");
@@ -64,8 +63,7 @@ pub fn from_inside(target: &Target) -> impl Iterator<Item = (CastJob, BeamPatter
     })
 }
 
-/// How many beams of `pattern` miss when `caster` casts `job`: before f64 has its say on any
-/// ray, and after.
+/// How many beams miss when `caster` casts `job`: before f64 has its say on any ray, and after.
 pub fn missed(
     caster: &OpenCaster,
     job: &CastJob,

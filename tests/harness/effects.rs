@@ -31,8 +31,7 @@ pub struct EffectVerdict {
     pub broken: Vec<String>,
 }
 
-/// Compares the outputs that `cast` holds for the rays of `job` that hit: one verdict for each
-/// of `effects`.
+/// One verdict for each of `effects`, on the rays of `job` that hit.
 pub fn judge_effects(
     job: &CastJob,
     pattern: &BeamPattern,

@@ -20,8 +20,7 @@ use crate::casting::hits;
 
 /// Relative error allowed of a range.
 pub const RANGE_TOLERANCE: f64 = 1e-6;
-/// Beams closer than this to the surface's plane may be less accurate: 0.1
-/// degree.
+/// Beams closer than this to the surface's plane may be less accurate.
 pub const GRAZING_RAD: f64 = 0.1 * std::f64::consts::PI / 180.0;
 /// Beams closer than this to a silhouette may see what lies on its other side.
 pub const SILHOUETTE_RAD: f64 = 1e-6;
@@ -43,8 +42,7 @@ pub struct Verdict {
     pub decided_in_f64: usize,
     /// Hits of the oracle.
     pub hits: usize,
-    /// Largest relative error of a range where the same surface was found, not
-    /// grazing.
+    /// Largest relative error of a range on the same surface, not grazing.
     pub worst: f64,
     /// Beams that differ, all within [`SILHOUETTE_RAD`] of a silhouette.
     pub at_silhouettes: usize,
@@ -58,8 +56,7 @@ pub fn leaves_too_much(hits: &Hits, most: f64) -> bool {
     hits.decided_in_f64 as f64 > (most * hits.hits.len() as f64).max(1.0)
 }
 
-/// Compares `hits`, which a caster found for `job`, with the oracle on all
-/// beams of `pattern`, cast or not.
+/// Compares `hits` with the oracle on all beams of `pattern`, cast or not.
 pub fn judge(job: &CastJob, pattern: &BeamPattern, hits: &Hits) -> Verdict {
     let mut found = vec![None; pattern.len()];
     for hit in &hits.hits {
@@ -78,8 +75,7 @@ pub fn judge(job: &CastJob, pattern: &BeamPattern, hits: &Hits) -> Verdict {
     Verdict { decided_in_f64: hits.decided_in_f64, ..verdict }
 }
 
-/// Asserts that `caster` keeps the promise on `job`, and leaves at most the share
-/// `most_ambiguous` of its hits to f64.
+/// Asserts the promise, and that at most the share `most_ambiguous` of hits is left to f64.
 pub fn assert_promise(
     caster: &OpenCaster,
     job: &CastJob,

@@ -119,8 +119,7 @@ pub fn torus(n: u32) -> TriangleMesh {
     mesh
 }
 
-/// `n` triangles anywhere in the cube from -1 to 1, their corners within
-/// `size` of each other.
+/// `n` triangles in the cube from -1 to 1, their corners within `size` of each other.
 pub fn soup(n: u32, size: f64) -> TriangleMesh {
     let mut random = Random::new("soup");
     let mut corners = |_| {

@@ -4,8 +4,7 @@ use std::process::Command;
 use tempfile::TempDir;
 use test_support::shared_data;
 
-/// What a `tar.xz` below `../shared/data` holds, in a folder that is removed
-/// when dropped.
+/// What a `tar.xz` below `../shared/data` holds, in a temporary folder.
 pub fn unpacked(relative: &str) -> Result<TempDir, String> {
     let archive = shared_data(relative)?;
     let folder = tempfile::tempdir().expect("a temporary folder");

@@ -65,8 +65,7 @@ pub fn failure(class: &str, split: Split, name: &str) -> MeshFailure {
     }
 }
 
-/// Begins a dataset in `out` and writes the scans of `entries`, as a run that was killed before
-/// the end leaves it.
+/// Begins a dataset in `out` and writes the scans of `entries`, as a run that was killed leaves it.
 pub fn write(out: &Path, terms: &Terms, entries: &[Entry]) -> Vec<MeshRecord> {
     Journal::at(out).begin(terms).expect("a journal");
     entries.iter().map(|entry| write_mesh(out, &terms.config, entry)).collect()

@@ -36,7 +36,6 @@ pub fn rows(effects: &Effects, attributes: &AttributeSet) -> Rows {
     .into()
 }
 
-/// The scan of a unit sphere from this far.
 fn scan(distance_m: f64, effects: &Effects, attributes: &AttributeSet) -> Scan {
     let sensor = SensorProfile::builtin("vlp32c").unwrap();
     let pattern = effects.widen(sensor.pattern(), &sensor).unwrap();

@@ -7,8 +7,7 @@ use tests::{adapter, casting, meshes};
 
 use super::Rows;
 
-/// Bytes sent and read back for each ray: as batches are laid out, and as every
-/// caster that there is answers.
+/// As batches are laid out, and as every caster that there is answers.
 pub fn rows(effects: &Effects) -> Rows {
     let target = casting::target(&meshes::icosphere(4));
     let job = casting::job(&target, &casting::at(DVec3::X * 3.0), &casting::builtin("vlp32c"));

@@ -15,7 +15,6 @@ use std::sync::LazyLock;
 use infer_cpu::{Classifier, Options, Precision};
 use libfuzzer_sys::fuzz_target;
 
-/// No header is given more values than this.
 const MOST_VALUES: usize = 1 << 18;
 
 /// One file a process, in memory where the system has such a folder.
