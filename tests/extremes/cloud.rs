@@ -5,27 +5,17 @@ use crate::stream;
 #[derive(Clone, Deserialize)]
 #[serde(tag = "rule", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Cloud {
-    Points {
-        points: Vec<[f64; 3]>,
-    },
-    Repeated {
-        point: [f64; 3],
-        n: usize,
-    },
+    /// Listed points.
+    Points { points: Vec<[f64; 3]> },
+    /// One point, n times.
+    Repeated { point: [f64; 3], n: usize },
     /// n points on a twisted strip, and optionally one far from it.
-    Strip {
-        n: usize,
-        outlier: Option<[f64; 3]>,
-    },
+    Strip { n: usize, outlier: Option<[f64; 3]> },
     /// n points on the surface of an upright vase with a round foot, a belly and a neck.
-    Vase {
-        n: usize,
-    },
+    Vase { n: usize },
     /// n points, uniform in a cube, which are read from a stream of bytes and never stored on a
     /// disk.
-    Streamed {
-        n: usize,
-    },
+    Streamed { n: usize },
 }
 
 impl Cloud {

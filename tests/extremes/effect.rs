@@ -25,14 +25,8 @@ pub struct InCube {
 #[derive(Deserialize)]
 #[serde(untagged, deny_unknown_fields)]
 enum Expect {
-    Refused {
-        refused: String,
-    },
-    /// The limits of the number of points, and their position.
-    Points {
-        points: [usize; 2],
-        range_m: Option<[f32; 2]>,
-    },
+    Refused { refused: String },
+    Points { points: [usize; 2], range_m: Option<[f32; 2]> },
 }
 
 fn white() -> f32 {

@@ -40,6 +40,7 @@ enum Place {
     View { distance_m: f64, elevation_deg: f64, azimuth_deg: f64 },
 }
 
+/// `at-segment` aims at equidistant points, both ends included.
 #[derive(Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum Beams {
@@ -47,17 +48,8 @@ enum Beams {
     Directions(Vec<DVec3>),
     Random(usize),
     AtPoints(Vec<DVec3>),
-    AtBox {
-        n: usize,
-        low: DVec3,
-        high: DVec3,
-    },
-    /// Beams to equidistant points from one point to another, both included.
-    AtSegment {
-        n: u32,
-        from: DVec3,
-        to: DVec3,
-    },
+    AtBox { n: usize, low: DVec3, high: DVec3 },
+    AtSegment { n: u32, from: DVec3, to: DVec3 },
     AtCornersAndEdges {},
 }
 

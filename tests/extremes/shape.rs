@@ -6,46 +6,30 @@ use tests::meshes;
 #[derive(Clone, Deserialize)]
 #[serde(tag = "shape", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Shape {
+    /// A mesh without triangles.
     Empty {},
     /// A cube from -1 to 1.
     Cube {},
     /// Two triangles from -1 to 1 in the plane z = 0.
     Square {},
     /// The cube with n x n squares on each face.
-    TiledCube {
-        n: u32,
-    },
+    TiledCube { n: u32 },
     /// A wavy torus with 2 n^2 triangles.
-    Torus {
-        n: u32,
-    },
+    Torus { n: u32 },
     /// A unit sphere with 20 * 4^level triangles.
-    Icosphere {
-        level: u32,
-    },
+    Icosphere { level: u32 },
     /// n random triangles in the cube.
-    Soup {
-        n: u32,
-        size: f64,
-    },
-    Triangles {
-        vertices: Vec<DVec3>,
-        triangles: Vec<[u32; 3]>,
-    },
+    Soup { n: u32, size: f64 },
+    /// Listed triangles.
+    Triangles { vertices: Vec<DVec3>, triangles: Vec<[u32; 3]> },
     /// Slivers from one apex at -x to tips at x = 1, with a number and a spacing.
-    Fan {
-        slivers: u32,
-        apart: f64,
-    },
+    Fan { slivers: u32, apart: f64 },
     /// Different squares that overlap in a plane.
     Layers {},
-    Together {
-        parts: Vec<Shape>,
-    },
+    /// Several meshes together.
+    Together { parts: Vec<Shape> },
     /// A cube with this half side around the origin.
-    SmallCube {
-        half: f64,
-    },
+    SmallCube { half: f64 },
 }
 
 impl Shape {
