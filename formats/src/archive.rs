@@ -23,7 +23,6 @@ pub(crate) struct NpzWriter<W: Write + Seek> {
 }
 
 impl<W: Write + Seek> NpzWriter<W> {
-    /// Writes the archive whose arrays `fill` writes.
     pub fn write(writer: W, fill: impl FnOnce(&mut Self) -> io::Result<()>) -> io::Result<()> {
         let mut npz = Self { zip: ZipWriter::new(writer) };
         if let Err(error) = fill(&mut npz) {
@@ -62,8 +61,7 @@ impl<W: Write + Seek> NpzWriter<W> {
         writer.flush()
     }
 
-    /// Writes the array `key` of NumPy's fixed-width text (`<U`), which `np.load` reads without
-    /// pickle.
+    /// Writes the array `key` of NumPy's fixed-width text (`<U`), which is read without pickle.
     pub fn text(&mut self, key: &str, lines: &[String]) -> io::Result<()> {
         // NumPy has no text of width 0.
         let width = lines.iter().map(|line| line.chars().count()).max().unwrap_or(0).max(1);
@@ -89,8 +87,7 @@ pub(crate) fn waiting_room(folder: &Path) -> SpooledTempFile {
     tempfile::spooled_tempfile_in(IN_MEMORY, folder)
 }
 
-/// Writes the archive whose arrays `fill` writes to `path`, atomically, and returns
-/// the hash of the file that `hashing` asks for.
+/// Writes the archive whose arrays `fill` writes to `path`, atomically; returns the file's hash.
 ///
 /// The archive is completed in a buffer first, because the header of an entry is patched after the
 /// entry, while hashing takes the bytes of the file in order.
@@ -128,7 +125,6 @@ impl NpzReader {
 }
 
 impl<R: Read + Seek> NpzReader<R> {
-    /// Opens an archive, which errors call `path`.
     pub fn new(mut reader: R, path: &Path) -> Result<Self, FormatError> {
         let file_size =
             reader.seek(SeekFrom::End(0)).map_err(|source| FormatError::io(path, source))?;
@@ -153,7 +149,6 @@ impl<R: Read + Seek> NpzReader<R> {
         names.filter_map(|name| name.strip_suffix(".npy").map(str::to_owned)).collect()
     }
 
-    /// The array `key`.
     pub fn array<A: Number>(&mut self, key: &str) -> Result<Values<A>, FormatError> {
         self.entry(key, |header, size, entry| {
             check_size(&header, size_of::<A>(), size)?;
@@ -191,8 +186,7 @@ impl<R: Read + Seek> NpzReader<R> {
         })
     }
 
-    /// Passes the array `key` to `read`: its header, the number of bytes of its elements, and a
-    /// reader of these.
+    /// Passes the array `key` to `read`: its header, the bytes that its elements take, their reader.
     pub fn entry<T>(
         &mut self,
         key: &str,

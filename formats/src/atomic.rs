@@ -22,8 +22,7 @@ const SUFFIX: &str = ".tmp";
 /// Bytes of the buffer, which holds most scans.
 const BUFFER: usize = 64 << 10;
 
-/// Writes the file at `path` with `fill`, atomically, and replaces an existing file. Missing folders
-/// are created.
+/// Writes or replaces the file at `path` with `fill`, atomically. Creates missing folders.
 pub fn write(
     path: &Path,
     fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
@@ -31,8 +30,7 @@ pub fn write(
     write_through(path, |file| file, fill, drop)
 }
 
-/// As [`write()`]; returns the hash of the file that `hashing` asks for. Bytes are hashed while they
-/// are written.
+/// As [`write()`]; returns the hash of the file that `hashing` asks for.
 #[cfg(feature = "dataset")]
 pub fn write_hashed(
     path: &Path,
@@ -63,8 +61,7 @@ impl Write for HashingFile {
     }
 }
 
-/// Writes a temporary file through the writer that `open` makes of it, renames it to `path`, and
-/// returns the result of `close` for the writer.
+/// Writes a temporary file through the writer of `open`, ends it with `close` and renames it.
 fn write_through<W: Write, T>(
     path: &Path,
     open: impl FnOnce(File) -> W,
@@ -131,7 +128,6 @@ pub fn write_bytes(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), FormatErr
     write(path, |writer| writer.write_all(bytes.as_ref()))
 }
 
-/// Writes `lines` to `path`, atomically.
 #[cfg(feature = "dataset")]
 pub(crate) fn write_lines(
     path: PathBuf,
@@ -144,7 +140,6 @@ pub(crate) fn write_lines(
     Ok(HashedFile { path, hash })
 }
 
-/// The folder of `path`, which is created if it is missing.
 pub(crate) fn make_folder_of(path: &Path) -> Result<&Path, FormatError> {
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,

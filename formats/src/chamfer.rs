@@ -52,7 +52,6 @@ mod tests {
         let a: Vec<[f64; 3]> =
             (0..100).map(|i| [f64::from(i % 7), f64::from(i % 3), f64::from(i)]).collect();
         assert_eq!(chamfer(&a, &a), Chamfer::default());
-        // Equal points need no special case.
         let same = vec![[0.5; 3]; 5000];
         assert_eq!(chamfer(&same, &same[..1]), Chamfer::default());
         assert!(chamfer(&a, &[]).squared.is_nan());

@@ -9,8 +9,7 @@ use crate::hash::{FileHash, Hashing};
 use crate::scan::{Column, Scan};
 
 /// Writes `scan` to `path`, atomically: the header `x,y,z` and the names of the attributes
-/// (`nx,ny,nz` for normals), then one point in each line. Returns the hash of the file that
-/// `hashing` asks for.
+/// (`nx,ny,nz` for normals), then one point in each line.
 ///
 /// Numbers have the fewest digits that read back as the same f32. The origin is added to the
 /// positions, since text can represent any coordinate.

@@ -8,7 +8,6 @@ use std::path::Path;
 
 use crate::error::FormatError;
 
-/// The error of invalid bytes.
 pub(crate) fn invalid(cause: impl ToString) -> io::Error {
     io::Error::new(io::ErrorKind::InvalidData, cause.to_string())
 }

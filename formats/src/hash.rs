@@ -75,7 +75,6 @@ pub struct HashedFile {
     pub hash: Option<FileHash>,
 }
 
-/// A hash in progress.
 #[cfg(feature = "dataset")]
 pub(crate) enum Hasher {
     Sha256(Sha256),

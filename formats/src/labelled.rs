@@ -33,8 +33,7 @@ pub use read::read_labelled;
 pub struct LabelledSet {
     /// Coordinates of all clouds, `[total, 3]` in C order.
     pub points: Vec<f32>,
-    /// Where each cloud begins among all points, and where the last one ends:
-    /// `[m + 1]`, ascending from 0.
+    /// Where each cloud begins, and where the last ends: `[m + 1]`, ascending from 0.
     pub offsets: Vec<usize>,
     /// Class of each cloud; an index into `classes` where they are known.
     pub labels: Vec<usize>,
@@ -60,7 +59,6 @@ pub struct LabelledSet {
 }
 
 impl Default for LabelledSet {
-    /// The set without clouds.
     fn default() -> Self {
         Self {
             points: Vec::new(),
@@ -131,8 +129,7 @@ impl LabelledSet {
         self.labels.push(label);
     }
 
-    /// The clouds at `indices`, which must be below [`LabelledSet::len`], in
-    /// that order.
+    /// The clouds at `indices`, in that order; all are below [`LabelledSet::len`].
     #[must_use]
     pub fn select(&self, indices: &[usize]) -> Self {
         let mut some = Self {

@@ -11,7 +11,6 @@ use crate::error::FormatError;
 /// line of a point takes some hundred bytes.
 const LONGEST_LINE: u64 = 1 << 20;
 
-/// The lines of a text, one by one.
 pub(crate) struct Lines<'a, R> {
     /// The rest of the file after the last line that was read.
     pub reader: &'a mut R,
@@ -29,12 +28,10 @@ pub(crate) struct Line<'a> {
 }
 
 impl<'a, R: BufRead> Lines<'a, R> {
-    /// The lines of `reader`, which errors call `name`.
     pub fn new(reader: &'a mut R, name: &'a Path) -> Self {
         Self { reader, name, number: 0, bytes: Vec::new() }
     }
 
-    /// The next line, or `None` at the end.
     pub fn next(&mut self) -> Result<Option<Line<'_>>, FormatError> {
         Ok(if self.advance()? { Some(self.line()) } else { None })
     }
@@ -70,7 +67,6 @@ impl<'a, R: BufRead> Lines<'a, R> {
 }
 
 impl Line<'_> {
-    /// The error of this line.
     pub fn error(&self, cause: impl ToString) -> FormatError {
         FormatError::malformed(self.name, format!("line {}", self.number), cause)
     }
@@ -81,7 +77,6 @@ impl Line<'_> {
             .map_err(|_| self.error(format!("expected a number, found `{}`", excerpt(word))))
     }
 
-    /// The whole number `word`.
     pub fn count(&self, word: &str) -> Result<u64, FormatError> {
         word.parse().map_err(|_| self.error(format!("expected a count, found `{}`", excerpt(word))))
     }

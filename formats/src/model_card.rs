@@ -204,14 +204,12 @@ impl ModelCard {
     }
 }
 
-/// A model file's metadata.
 struct Entries<'a> {
     path: &'a Path,
     metadata: &'a BTreeMap<String, String>,
 }
 
 impl Entries<'_> {
-    /// The value of `key`, which `parse` parses, or `if_absent`.
     fn get<T, E: Display>(
         &self,
         key: &str,

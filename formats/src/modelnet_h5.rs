@@ -153,7 +153,6 @@ fn class_names(folder: &Path) -> Result<Option<Vec<String>>, FormatError> {
     }
 }
 
-/// Appends the clouds of one file.
 fn read_file(path: &Path, set: &mut LabelledSet) -> Result<(), FormatError> {
     let bad = |part: &str, cause: String| FormatError::malformed(path, part, cause);
     // The crate's own errors do not name the file.

@@ -12,7 +12,6 @@ use crate::number::{ByteOrder, Number, NumberType};
 use crate::python_literal::{dictionary, string, tuple};
 use crate::records;
 
-/// The first bytes of every array file.
 pub(crate) const MAGIC: &[u8] = b"\x93NUMPY";
 /// The data begin at a multiple of this.
 const ALIGNMENT: usize = 64;
@@ -20,14 +19,12 @@ const ALIGNMENT: usize = 64;
 /// 10,000 bytes.
 const LONGEST_HEADER: u64 = 1 << 20;
 
-/// The header of an array.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Header {
     /// The type of an element, as in `<f4`; empty for a record.
     pub descr: String,
     /// Whether the first index, not the last, runs fastest.
     pub is_fortran_order: bool,
-    /// The size along each axis.
     pub shape: Vec<usize>,
     /// Bytes of the header itself, from the magic string to the data.
     pub n_bytes: usize,
@@ -156,8 +153,7 @@ pub(crate) fn write_array<A: Number>(
         .try_for_each(|element| writer.write_all(element.to_little_endian().as_ref()))
 }
 
-/// Reads the elements of a whole array and returns them in C order. They must be
-/// of the type `A`.
+/// Reads a whole array, whose elements must be of the type `A`, and returns them in C order.
 pub(crate) fn read_elements<A: Number>(
     reader: &mut (impl Read + ?Sized),
     header: &Header,
@@ -175,8 +171,7 @@ pub(crate) fn read_elements<A: Number>(
     read_in_c_order(reader, header, size_of::<A>(), |bytes| A::from_bytes(bytes, order))
 }
 
-/// Reads the elements of a whole array of numbers and returns them in C order,
-/// each converted by `convert`.
+/// Reads a whole array of numbers and returns them in C order, each converted by `convert`.
 pub(crate) fn read_numbers<T: Copy>(
     reader: &mut (impl Read + ?Sized),
     header: &Header,

@@ -2,20 +2,15 @@
 
 use half::f16;
 
-/// The order of a number's bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ByteOrder {
-    /// Lowest byte first.
     Little,
-    /// Highest byte first.
     Big,
 }
 
 /// A number of Rust that files hold without conversion.
 pub(crate) trait Number: Copy {
-    /// Its type in files.
     const TYPE: NumberType;
-    /// Its bytes, lowest first.
     fn to_little_endian(self) -> impl AsRef<[u8]>;
     /// The number at the start of `bytes`, which must hold at least one.
     fn from_bytes(bytes: &[u8], order: ByteOrder) -> Self;
@@ -25,14 +20,12 @@ pub(crate) trait Number: Copy {
 /// conversion to f64.
 macro_rules! numbers {
     ($($number:ty: $kind:ident, $numpy:literal, $x:ident => $f64:expr;)*) => {
-        /// The type of a number in a file.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub(crate) enum NumberType {
             $($kind,)*
         }
 
         impl NumberType {
-            /// Bytes that one number takes.
             pub fn size(self) -> usize {
                 match self {
                     $(Self::$kind => size_of::<$number>(),)*
@@ -50,14 +43,12 @@ macro_rules! numbers {
                 }
             }
 
-            /// NumPy's name of the type, without the byte order.
             pub fn numpy(self) -> &'static str {
                 match self {
                     $(Self::$kind => $numpy,)*
                 }
             }
 
-            /// The type that NumPy calls `name`.
             pub fn of_numpy(name: &str) -> Option<Self> {
                 match name {
                     $($numpy => Some(Self::$kind),)*

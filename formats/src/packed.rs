@@ -42,8 +42,7 @@ pub struct PackedWriter {
 }
 
 impl PackedWriter {
-    /// Begins the set at `path`, of clouds of `n_points` points. A label is an index into
-    /// `classes`.
+    /// Begins the set at `path`, of clouds of `n_points` points. Labels are indices into `classes`.
     ///
     /// # Errors
     /// The folder cannot be created or written.
@@ -158,8 +157,7 @@ impl ClusterWriter {
         Ok(())
     }
 
-    /// Writes the set atomically. The same clusters in the same order give the same bytes. A set
-    /// may be empty.
+    /// Writes the set, which may be empty, atomically. The same clusters give the same bytes.
     ///
     /// # Errors
     /// Errors of the system.
@@ -233,7 +231,6 @@ impl Columns {
     }
 }
 
-/// Checks that the cloud `name` has as many points as every cloud of its set.
 pub(crate) fn check_size(name: &str, points: usize, expected: usize) -> Result<(), FormatError> {
     if points != expected {
         let cause = format!("expected {expected} points, found {points}");
@@ -242,7 +239,6 @@ pub(crate) fn check_size(name: &str, points: usize, expected: usize) -> Result<(
     Ok(())
 }
 
-/// Checks that the cloud `name` has a class.
 pub(crate) fn check_label(name: &str, label: usize, classes: usize) -> Result<(), FormatError> {
     if label >= classes {
         let cause = format!("expected a label below {classes}, found {label}");

@@ -30,7 +30,6 @@ const ETHERNET: u32 = 1;
 /// Routers that a broadcast may pass: the default of operating systems.
 const TIME_TO_LIVE: u8 = 64;
 
-/// The sender of broadcast packets.
 pub(crate) struct Sender {
     pub mac: [u8; 6],
     pub ip: [u8; 4],
@@ -50,8 +49,7 @@ pub(crate) fn write_header(writer: &mut impl Write) -> io::Result<()> {
     writer.write_all(&ETHERNET.to_le_bytes())
 }
 
-/// Writes a UDP broadcast packet that was sent at `seconds` and `microseconds` of
-/// Unix time.
+/// Writes a UDP broadcast packet that was sent at this Unix time.
 pub(crate) fn write_packet(
     writer: &mut impl Write,
     sender: &Sender,
@@ -128,7 +126,6 @@ pub fn read(
     }
 }
 
-/// A network interface of a capture.
 #[derive(Clone, Copy)]
 struct Interface {
     link: Linktype,
@@ -136,7 +133,6 @@ struct Interface {
     clock: (u64, u64),
 }
 
-/// A frame of a capture.
 struct Frame<'a> {
     link: Linktype,
     time_s: Option<f64>,
@@ -218,7 +214,6 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// The error of a packet whose fragments cannot be joined.
 const FRAGMENT: &str = "expected whole UDP packets, found a fragment of one";
 
 /// Packets that are joined at the same time: those of a few senders, of up to 64 KiB each.

@@ -4,7 +4,6 @@ use std::io::{self, Read};
 
 use crate::decoding::invalid;
 
-/// Bytes that are read at once.
 const BLOCK_SIZE: usize = 1 << 16;
 /// The largest record that is read. No sensor has points of this size.
 const LARGEST_RECORD: usize = 1 << 24;
@@ -31,12 +30,10 @@ pub(crate) fn read_to_end(
     read_at_most(reader, size, u64::MAX, each).map(|(_, rest)| rest)
 }
 
-/// The error of a file that ends after `found` of `n` records.
 pub(crate) fn truncated(found: u64, n: u64) -> io::Error {
     io::Error::new(io::ErrorKind::UnexpectedEof, format!("the file ends after {found} of {n}"))
 }
 
-/// Skips `n` bytes.
 pub(crate) fn skip(reader: &mut (impl Read + ?Sized), n: u64) -> io::Result<()> {
     let skipped = io::copy(&mut reader.take(n), &mut io::sink())?;
     if skipped < n { Err(io::ErrorKind::UnexpectedEof.into()) } else { Ok(()) }

@@ -6,10 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::FormatError;
 
-/// The points of one scan, with attributes.
-///
-/// Every attribute that is present has one value for each position. A scan may
-/// have no points.
+/// The points of one scan, perhaps none. Every attribute that is present has one value for each
+/// position.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scan {
     /// An offset to add to every position, metres. It is zero in most scans; a scene
@@ -17,8 +15,7 @@ pub struct Scan {
     pub origin: [f64; 3],
     /// The end points of the beams in the world's frame, metres from `origin`.
     pub positions: Vec<[f32; 3]>,
-    /// Distance from the start of the beam, which is at the sensor or near it,
-    /// metres.
+    /// Distance from the start of the beam, which is at the sensor or near it, metres.
     pub range_m: Option<Vec<f32>>,
     /// Number of the beam in the sensor's firing order.
     pub beam: Option<Vec<u32>>,
@@ -54,8 +51,7 @@ pub struct Scan {
 }
 
 crate::named! {
-    /// An attribute of points besides their position, in the order of columns in
-    /// files.
+    /// An attribute of points besides their position, in the order of columns in files.
     #[derive(Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum Attribute: "attribute" {
@@ -239,8 +235,7 @@ impl Scan {
 }
 
 impl Attribute {
-    /// The names of the attribute's columns in PLY and CSV files: its own, or
-    /// three for a vector.
+    /// The attribute's columns in PLY and CSV files: its own name, or three for a vector.
     #[cfg(feature = "dataset")]
     pub(crate) fn column_names(self) -> Vec<&'static str> {
         match self {

@@ -58,11 +58,9 @@ impl ScanFormat {
     }
 }
 
-/// The error of reading or writing packets as points.
 const PACKETS: &str = "packets hold a sensor's ranges, not points";
 
-/// Writes `scan` to `path`, atomically, and returns the hash of the file that `hashing` asks for.
-/// The same scan gives the same bytes. The name is not changed.
+/// Writes `scan` to `path`, atomically, and returns the file's hash. Equal scans give equal bytes.
 ///
 /// # Errors
 /// An attribute of another length than the positions; [`ScanFormat::Pcap`], whose

@@ -32,8 +32,7 @@ pub fn end(tar: &mut impl Write) -> io::Result<()> {
     tar.write_all(&[0; 2 * BLOCK])
 }
 
-/// The NPZ file of some clouds of `n_points` points each: `points` f32
-/// `[m, n, 3]`, `labels` i64 `[m]`.
+/// The NPZ file of clouds of `n_points` points: `points` f32 `[m, n, 3]`, `labels` i64 `[m]`.
 pub fn npz_of_clouds(clouds: &[(Vec<[f32; 3]>, usize)], n_points: usize) -> io::Result<Vec<u8>> {
     npz(|npz| {
         let numbers: Vec<f32> =

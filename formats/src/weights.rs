@@ -1,7 +1,4 @@
-//! Weights on disk: safetensors, opened once, read tensor by tensor.
-//!
-//! [`WeightsFile`] holds only the header and reads tensors on demand, so that a model
-//! is not in memory twice.
+//! Weights on disk: safetensors, read tensor by tensor, so that a model is not in memory twice.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -33,7 +30,6 @@ pub struct Tensor {
 pub struct WeightsFile {
     path: PathBuf,
     file: Box<dyn Source>,
-    /// The offset of the tensors' bytes.
     data_offset: u64,
     header: Metadata,
 }

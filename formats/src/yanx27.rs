@@ -47,8 +47,7 @@ impl Yanx27Writer {
         Ok(Self { root, classes, ids: Default::default(), hashing, files: Vec::new() })
     }
 
-    /// Writes the cloud of view `view` of the mesh `name` of `class`. Unknown normals are written as
-    /// 0.
+    /// Writes the cloud of view `view` of the mesh `name` of `class`. Unknown normals are 0.
     pub fn push(
         &mut self,
         class: &str,
@@ -95,8 +94,7 @@ impl Yanx27Writer {
         Ok(())
     }
 
-    /// Writes the lists of classes and instances, atomically, in the order of
-    /// the labels and of the ids. Returns all files of the dataset.
+    /// Writes the lists atomically, in the order of the labels and ids. Returns all files.
     pub fn finish(mut self) -> Result<Vec<HashedFile>, FormatError> {
         self.write_lists("modelnet40")?;
         if self.classes.len() == 10 {

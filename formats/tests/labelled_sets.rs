@@ -1,5 +1,3 @@
-//! Labelled sets under either convention of keys, and what is wrong with others.
-
 use std::fs;
 
 use formats::labelled::{LabelledSet, read_labelled};

@@ -1,5 +1,3 @@
-//! ModelNet40's HDF5 layout, read back.
-
 use std::ffi::OsString;
 use std::fs;
 use std::path::Path;

@@ -1,5 +1,3 @@
-//! Files as NumPy writes them, for readers to read.
-
 use std::io::{Cursor, Write};
 
 use zip::ZipWriter;
@@ -19,7 +17,6 @@ pub fn npz(arrays: &[(&str, Vec<u8>)]) -> Vec<u8> {
     archive(arrays, SimpleFileOptions::default())
 }
 
-/// An archive of arrays under these options.
 pub fn archive(arrays: &[(&str, Vec<u8>)], options: SimpleFileOptions) -> Vec<u8> {
     let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
     for (key, bytes) in arrays {

@@ -1,5 +1,3 @@
-//! Packed sets and sets of clusters survive their files.
-
 use std::fs;
 use std::path::Path;
 

@@ -1,5 +1,3 @@
-//! Scans survive their files, and files that are not scans are refused.
-
 use std::fs;
 use std::path::Path;
 
@@ -41,7 +39,6 @@ proptest! {
         prop_assert_eq!(&there_and_back(&scan, ScanFormat::Ply), &scan);
     }
 
-    /// No byte of a file, wherever it is changed or cut, makes a reader panic.
     #[test]
     fn a_damaged_file_is_an_error_or_a_scan(
         at in any::<prop::sample::Index>(), value in any::<u8>(), cut in any::<bool>(),

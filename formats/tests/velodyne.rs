@@ -1,5 +1,3 @@
-//! Packets of a VLP-16 and a VLP-32C are read as their manuals describe them.
-
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -122,7 +120,6 @@ fn what_is_no_turn_is_named() {
     assert_eq!(link, ": frame 0: expected Ethernet (link type 1), found link type 113");
 }
 
-/// A thousand packets that a VLP-16 sent.
 #[test]
 fn a_real_vlp16_is_read() {
     let file = need!(shared_data("real_scans/vlp16_packets_1206B.bin"));
@@ -177,7 +174,6 @@ proptest! {
     }
 }
 
-/// The frames of a classic capture.
 fn frames(file: &[u8]) -> Vec<Vec<u8>> {
     let mut rest = &file[FILE..];
     let mut frames = Vec::new();

@@ -41,8 +41,7 @@ pub fn to_csv(found: &Evaluation, classes: &[String]) -> Vec<u8> {
     csv.into_inner().expect("invariant: memory takes all")
 }
 
-/// Draws the confusion matrix as SVG. A darker cell is a larger share of the clouds of a true
-/// class.
+/// Draws the confusion matrix as SVG. A darker cell is a larger share of a true class's clouds.
 #[must_use]
 pub fn drawing(found: &Evaluation, classes: &[String]) -> String {
     const CELL: f64 = 16.0;

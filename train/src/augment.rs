@@ -92,7 +92,6 @@ pub fn varied_too(held: &Clouds, recipe: &Recipe) -> Clouds {
 /// The points of a cloud that were chosen for the network.
 struct ChosenPoints {
     points: Vec<[f32; 3]>,
-    /// All points. Empty if the network has no EdgeConv layer.
     neighborhood: Vec<[f32; 3]>,
     /// The index in `neighborhood` of each of `points`.
     places: Vec<usize>,

@@ -112,7 +112,6 @@ mod tests {
 
     #[test]
     fn a_balanced_epoch_has_as_many_clouds_of_each_class() {
-        // Seven of class 0, one of class 1, none of class 2.
         let labels = [0, 0, 0, 1, 0, 0, 0, 0];
         let recipe = Recipe { balance: 1.0, clouds_per_epoch: Some(11), ..Recipe::default() };
         let mut drawn = order(&labels, 3, 5, &recipe);

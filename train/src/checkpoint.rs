@@ -16,8 +16,7 @@ use crate::trainer::Trainer;
 const MEAN: &str = ".adam_mean";
 const SQUARE: &str = ".adam_square";
 
-/// Writes the state of `trainer`, the `digest` of its training data and `notes` to `path`,
-/// atomically.
+/// Writes the state of `trainer`, its data's `digest` and `notes` to `path`, atomically.
 pub fn write(path: &Path, trainer: &mut Trainer, digest: &str, notes: &str) -> Result<(), Error> {
     let mut tensors = model_file::tensors(&mut trainer.model);
     for parameter in trainer.model.parameters() {
@@ -37,8 +36,7 @@ pub fn write(path: &Path, trainer: &mut Trainer, digest: &str, notes: &str) -> R
     Ok(write_weights(path, &tensors, &metadata)?)
 }
 
-/// Sets `trainer`, whose training data have this `digest`, to the state in the checkpoint at
-/// `path`. Returns the notes of the checkpoint.
+/// Sets `trainer`, whose data have this `digest`, to the checkpoint at `path`. Returns its notes.
 pub fn read(path: &Path, trainer: &mut Trainer, digest: &str) -> Result<String, Error> {
     let mut file = WeightsFile::open(path)?;
     let metadata = file.metadata();

@@ -56,12 +56,11 @@ impl Clouds {
     /// is one of:
     ///
     /// - a packed NPZ file;
-    /// - the common prefix of two packed files, as gen-dataset writes them: `rotational-noisy` for
-    /// -   `rotational-noisy-train.npz` and `rotational-noisy-test.npz`;
+    /// - the common prefix of two packed files, `PREFIX-train.npz` and `PREFIX-test.npz`;
     /// - a folder with `train.npz` and `test.npz`;
     /// - a folder of ModelNet40's HDF5 files (`modelnet40_ply_hdf5_2048`), with feature `hdf5`;
     /// - a folder of text files as in yanx27/Pointnet_Pointnet2_pytorch. The first `most_points`
-    /// -   points of each file are read.
+    ///   points of each file are read.
     pub fn read(path: &Path, split: Split, most_points: usize) -> Result<Self, Error> {
         Self::read_for(Normalization::UnitSphere, path, split, most_points)
     }
@@ -212,8 +211,7 @@ impl Clouds {
         (learnt, held)
     }
 
-    /// The mesh of cloud `i`: the name of the cloud without the number of the view, which
-    /// gen-dataset appends after `_v`.
+    /// The name of cloud `i` without the number of the view, which gen-dataset appends after `_v`.
     fn instance(&self, i: usize) -> String {
         let Some(names) = &self.set.names else { return i.to_string() };
         match names[i].rsplit_once("_v") {

@@ -16,7 +16,6 @@ use crate::recipe::{Augment, Recipe};
 /// foot.
 const LEAST_LEFT: f64 = 0.5;
 
-/// Varies and centres `cluster`.
 pub(crate) fn varied(
     cluster: &[[f32; 3]],
     ground_z: Option<f32>,

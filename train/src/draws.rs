@@ -2,7 +2,6 @@
 
 use formats::rng::StreamKey;
 
-/// The numbers of a stream in order.
 pub(crate) struct Draws {
     stream: StreamKey,
     n: u64,

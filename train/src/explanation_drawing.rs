@@ -6,8 +6,7 @@ use crate::svg::{drawing, text};
 /// Pixels of a view.
 const SIDE: f64 = 360.0;
 
-/// Draws the cloud twice, as SVG: on the left coloured by LIME-3D, on the right with its critical
-/// points.
+/// Draws the cloud twice, as SVG: coloured by LIME-3D, and with its critical points.
 #[must_use]
 pub fn draw(points: &[[f32; 3]], found: &Explanation, critical: &[usize]) -> String {
     let most = found.attribution.iter().fold(f64::MIN_POSITIVE, |most, a| most.max(a.abs()));

@@ -31,8 +31,7 @@ use crate::trainer::Trainer;
 /// Number of clouds from which the statistics of the batch norms are computed.
 const CLOUDS: usize = 256;
 
-/// Sets the network of `trainer` to the model at `path`. `card` is the card of the network in
-/// training.
+/// Sets the network of `trainer`, whose card is `card`, to the model at `path`.
 pub fn start(
     trainer: &mut Trainer,
     path: &Path,
@@ -53,7 +52,6 @@ pub fn start(
     Ok(())
 }
 
-/// Checks that both models have the same inputs and layers.
 fn check_card(path: &Path, wanted: &ModelCard, found: &ModelCard) -> Result<(), FormatError> {
     // The card of an imported model may lack the number of points.
     let found = ModelCard { points: found.points.or(wanted.points), ..found.clone() };

@@ -4,27 +4,22 @@
 /// there.
 pub(crate) type Check = (bool, &'static str, &'static str);
 
-/// A finite number of 0 or more.
 pub(crate) fn non_negative(key: &'static str, x: f64) -> Check {
     (x.is_finite() && x >= 0.0, key, "expected a finite number of 0 or more")
 }
 
-/// A finite number above 0.
 pub(crate) fn positive(key: &'static str, x: f64) -> Check {
     (x.is_finite() && x > 0.0, key, "expected a finite number above 0")
 }
 
-/// A share of a whole that leaves some of it.
 pub(crate) fn share_below_1(key: &'static str, x: f64) -> Check {
     ((0.0..1.0).contains(&x), key, "expected 0 or more, and less than 1")
 }
 
-/// A share of a whole.
 pub(crate) fn share(key: &'static str, x: f64) -> Check {
     ((0.0..=1.0).contains(&x), key, "expected 0 to 1")
 }
 
-/// A number of layers of `least` or more.
 pub(crate) fn layers(key: &'static str, n: usize, least: usize) -> Check {
     let expected =
         if least == 1 { "expected 1 layer or more" } else { "expected 2 layers or more" };

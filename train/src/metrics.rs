@@ -76,7 +76,6 @@ impl Metrics {
         atomic::write_bytes(&folder.join("curve.svg"), self.curve())
     }
 
-    /// A header, and one line for each epoch.
     fn to_csv(&self) -> String {
         const HEADER: &str = "epoch,rate,loss,accuracy,validation_instance,validation_class,\
                               seconds,clouds_per_second\n";

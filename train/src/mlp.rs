@@ -63,7 +63,6 @@ impl Stack {
 #[derive(Clone, Debug)]
 pub struct SharedMlp {
     hidden: Stack,
-    /// The last layer.
     pub pooled: PooledLayer,
 }
 
@@ -86,7 +85,6 @@ impl SharedMlp {
         self.pooled.forward(x, rows, momentum);
     }
 
-    /// Propagates the gradient of the output. Returns the gradient of `x` if `wants_input`.
     pub fn backward(
         &mut self,
         x: ArrayView2<'_, f32>,
@@ -107,7 +105,6 @@ impl Module for SharedMlp {
     }
 }
 
-/// Dense layers after a pooling.
 #[derive(Clone, Debug)]
 pub struct DenseHead {
     hidden: Stack,
@@ -145,7 +142,6 @@ impl DenseHead {
         dx.expect("invariant: `wants_input` is true")
     }
 
-    /// The number of features of the last hidden layer, if there is one.
     pub fn hidden_width(&self) -> Option<usize> {
         self.hidden.0.last().map(|layer| layer.base.output.ncols())
     }

@@ -60,8 +60,7 @@ pub fn read_into(
     Ok(())
 }
 
-/// Writes `network` to `path` for release, in f16 and with the batch norms folded into the linear
-/// layers, atomically.
+/// Writes `network` for release: in f16, with the batch norms folded in, atomically.
 pub fn ship(path: &Path, network: &mut dyn Module, card: &ModelCard) -> Result<(), Error> {
     let mut tensors = BTreeMap::new();
     for layer in network.folded() {

@@ -137,7 +137,6 @@ fn object(clouds: &Clouds, draws: &mut Draws) -> Vec<[f64; 3]> {
     cloud.iter().map(|point| point.map(f64::from)).collect()
 }
 
-/// Rotates `points` about z by a random angle.
 fn turned(points: impl Iterator<Item = [f64; 3]>, draws: &mut Draws) -> Vec<[f64; 3]> {
     let (sin, cos) = draws.between(0.0, std::f64::consts::TAU).sin_cos();
     points.map(|[x, y, z]| [cos * x - sin * y, sin * x + cos * y, z]).collect()

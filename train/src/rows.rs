@@ -30,7 +30,6 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// Splits `matrix` into the rows of each cloud.
 pub(crate) fn by_cloud<'a>(matrix: &'a mut Matrix, rows: Rows<'_>) -> Vec<ArrayViewMut2<'a, f32>> {
     let mut clouds = Vec::with_capacity(rows.n_clouds());
     let mut rest = matrix.view_mut();

@@ -134,14 +134,12 @@ fn check(clouds: &Clouds, recipe: &Recipe, data: &str) -> Result<(), Error> {
     Ok(())
 }
 
-/// A run and its folder.
 struct Run<'a> {
     folder: PathBuf,
     trainer: Trainer,
     metrics: Metrics,
     classes: Vec<String>,
     training_set: String,
-    /// Digest of the training clouds.
     digest: String,
     report: &'a mut dyn FnMut(Progress<'_>),
 }

@@ -8,10 +8,8 @@ use crate::mlp::{DenseHead, SharedMlp};
 use crate::rows::Rows;
 use crate::shape::Shape;
 
-/// A T-Net in training.
 #[derive(Clone, Debug)]
 pub struct TNet {
-    /// The point-wise layers and the pooling.
     pub points: SharedMlp,
     head: DenseHead,
     /// The last predicted transforms.
@@ -30,7 +28,6 @@ impl TNet {
         }
     }
 
-    /// Predicts the transforms.
     pub fn predict(&mut self, x: ArrayView2<'_, f32>, rows: Rows<'_>, momentum: f32) {
         self.points.forward(x, rows, momentum);
         let elements = self.head.forward(self.points.pooled.base.output(), None, momentum);

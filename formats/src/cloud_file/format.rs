@@ -78,7 +78,6 @@ impl CloudFormat {
     }
 }
 
-/// The error of `.laz` files.
 pub(super) const COMPRESSED_LAS: &str =
     "LAZ is compressed LAS: decompress it first (`laszip`, or `pdal translate in.laz out.las`)";
 const MESH: &str = "expected a cloud, found a mesh: scan it first";

@@ -17,7 +17,6 @@ const KITTI_COLUMNS: usize = 4;
 const NUSCENES_COLUMNS: usize = 5;
 const COLUMN_SIZE: usize = size_of::<f32>();
 
-/// Reads every point up to the end.
 pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
     let mut points = Vec::new();
     read_points(reader, name, |number| points.push([0, 1, 2].map(number)))?;

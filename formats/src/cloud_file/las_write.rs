@@ -24,7 +24,6 @@ const UNKNOWN: [u8; 8] = {
     [0, 0, RETURN_1_OF_1, 0, 0, 0, 0, 0]
 };
 
-/// The whole numbers of one axis.
 #[derive(Clone, Copy)]
 struct Axis {
     low: f64,
@@ -33,7 +32,6 @@ struct Axis {
     offset: f64,
 }
 
-/// Writes `points` to `path`, atomically.
 pub(super) fn write(path: &Path, points: &[[f64; 3]]) -> Result<(), FormatError> {
     let infinite = |point: &[f64; 3]| point.iter().any(|x| !x.is_finite());
     if let Some(i) = points.iter().position(infinite) {
@@ -100,7 +98,6 @@ fn header(n: u32, [x, y, z]: &[Axis; 3]) -> Header {
     }
 }
 
-/// ASCII with zeros behind it.
 fn padded(text: &str) -> [u8; 32] {
     let mut bytes = [0; 32];
     let n = text.len().min(bytes.len());

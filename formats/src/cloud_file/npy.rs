@@ -10,13 +10,11 @@ use crate::npy::{self, Header};
 use crate::number::{ByteOrder, NumberType};
 use crate::records;
 
-/// Reads the array that `reader` holds.
 pub(super) fn read(reader: &mut impl Read, name: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
     let header = npy::read_header(reader).map_err(|error| error_in(name, "header", error))?;
     read_points(&header, reader).map_err(|error| error_in(name, "array", error))
 }
 
-/// Whether an array of this header holds points.
 pub(super) fn holds_points(header: &Header) -> bool {
     matches!(header.shape[..], [_, columns] if columns >= 3) && header.number().is_some()
 }

@@ -14,7 +14,6 @@ const ORIGIN: &str = "origin";
 /// The key of the points in most other archives.
 const POINTS: &str = "points";
 
-/// Reads the cloud that the archive holds.
 pub(super) fn read(reader: impl Read + Seek, name: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
     let mut npz = NpzReader::new(reader, name)?;
     let key = match [POSITIONS, POINTS].into_iter().find(|key| npz.has(key)) {
@@ -65,7 +64,6 @@ fn only_array_of_points<R: Read + Seek>(npz: &mut NpzReader<R>) -> Result<String
     }
 }
 
-/// Writes `points` under the key `positions`.
 pub(super) fn write(
     writer: impl Write + Seek,
     points: &[[f64; 3]],

@@ -16,7 +16,6 @@ use crate::lines::Lines;
 use crate::number::{ByteOrder, NumberType};
 use crate::records;
 
-/// Reads every point.
 pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
     let mut lines = Lines::new(reader, name);
     let header = read_header(&mut lines, name)?;

@@ -8,11 +8,8 @@ use crate::error::FormatError;
 use crate::lines::{Line, Lines};
 use crate::number::{ByteOrder, NumberType};
 
-/// A header.
 pub(super) struct Header {
-    /// The number of points.
     pub n: u64,
-    /// The encoding of the points.
     pub encoding: Encoding,
     fields: Vec<Field>,
 }
@@ -25,7 +22,6 @@ struct Field {
     count: u64,
 }
 
-/// The encoding of points.
 #[derive(Clone, Copy)]
 pub(super) enum Encoding {
     /// A line for each point.
@@ -39,7 +35,6 @@ pub(super) enum Encoding {
 /// One coordinate of every point.
 #[derive(Clone, Copy)]
 pub(super) struct Coordinate {
-    /// Its type.
     pub number: NumberType,
     /// Its offset in a point, bytes.
     pub offset: u64,
@@ -101,7 +96,6 @@ impl Header {
         self.fields.iter().fold(0, |sum: u64, field| sum.saturating_add(field.n_bytes()))
     }
 
-    /// The coordinate `axis`, or the cause of an error.
     pub fn coordinate(&self, axis: &str) -> Result<Coordinate, String> {
         let at = self.fields.iter().position(|field| field.name.eq_ignore_ascii_case(axis));
         let at = at.ok_or_else(|| {
@@ -163,7 +157,6 @@ impl Encoding {
 }
 
 impl Coordinate {
-    /// The coordinate at the start of `bytes`.
     pub fn decode(self, bytes: &[u8]) -> f64 {
         self.number.decode(bytes, ByteOrder::Little)
     }

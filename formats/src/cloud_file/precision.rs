@@ -4,12 +4,9 @@ use std::io::{self, Write};
 
 use crate::number::NumberType;
 
-/// The type of the coordinates of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Precision {
-    /// f32.
     Single,
-    /// f64.
     Double,
 }
 
@@ -36,7 +33,6 @@ impl Precision {
         }
     }
 
-    /// Bytes of a coordinate.
     pub fn size(self) -> usize {
         match self {
             Self::Single => NumberType::F32.size(),

@@ -13,20 +13,17 @@ use crate::lines::{Line, Lines};
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// The separator of the columns of a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Separator {
     Letter(char),
     Blanks,
 }
 
-/// The columns of the coordinates.
 struct Layout {
     separator: Separator,
     columns: [usize; 3],
 }
 
-/// Reads every point up to the end.
 pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
     let mut lines = Lines::new(reader, name);
     let mut layout: Option<Layout> = None;

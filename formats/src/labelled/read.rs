@@ -77,7 +77,6 @@ pub fn read_labelled(path: &Path) -> Result<LabelledSet, FormatError> {
     Ok(LabelledSet { points, offsets, labels, ..columns })
 }
 
-/// The array `key`, which `read` reads, if the archive has it.
 fn column<R: Read + Seek, T>(
     npz: &mut NpzReader<R>,
     key: &str,
@@ -161,7 +160,6 @@ fn count_from_sensor<R: Read + Seek>(
     Ok(())
 }
 
-/// The class of each cloud, and the classes if they are known.
 fn read_labels<R: Read + Seek>(
     npz: &mut NpzReader<R>,
     classes: Option<Vec<String>>,
@@ -189,7 +187,6 @@ fn read_labels<R: Read + Seek>(
     Ok((labels, Some(classes)))
 }
 
-/// The array `key`, a list of whole numbers that fit `T`.
 fn read_whole_numbers<R: Read + Seek, T: TryFrom<u64>>(
     npz: &mut NpzReader<R>,
     key: &str,
@@ -205,7 +202,6 @@ fn read_whole_numbers<R: Read + Seek, T: TryFrom<u64>>(
     numbers.into_iter().map(|number| whole(number).ok_or_else(|| expected(number))).collect()
 }
 
-/// The array `key`, a list of numbers that `convert` converts.
 fn read_list<R: Read + Seek, T: Copy>(
     npz: &mut NpzReader<R>,
     key: &str,

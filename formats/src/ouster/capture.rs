@@ -42,12 +42,9 @@ pub fn read_frame(path: &Path, metadata: &Metadata) -> Result<Scan, FormatError>
     Ok(frame.points.scan())
 }
 
-/// A frame that is being read.
 #[derive(Default)]
 struct Frame {
-    /// The header of its first packet.
     first: Option<Header>,
-    /// Whether each column was received.
     received: Vec<bool>,
     /// Received columns, of those that the sensor sends.
     n_columns: usize,

@@ -33,17 +33,13 @@ crate::named! {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Metadata {
     pub(super) profile: Profile,
-    /// Whether headers are of the type FUSA.
     pub(super) is_fusa: bool,
     pub(super) columns_per_frame: u16,
     pub(super) columns_per_packet: u16,
     /// The first and the last column that are sent. The first may have the larger number.
     pub(super) column_window: [u16; 2],
-    /// Turns per second.
     pub(super) rate_hz: f64,
-    /// Altitude and azimuth of each row, degrees.
     pub(super) beams_deg: Vec<[f64; 2]>,
-    /// x and z of the origin of the beams while the encoder is at 0, metres, in the lidar frame.
     pub(super) origin_m: [f64; 2],
     /// The upper three rows of the transform, metres.
     pub(super) lidar_to_sensor: [[f64; 4]; 3],
@@ -155,7 +151,6 @@ const BEAMS: Section = ["", "/beam_intrinsics"];
 const LIDAR: Section = ["", "/lidar_intrinsics"];
 const CONFIG: Section = ["", "/config_params"];
 
-/// The fields of a file.
 struct Fields<'a> {
     path: &'a Path,
     root: &'a Value,
@@ -163,7 +158,6 @@ struct Fields<'a> {
 }
 
 impl Fields<'_> {
-    /// The field `name`, which `parse` parses, if the file has it.
     fn optional<T>(
         &self,
         section: Section,
@@ -175,7 +169,6 @@ impl Fields<'_> {
         parsed.map_err(|cause| self.error(&pointer, cause))
     }
 
-    /// As [`Fields::get`], for a required field.
     fn get<T>(
         &self,
         section: Section,
@@ -278,7 +271,6 @@ fn rigid(value: &Value) -> Result<[[f64; 4]; 3], String> {
     Ok(rows)
 }
 
-/// The start of a value, for errors.
 fn shown(value: &Value) -> String {
     let text = value.to_string();
     let start: String = text.chars().take(40).collect();

@@ -254,7 +254,6 @@ impl Decoder {
         Ok(header)
     }
 
-    /// The columns of a payload of the right length.
     fn columns_of<'a>(&self, payload: &'a [u8]) -> impl Iterator<Item = &'a [u8]> {
         let n = usize::from(self.metadata.columns_per_packet);
         payload[self.layout.header..].chunks_exact(self.layout.column).take(n)
@@ -292,7 +291,6 @@ fn u16_at(bytes: &[u8], at: usize) -> u16 {
     u16::from_le_bytes([bytes[at], bytes[at + 1]])
 }
 
-/// The time of a column.
 fn time_ns(column: &[u8]) -> u64 {
     (0..4).map(|i| u64::from(u16_at(column, 2 * i)) << (16 * i)).sum()
 }

@@ -8,9 +8,7 @@ use crate::error::FormatError;
 use crate::lines::{Line, Lines};
 use crate::number::{ByteOrder, NumberType};
 
-/// A header.
 pub(super) struct Header {
-    /// The encoding of the elements.
     pub encoding: Encoding,
     /// An offset to add to every point, from the comment `origin X Y Z` of scans.
     pub origin: Option<[f64; 3]>,
@@ -18,12 +16,10 @@ pub(super) struct Header {
     pub elements: Vec<Element>,
 }
 
-/// The encoding of elements.
 #[derive(Clone, Copy)]
 pub(super) enum Encoding {
     /// A line for each element.
     Ascii,
-    /// Binary numbers in this byte order.
     Binary(ByteOrder),
 }
 
@@ -34,7 +30,6 @@ pub struct Element {
     pub(super) properties: Vec<Property>,
 }
 
-/// A property of each element of a kind.
 pub(super) struct Property {
     pub name: String,
     /// The type of its number, or of its list's numbers.

@@ -16,8 +16,7 @@ use crate::error::FormatError;
 use crate::hash::{FileHash, Hashing};
 use crate::scan::{Attribute, Column, ColumnSlot, Scan};
 
-/// Writes `scan` to `path`, atomically, and returns the hash of the file that
-/// `hashing` asks for.
+/// Writes `scan` to `path`, atomically, and returns the file's hash.
 pub fn write_scan(
     path: &Path,
     hashing: Hashing,
@@ -69,8 +68,7 @@ fn header(scan: &Scan) -> String {
     header + "end_header\n"
 }
 
-/// Reads a scan from a PLY file, ASCII or binary, with properties in any order. Other properties are
-/// skipped.
+/// Reads a scan, ASCII or binary, with properties in any order. Other properties are skipped.
 pub fn read_scan(path: &Path) -> Result<Scan, FormatError> {
     let file = File::open(path).map_err(|source| FormatError::io(path, source))?;
     let (mut known, mut values) = (Vec::new(), Vec::new());
@@ -124,7 +122,6 @@ impl Rows<'_> {
         self.values.chunks_exact(self.width).map(vector).collect()
     }
 
-    /// A column of whole numbers that fit `T`.
     fn whole<T: TryFrom<u32>>(&self, at: usize) -> Result<Vec<T>, String> {
         let most = 8 * size_of::<T>();
         let whole = |x: f64| {

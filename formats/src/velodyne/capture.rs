@@ -55,11 +55,9 @@ pub fn read_turn(path: &Path) -> Result<Scan, FormatError> {
     Ok(turn.points.scan())
 }
 
-/// A turn that is being read.
 #[derive(Default)]
 struct Turn {
     decoder: Option<Decoder>,
-    /// The header of the packet before.
     before: Option<Header>,
     /// Azimuth units from the start of the first packet to that of the last.
     start: f64,

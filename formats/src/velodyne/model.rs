@@ -60,7 +60,6 @@ const FIRING_US: f64 = 2.304;
 /// in `VLP16db.yaml`, 11.2 mm at 15 degrees.
 const VLP16_CROSSING_M: f64 = 0.0419;
 
-/// The direction and the firing time of a laser.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Laser {
     /// Its ring, from the lowest elevation.

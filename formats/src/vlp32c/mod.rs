@@ -201,7 +201,6 @@ pub fn write(
     })
 }
 
-/// Writes the packet that begins with sequence `first`.
 fn write_packet(
     writer: &mut impl Write,
     revolution: &Revolution,
@@ -265,7 +264,6 @@ impl Capture {
     }
 }
 
-/// The measurements of each sequence.
 fn measurements(
     path: &Path,
     revolution: &Revolution,

@@ -4,16 +4,13 @@ use super::{DISTANCE_UNIT_M, Returns};
 
 /// Lasers of the sensor, and measurements of a block.
 pub(crate) const LASERS: usize = 32;
-/// Blocks of a packet.
 pub(crate) const BLOCKS: usize = 12;
 
 /// Bytes of a block's flag and azimuth.
 pub(crate) const BLOCK_HEADER_SIZE: usize = 4;
 /// Bytes of a distance and a reflectivity.
 pub(crate) const MEASUREMENT_SIZE: usize = 3;
-/// Bytes of a block.
 pub(crate) const BLOCK_SIZE: usize = BLOCK_HEADER_SIZE + LASERS * MEASUREMENT_SIZE;
-/// Bytes of a packet.
 pub(crate) const PAYLOAD_SIZE: usize = BLOCKS * BLOCK_SIZE + 6;
 
 /// The first bytes of each block.
@@ -21,7 +18,6 @@ pub(crate) const FLAG: [u8; 2] = [0xff, 0xee];
 /// The last byte of a packet of a VLP-32C.
 pub(crate) const MODEL: u8 = 0x28;
 
-/// The measurement of one laser.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Measurement {
     /// Distance in units of [`DISTANCE_UNIT_M`]; 0 without a return.
@@ -30,7 +26,6 @@ pub(super) struct Measurement {
 }
 
 impl Measurement {
-    /// No return.
     pub const NONE: Self = Self { distance: 0, reflectivity: 0 };
 
     /// A return, or none if its range does not fit a packet.
@@ -48,14 +43,12 @@ impl Measurement {
 /// The measurements of a firing sequence, by laser.
 #[derive(Clone)]
 pub(super) struct Sequence {
-    /// The last return.
     pub last: [Measurement; LASERS],
     /// The other return of dual returns, which equals the last if there is only one.
     pub other: [Measurement; LASERS],
 }
 
 impl Sequence {
-    /// No returns.
     pub const NONE: Self =
         Self { last: [Measurement::NONE; LASERS], other: [Measurement::NONE; LASERS] };
 }

@@ -1,5 +1,3 @@
-//! Raw floats: KITTI's four columns, and as many as a name says.
-
 use super::{error, read};
 
 fn floats(numbers: &[f32]) -> Vec<u8> {

@@ -1,5 +1,3 @@
-//! LAS: scale and offset in f64, every version, and headers that lie.
-
 use std::io::Cursor;
 
 use las::{Builder, Point, Transform, Vector, Version, Writer};

@@ -1,5 +1,3 @@
-//! Clouds as files: what is read, what is written, what is refused.
-
 mod damaged;
 mod kitti;
 mod las;
@@ -15,7 +13,6 @@ use std::path::Path;
 
 use formats::cloud_file::{CloudFormat, read_cloud_from};
 
-/// The points that `bytes` hold, taken for a file called `name`.
 fn read(name: &str, bytes: impl AsRef<[u8]>) -> Vec<[f64; 3]> {
     let name = Path::new(name);
     read_cloud_from(bytes.as_ref(), Some(CloudFormat::of_path(name).unwrap()), name).unwrap()

@@ -1,5 +1,3 @@
-//! NumPy's arrays: every type of number, either order, and headers that lie.
-
 use super::{MANY, error, read};
 use crate::numpy::npy;
 use proptest::prelude::*;
@@ -8,7 +6,6 @@ fn c_order(descr: &str, shape: &str, data: &[u8]) -> Vec<[f64; 3]> {
     read("a.npy", npy(descr, "False", shape, data))
 }
 
-/// The bytes of 1, 2, 3 as every type of number that NumPy has.
 #[test]
 fn numbers_of_every_type_are_read() {
     macro_rules! of {
@@ -87,7 +84,6 @@ fn a_promise_beyond_all_memory_is_an_error() {
 }
 
 proptest! {
-    /// Whichever order an array lies in, its points are the same.
     #[test]
     fn either_order_gives_the_same_points(
         points in prop::collection::vec(prop::array::uniform3(-1e9f64..1e9), 0..50),

@@ -1,5 +1,3 @@
-//! NumPy's archives: which array holds the points, and what is added to them.
-
 use zip::write::SimpleFileOptions;
 
 use super::{MANY, error, read};

@@ -1,5 +1,3 @@
-//! PCD: text, binary and compressed, fields in any order and of any type.
-
 use super::{MANY, error, read};
 
 const HEADER: &str = "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\n";

@@ -1,5 +1,3 @@
-//! PLY: text and binary, other properties, lists and elements passed over.
-
 use super::{MANY, error, read};
 
 const POINTS: [[f64; 3]; 2] = [[0.5, -2.0, 3.0], [4.0, 5.0, 6.0]];

@@ -7,7 +7,6 @@ use formats::cloud_file::read_cloud;
 use formats::labelled::read_labelled;
 use test_support::{need, shared_data};
 
-/// Every file below `folder` with one of `extensions`.
 fn files(folder: &Path, extensions: &[&str]) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder).unwrap() {
@@ -22,7 +21,6 @@ fn files(folder: &Path, extensions: &[&str]) -> Vec<PathBuf> {
     found
 }
 
-/// The largest distance from the sensor.
 fn reach_m(points: &[[f64; 3]]) -> f64 {
     points.iter().map(|p| p.iter().map(|x| x * x).sum::<f64>().sqrt()).fold(0.0, f64::max)
 }

@@ -1,5 +1,3 @@
-//! Text: separators, column names, comments, and what is no number.
-
 use super::{error, read};
 
 const POINTS: [[f64; 3]; 2] = [[1.0, -2.5, 3e-7], [4.0, 5.0, 6.0]];

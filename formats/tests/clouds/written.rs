@@ -1,5 +1,3 @@
-//! What is written comes back, atomically and with the same bytes.
-
 use std::fs;
 use std::path::Path;
 

@@ -12,7 +12,6 @@ pub struct Packet {
     pub model: u8,
 }
 
-/// What one firing sequence measured.
 #[derive(Debug, PartialEq)]
 pub struct Block {
     pub azimuth: u16,

@@ -1,5 +1,3 @@
-//! Packets are what the sensor's manual says, byte by byte.
-
 mod capture;
 
 use std::fs;
@@ -183,7 +181,6 @@ fn a_scan_that_says_too_little_or_too_much_is_refused() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// What returned is found where it was fired, and nothing else is.
     #[test]
     fn what_is_written_is_found(
         rpm in 300.0..=1200.0f64,

@@ -1,5 +1,3 @@
-//! `compare-points`: computes the Chamfer distance of two clouds.
-
 use std::path::{Path, PathBuf};
 
 use anyhow::ensure;
@@ -19,7 +17,6 @@ pub struct ComparePointsArgs {
     b: PathBuf,
 }
 
-/// Prints the Chamfer distance of two clouds.
 pub fn run(args: &ComparePointsArgs) -> anyhow::Result<()> {
     let (a, b) = (read_finite(&args.a)?, read_finite(&args.b)?);
     let found = chamfer(&a, &b);
@@ -28,7 +25,6 @@ pub fn run(args: &ComparePointsArgs) -> anyhow::Result<()> {
     print(&format!("Chamfer distance, plain, sum of both means:   {:.9}", found.plain))
 }
 
-/// Reads the cloud at `path`.
 pub fn read_finite(path: &Path) -> anyhow::Result<Vec<[f64; 3]>> {
     let cloud = read_cloud(path)?;
     ensure!(!cloud.is_empty(), "{}: expected points, found none", path.display());

@@ -1,5 +1,3 @@
-//! `eval`: measures a model's accuracy on labelled clouds.
-
 use std::collections::BTreeMap;
 use std::iter::repeat_n;
 use std::path::{Path, PathBuf};
@@ -68,7 +66,6 @@ struct ObjectArgs {
     min_points: Option<usize>,
 }
 
-/// Prints the accuracy of a model.
 pub fn run(args: &EvalArgs) -> anyhow::Result<()> {
     let (card, names) = {
         let classifier = Classifier::load(&args.model, &options(args))?;
@@ -173,7 +170,6 @@ fn unknown(args: &EvalArgs, card: &ModelCard, names: &[String]) -> Result<Vec<St
     Ok(names.iter().filter(|class| !known.contains(class)).cloned().collect())
 }
 
-/// The results for all objects together.
 fn summary(objects: &[Object], labels: &Labels, table: &Table) -> String {
     let mut lines = Vec::new();
     if let Some(balanced) = table.balanced() {

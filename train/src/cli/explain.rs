@@ -1,5 +1,3 @@
-//! `explain`: shows which points determined a prediction, by LIME-3D and by critical points.
-
 use std::path::PathBuf;
 
 use formats::atomic;
@@ -41,7 +39,6 @@ pub struct ExplainArgs {
 /// Number of random subsets to compare the distance with.
 const DRAWS: u32 = 1000;
 
-/// Explains the prediction of a model for a cloud.
 pub fn run(args: &ExplainArgs) -> anyhow::Result<()> {
     check(args)?;
     let cloud = read_finite(&args.cloud)?;

@@ -1,5 +1,3 @@
-//! The commands of `edgepuck-train`.
-
 pub mod compare_points;
 pub mod eval;
 pub mod explain;
@@ -10,7 +8,6 @@ pub mod train;
 use formats::outcome::Usage;
 use std::io::Write;
 
-/// Writes a line to standard output.
 fn print(line: &str) -> anyhow::Result<()> {
     Ok(writeln!(std::io::stdout(), "{line}")?)
 }

@@ -6,7 +6,6 @@ use train::run::Progress;
 
 const TEMPLATE: &str = "epoch {prefix} {bar:30} {pos}/{len} {msg} {eta} left";
 
-/// Returns a function that shows each report of a run.
 pub fn shown() -> impl FnMut(Progress<'_>) {
     let style = ProgressStyle::with_template(TEMPLATE).expect("invariant: a valid template");
     let mut bar = ProgressBar::hidden();

@@ -1,5 +1,3 @@
-//! `train`: trains a network.
-
 use std::path::PathBuf;
 
 use formats::split::Split;
@@ -70,7 +68,6 @@ fn parse_widths(word: &str) -> Result<Widths, String> {
     }
 }
 
-/// Trains a network, continuing an interrupted run.
 pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
     let recipe = recipe(args)?;
     let most_points = points_to_read(&recipe);

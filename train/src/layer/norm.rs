@@ -133,8 +133,7 @@ impl Norm {
         (out, Saved { normalised: z, inverse })
     }
 
-    /// Sets the gradients of scale and shift from the gradient `dy` of the outputs `y`. Returns the
-    /// gradient of `z`.
+    /// Sets the gradients of scale and shift from the gradient `dy` of `y`; returns that of `z`.
     pub fn backward(
         &mut self,
         mut dy: Matrix,
@@ -170,7 +169,6 @@ impl Norm {
     }
 }
 
-/// Changes the gradient of the outputs `y` of a ReLU to that of its inputs.
 pub fn relu_gradient(dy: &mut Matrix, y: &Matrix) {
     dy.zip_mut_with(y, |dy, &y| {
         if y <= 0.0 {

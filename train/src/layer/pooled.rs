@@ -3,13 +3,13 @@
 //! The products z = W x, about a thousand for each point, are never stored:
 //!
 //! - The maximum needs one product for each channel and cloud, which infer-cpu's fused kernel
-//! -   finds. A batch norm with a scale of 0 or more keeps the order of its values. A scale below 0
-//! -   reverses the order, so that the kernel takes weights of the opposite sign.
+//!   finds. A batch norm with a scale of 0 or more keeps the order of its values. A scale below 0
+//!   reverses the order, so that the kernel takes weights of the opposite sign.
 //! - Mean and variance of z follow from those of x: mean(z) = W mean(x), and var(z) = w cov(x) wᵀ
-//! -   for each channel's w.
+//!   for each channel's w.
 //! - In the backward pass, the gradient G of a channel flows to one point of each cloud and,
-//! -   through the statistics of the batch norm, to all points. With the channel's σ and γ, the
-//! -   number n of all points, S = ΣG and P = ΣG ẑ over clouds:
+//!   through the statistics of the batch norm, to all points. With the channel's σ and γ, the
+//!   number n of all points, S = ΣG and P = ΣG ẑ over clouds:
 //!
 //! ```text
 //! dW  =  γ/σ (Σ G x_winner  -  S mean(x)  -  P cov(x) w / σ)
@@ -45,9 +45,7 @@ struct Saved {
     winners: Vec<u32>,
     /// The product of that row, normalised to mean 0 and variance 1.
     normalised: Matrix,
-    /// The mean of the inputs.
     mean: Vec<f32>,
-    /// The inputs minus their mean.
     centred: Matrix,
     /// W cov(x).
     covariant: Matrix,

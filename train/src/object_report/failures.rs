@@ -11,7 +11,6 @@ const MOST_POINTS: usize = 500;
 const SIDE: f64 = 150.0;
 /// Pixels of the two lines of text under a view.
 const WORDS: f64 = 34.0;
-/// Number of objects in a row.
 const COLUMNS: usize = 4;
 /// Smallest width of a view, metres, so that a person is drawn smaller than a bus.
 const LEAST_WIDTH_M: f64 = 3.0;

@@ -1,5 +1,3 @@
-//! What happens to clouds on their way to the network.
-
 use train::augment;
 use train::recipe::{Augment, Recipe, Sampling};
 use train::shape::Edge;

@@ -1,5 +1,3 @@
-//! Clusters in metres and of any size, from the set to the report.
-
 use std::path::Path;
 
 use formats::labelled::LabelledSet;

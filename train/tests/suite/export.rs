@@ -1,5 +1,3 @@
-//! What is trained is what infer-cpu runs.
-
 use std::path::Path;
 
 use formats::model_card::ModelCard;
@@ -22,7 +20,6 @@ fn recipe(input_transform: bool, feature_transform: bool) -> Recipe {
     ))
 }
 
-/// Logits of the trained network by its reference and by infer-cpu, on 100 clouds.
 #[test]
 fn logits_are_those_of_infer_cpu() {
     let clouds = crate::clouds(100);
@@ -62,7 +59,6 @@ fn logits_are_those_of_infer_cpu() {
     }
 }
 
-/// What is shipped, folded and in f16, answers as what was learnt does.
 #[test]
 fn shipped_weights_are_those_that_were_learnt() {
     let clouds = crate::clouds(60);
@@ -92,7 +88,6 @@ fn shipped_weights_are_those_that_were_learnt() {
     }
 }
 
-/// That something is learnt at all: three plain shapes are told apart.
 #[test]
 fn plain_shapes_are_classified() {
     let (clouds, test) = (crate::clouds(120), crate::test_clouds(150));
@@ -109,8 +104,6 @@ fn plain_shapes_are_classified() {
     assert!(found.instance_accuracy() > 0.95, "{found:?}");
 }
 
-/// A front end is learnt with the network behind it, and infer-cpu finds both: it chooses as many
-/// points as were asked for, and knows plain shapes by them.
 #[test]
 fn a_point_encoder_and_its_network_classify_plain_shapes_by_few_points() {
     for gumbel in [false, true] {

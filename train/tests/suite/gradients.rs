@@ -83,7 +83,6 @@ fn duplicated(batch: &Batch) -> Vec<Table> {
     batch.starts.windows(2).map(cloud).collect()
 }
 
-/// The gradients in a network's parameters, by name.
 fn gradients(network: &mut PointNet) -> BTreeMap<String, Vec<f32>> {
     network.parameters().into_iter().map(|p| (p.name.clone(), p.gradient.clone())).collect()
 }

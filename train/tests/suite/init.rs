@@ -1,5 +1,3 @@
-//! Training that starts from a model.
-
 use std::path::{Path, PathBuf};
 
 use formats::model_card::{ModelCard, Normalization};

@@ -1,5 +1,3 @@
-//! A run that is killed at any moment, and goes on.
-
 use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -53,7 +51,6 @@ fn a_run_that_is_killed_again_and_again_ends_with_the_same_bytes_and_curve() {
     let bytes = |name: &str| std::fs::read(folder.join(name)).unwrap();
     assert_eq!(bytes("broken.safetensors"), bytes("whole.safetensors"));
     assert_eq!(curve(folder, "broken.run"), curve(folder, "whole.run"));
-    // Nothing half-written is left.
     for name in ["", "broken.run"] {
         for entry in std::fs::read_dir(folder.join(name)).unwrap() {
             let name = entry.unwrap().file_name().to_string_lossy().into_owned();

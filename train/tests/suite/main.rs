@@ -18,7 +18,6 @@ use formats::rng::StreamKey;
 use train::clouds::Clouds;
 use train::recipe::Recipe;
 
-/// The recipe with this TOML.
 fn recipe(text: &str) -> Recipe {
     toml::from_str(text).unwrap()
 }
@@ -28,7 +27,6 @@ fn clouds(n: usize) -> Clouds {
     clouds_of(5, n)
 }
 
-/// Others of the same classes.
 fn test_clouds(n: usize) -> Clouds {
     clouds_of(6, n)
 }

@@ -1,5 +1,3 @@
-//! The program, as a user starts it.
-
 use std::path::Path;
 use std::process::{Command, Output};
 

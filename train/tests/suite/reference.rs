@@ -10,12 +10,10 @@ use train::shape::Shape;
 /// Values by a parameter's name, with its shape.
 pub type Values = BTreeMap<String, (Vec<usize>, Vec<f64>)>;
 
-/// Rows of numbers.
 pub type Table = Vec<Vec<f64>>;
 
 const EPSILON: f64 = 1e-5;
 
-/// A network by its parameters' names.
 pub struct Reference<'a> {
     /// Parameters, and running statistics.
     pub values: &'a Values,
@@ -182,7 +180,6 @@ impl Reference<'_> {
     }
 }
 
-/// A network's parameters and running statistics.
 pub fn values(network: &mut dyn Module) -> Values {
     let wide = |values: &[f32]| values.iter().map(|&x| f64::from(x)).collect();
     let tensors = train::model_file::tensors(network).into_iter();

@@ -1,5 +1,3 @@
-//! A run that is broken off goes on as if it had not been.
-
 use train::checkpoint;
 use train::error::Error;
 use train::layer::Module;

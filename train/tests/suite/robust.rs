@@ -1,5 +1,3 @@
-//! What makes a network of whole objects robust: variation, negatives, and weights to start from.
-
 use formats::model_card::ModelCard;
 use formats::rng::StreamKey;
 use infer_cpu::{Classifier, Options};
