@@ -1,5 +1,3 @@
-//! `edgepuck adapters`: lists what can cast.
-
 use crate::Outcome;
 use crate::caster::HOW_TO_GET_VULKAN;
 use sim_gpu::internals::gpu::{AdapterKind, list_adapters};

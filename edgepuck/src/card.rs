@@ -1,5 +1,3 @@
-//! `edgepuck card`: writes the card and the metadata for publishing a finished dataset.
-
 use crate::Outcome;
 use anyhow::Context;
 use edgepuck_dataset::{Publication, publish};

@@ -1,10 +1,7 @@
-//! Opens the adapter that a command line asks for.
-
 use anyhow::Context;
 use sim_gpu::Caster;
 use sim_gpu::internals::job::Culling;
 
-/// What a GPU may lack.
 pub const HOW_TO_GET_VULKAN: &str = "a GPU needs a Vulkan driver, which on Debian or Ubuntu \
      `apt-get install mesa-vulkan-drivers` installs for those of AMD and Intel";
 
@@ -32,7 +29,6 @@ impl CasterArgs {
         Ok(caster)
     }
 
-    /// Whether beams that cannot hit are cast.
     pub fn culling(&self) -> Culling {
         if self.no_cull { Culling::Off } else { Culling::On }
     }

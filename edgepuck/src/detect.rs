@@ -11,7 +11,6 @@ use serde_json::{Value, json};
 use crate::segment::{SweepArgs, tint};
 use crate::{Outcome, Usage, preview};
 
-/// The model that comes with the program.
 const BUNDLED: &str = "street-128";
 
 #[derive(clap::Args)]

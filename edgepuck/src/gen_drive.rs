@@ -1,5 +1,3 @@
-//! `edgepuck gen-drive`: a simulated drive through a street, as a sensor's packets.
-
 use std::ffi::OsStr;
 use std::io::Write;
 use std::path::{Path, PathBuf};

@@ -1,5 +1,3 @@
-//! `edgepuck merge-dataset`: merges the shards of a dataset.
-
 use crate::{Outcome, gen_dataset};
 use edgepuck_dataset::merge;
 use std::path::PathBuf;

@@ -1,5 +1,3 @@
-//! `edgepuck profile`: lists the built-in sensors, and checks and describes a profile.
-
 use crate::significant_digits::digits;
 use crate::{Outcome, Usage};
 use formats::atomic;

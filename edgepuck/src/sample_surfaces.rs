@@ -1,5 +1,3 @@
-//! `edgepuck sample-surfaces`: samples points uniformly from each mesh.
-
 use crate::Outcome;
 use crate::gen_dataset::report_failures;
 use edgepuck_dataset::{SurfaceConfig, write_surfaces};

@@ -1,5 +1,3 @@
-//! `edgepuck scan`: one scene, one scan per sensor.
-
 use crate::caster::CasterArgs;
 use crate::{Outcome, Usage, flags};
 use anyhow::Context;
@@ -115,11 +113,9 @@ fn told(scene: &Scene, scan: &Scan) -> String {
     )
 }
 
-/// The folder of the scene that is scanned by default.
 const DEFAULT_SCENE: &str = "data/default-scene";
 
-/// Writes the default scene and its mesh, unless they are there, and returns the
-/// scene's file.
+/// Writes the default scene and its mesh, unless they are there, and returns the scene's file.
 fn write_default_scene() -> anyhow::Result<PathBuf> {
     let file = |path: &str| Path::new(DEFAULT_SCENE).join(path);
     for (path, text) in edgepuck_assets::DEFAULT_SCENE {

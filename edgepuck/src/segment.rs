@@ -1,5 +1,3 @@
-//! `edgepuck segment`: segments a sweep into ground and clusters.
-
 use crate::{Outcome, Usage, preview};
 use edgepuck_segment::{Label, Segmentation, Segmenter, Settings, Sweep};
 use formats::cloud_file::{read_cloud, read_intensities, write_cloud};
@@ -109,7 +107,6 @@ impl SweepArgs {
         Ok(Scan { positions, intensity, ..Scan::default() })
     }
 
-    /// The position of the sensor in the sweep, metres.
     pub fn sensor_m(&self) -> [f64; 3] {
         let given = self.sensor.as_deref().and_then(|xyz| <[f64; 3]>::try_from(xyz).ok());
         given.unwrap_or_default()

@@ -1,5 +1,3 @@
-//! Quoted words and commands of the system's shell.
-
 use std::process::Command;
 
 /// `word`, quoted for a POSIX shell.

@@ -1,5 +1,3 @@
-//! `edgepuck weather`: adds rain, snow, fog and haze to a scan that was recorded in clear air.
-
 use crate::brightness::BrightnessArgs;
 use crate::segment::SweepArgs;
 use crate::{Outcome, Usage};

@@ -17,7 +17,6 @@ pub fn vectors(py: Python<'_>, vectors: Vec<[f32; 3]>) -> PyResult<Bound<'_, PyA
     Ok(array.into_pyarray(py).into_any())
 }
 
-/// The points of `array`.
 pub fn points(array: &PyReadonlyArray2<'_, f32>) -> PyResult<Vec<[f32; 3]>> {
     if array.shape()[1] != 3 {
         return Err(raised(format!("expected points of shape [n, 3], found {:?}", array.shape())));

@@ -1,5 +1,3 @@
-//! The classifier.
-
 use crate::arrays::points;
 use crate::error::raised;
 use infer_cpu::Options;

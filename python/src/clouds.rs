@@ -1,5 +1,3 @@
-//! The clouds of a dataset, cast on demand.
-
 use crate::error::{raised, raised_with_causes};
 use crate::process::{self, LazyCaster};
 use edgepuck_dataset as dataset;

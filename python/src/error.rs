@@ -1,5 +1,3 @@
-//! Errors of the libraries as exceptions.
-
 use pyo3::exceptions::PyValueError;
 use pyo3::{PyErr, create_exception};
 use std::fmt::Display;
@@ -11,7 +9,6 @@ create_exception!(
     "A file, a mesh or a value that cannot be used. The message names it and says why."
 );
 
-/// The exception for an error of a library.
 pub fn raised(error: impl Display) -> PyErr {
     Error::new_err(error.to_string())
 }

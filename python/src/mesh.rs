@@ -1,5 +1,3 @@
-//! Meshes, ready to be scanned.
-
 use crate::error::raised;
 use crate::process;
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};

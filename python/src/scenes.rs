@@ -1,5 +1,3 @@
-//! Scenes that recipes draw.
-
 use crate::error::{raised, raised_with_causes};
 use crate::process;
 use crate::{arrays, segment};

@@ -1,5 +1,3 @@
-//! Cuts a sweep into ground and clusters.
-
 use crate::arrays::points;
 use crate::error::raised;
 use edgepuck_segment::{Label, Segmenter, Settings, Sweep};

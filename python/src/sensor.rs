@@ -1,5 +1,3 @@
-//! Sensors.
-
 use crate::error::raised;
 use crate::process::LazyCaster;
 use numpy::ndarray::Array2;

@@ -6,7 +6,6 @@ use std::ffi::OsString;
 use std::process::Command;
 use xtask::workspace::{LAB, cargo_run};
 
-/// The product.
 pub const EDGEPUCK: &str = "edgepuck";
 
 /// Commands of the product that read or write no network. A first build for them

@@ -6,7 +6,6 @@ use anyhow::bail;
 use std::process::Command;
 use xtask::workspace::{cargo, output, packages, root};
 
-/// The manifest of the product's workspace.
 const MANIFEST: &str = "Cargo.toml";
 
 /// Runs every check even if one fails, and prints a table of the results.

@@ -18,9 +18,7 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// One check that passed.
     pub const PASSED: Self = Self { passed: 1, failed: 0, skipped: 0 };
-    /// One check that failed.
     pub const FAILED: Self = Self { passed: 0, failed: 1, skipped: 0 };
 
     /// The counts in the last line of a test program's output; `None` for any other line. Rust's
@@ -40,7 +38,6 @@ impl Counts {
         })
     }
 
-    /// Both together.
     pub fn and(self, other: Self) -> Self {
         Self {
             passed: self.passed + other.passed,
@@ -100,12 +97,10 @@ impl Summary {
         self.remarks.extend(others.remarks);
     }
 
-    /// Keeps a sentence for the end of the run.
     pub fn remark(&mut self, remark: String) {
         self.remarks.push(remark);
     }
 
-    /// All steps together.
     pub fn total(&self) -> Counts {
         self.steps.iter().fold(Counts::default(), |total, (.., counts)| total.and(*counts))
     }

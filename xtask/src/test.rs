@@ -153,7 +153,6 @@ fn compile_all(words: &[&str]) -> Command {
     by_clippy(cargo_on_all(words))
 }
 
-/// A command of Cargo that compiles the laboratory, with Clippy.
 fn compile_lab(words: &[&str]) -> Command {
     let mut command = by_clippy(cargo_in_lab(words));
     command.args(["--features", "hdf5"]);
@@ -170,7 +169,6 @@ fn laboratory(summary: &mut Summary, required: bool) -> anyhow::Result<Counts> {
     Ok(lints.and(test_programs::run(summary, &mut tests)?))
 }
 
-/// The tests of all crates.
 fn tests(summary: &mut Summary, required: bool) -> anyhow::Result<Counts> {
     let mut tests = compile_all(&["test", "--no-fail-fast"]);
     require_adapter(&mut tests, required);

@@ -1,5 +1,3 @@
-//! Corruptions of mesh scans.
-
 use super::plan::{Plan, chosen};
 use super::{CorruptArgs, Written, usage, write_list};
 use crate::Outcome;

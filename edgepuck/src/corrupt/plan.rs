@@ -14,10 +14,8 @@ use crate::Usage;
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Plan {
-    /// Corruptions of recorded sweeps.
     #[serde(default)]
     pub sweep: Vec<Entry<Corruption>>,
-    /// Corruptions of mesh scans.
     #[serde(default)]
     pub object: Vec<Entry<ObjectCorruption>>,
     #[serde(default)]

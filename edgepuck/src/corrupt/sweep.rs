@@ -1,5 +1,3 @@
-//! Corruptions of a recorded sweep.
-
 use super::plan::{Plan, chosen};
 use super::{CorruptArgs, Written, usage, write_list};
 use crate::Outcome;

@@ -49,7 +49,6 @@ impl Graph {
         name.to_owned()
     }
 
-    /// Adds a node with several outputs.
     pub fn add_of_many(
         &mut self,
         operator: &str,
@@ -87,7 +86,6 @@ impl Graph {
         name.to_owned()
     }
 
-    /// The graph as a message.
     pub fn finish(self, name: &str) -> GraphProto {
         GraphProto {
             node: self.nodes,
@@ -114,17 +112,14 @@ fn value(name: &str, elem_type: i32, shape: &[Size<'_>]) -> ValueInfoProto {
     }
 }
 
-/// An attribute with one whole number.
 pub fn int(name: &str, i: i64) -> AttributeProto {
     AttributeProto { i, ..attribute(name, attribute_type::INT) }
 }
 
-/// An attribute with a list of whole numbers.
 pub fn ints(name: &str, ints: &[i64]) -> AttributeProto {
     AttributeProto { ints: ints.to_vec(), ..attribute(name, attribute_type::INTS) }
 }
 
-/// An attribute with a string.
 pub fn word(name: &str, word: &str) -> AttributeProto {
     AttributeProto { s: word.into(), ..attribute(name, attribute_type::STRING) }
 }

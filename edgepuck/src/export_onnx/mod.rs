@@ -1,5 +1,3 @@
-//! `edgepuck export-onnx`: converts a model file to ONNX, for other engines.
-
 mod critical_points;
 mod edges;
 mod graph;

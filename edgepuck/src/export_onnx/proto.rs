@@ -85,7 +85,6 @@ pub struct AttributeProto {
     pub r#type: i32,
 }
 
-/// Values of an attribute's `type`.
 pub mod attribute_type {
     pub const INT: i32 = 2;
     pub const STRING: i32 = 3;
@@ -106,7 +105,6 @@ pub struct TensorProto {
     pub raw_data: Vec<u8>,
 }
 
-/// Kinds of elements.
 pub mod data_type {
     pub const FLOAT: i32 = 1;
     pub const INT64: i32 = 7;

@@ -3,7 +3,6 @@ use std::collections::BTreeSet;
 use super::proto::{GraphProto, TensorProto};
 use super::*;
 
-/// The checkout that the tests are built in.
 fn root() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
 }

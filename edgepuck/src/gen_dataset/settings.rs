@@ -1,5 +1,3 @@
-//! The flags that decide what a dataset holds.
-
 use super::usage;
 use anyhow::Context;
 use edgepuck_dataset::{DatasetConfig, Layout, SetConfig, Variant, Viewpoints};

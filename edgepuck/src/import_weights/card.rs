@@ -1,5 +1,3 @@
-//! The card of an imported model.
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

@@ -1,5 +1,3 @@
-//! `edgepuck import-weights`: converts a PyTorch checkpoint to a model file.
-
 mod card;
 mod checkpoint;
 mod table;

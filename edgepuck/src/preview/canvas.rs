@@ -8,7 +8,6 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 use plotters::style::register_font;
 
-/// A part of the picture.
 pub type Area<'a> = DrawingArea<BitMapBackend<'a>, Shift>;
 
 /// Hack, under the MIT and Bitstream Vera licences. It comes with the program,
@@ -52,8 +51,7 @@ pub fn text(height: u32) -> TextStyle<'static> {
     TextStyle::from((FONT_NAME, height).into_font())
 }
 
-/// A number of metres, with the digits that tell it from its neighbour one
-/// `step` away.
+/// A number of metres, with the digits that tell it from its neighbour one `step` away.
 pub fn metres(value: f64, step: f64) -> String {
     if !(1e-3..1e5).contains(&step) {
         return format!("{value:.1e}");

@@ -47,7 +47,6 @@ impl Colours {
         colours
     }
 
-    /// The colour of each point of `scan`.
     pub fn tints(&self, scan: &Scan) -> Vec<RGBColor> {
         self.values(scan).map(|value| self.tint(value)).collect()
     }

@@ -25,7 +25,6 @@ impl Frame {
         Self { centre, half: if half > 0.0 { half * MARGIN } else { 0.5 } }
     }
 
-    /// The cube's extent along `axis`.
     pub fn extent(&self, axis: usize) -> std::ops::Range<f64> {
         self.centre[axis] - self.half..self.centre[axis] + self.half
     }

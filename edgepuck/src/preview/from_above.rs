@@ -1,5 +1,3 @@
-//! A picture of a whole sweep from above.
-
 use std::path::Path;
 
 use anyhow::Result;

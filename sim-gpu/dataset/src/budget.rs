@@ -1,5 +1,3 @@
-//! Keeps the meshes in progress within a memory budget.
-
 use std::sync::{Condvar, Mutex, PoisonError};
 
 /// The bytes that meshes in progress may hold together.
@@ -18,7 +16,6 @@ pub struct Share<'a> {
 }
 
 impl Budget {
-    /// A budget of `limit` bytes.
     #[must_use]
     pub fn new(limit: u64) -> Self {
         Self { limit, held: Mutex::new(0), released: Condvar::new() }

@@ -70,12 +70,9 @@ impl Cloud {
     }
 }
 
-/// The scans of a dataset.
 #[derive(Clone, Copy)]
 pub(crate) struct Scans<'a> {
-    /// The dataset's folder.
     pub out: &'a Path,
-    /// The settings of the dataset.
     pub config: &'a DatasetConfig,
     /// The meshes, sorted by entry.
     pub records: &'a [MeshRecord],
@@ -93,17 +90,13 @@ pub(crate) struct Part<'a> {
 
 /// A cloud, its name and its label.
 pub(crate) struct Packed<'a> {
-    /// The mesh.
     pub entry: &'a Entry,
-    /// The view's number.
     pub view: u32,
     /// `CLASS/NAME_vK`, unique in its part.
     pub name: String,
-    /// The class's index.
     pub label: usize,
     /// Points of the scan.
     pub n_raw: u32,
-    /// The points.
     pub cloud: Cow<'a, Cloud>,
 }
 

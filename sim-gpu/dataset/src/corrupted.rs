@@ -43,7 +43,6 @@ pub struct CorruptedSet {
     pub corruption: ObjectCorruption,
     /// Casts its rays, on the CPU, since test sets are small and differ in their effects.
     caster: OpenCaster,
-    /// The beams of the sensor.
     pattern: BeamPattern,
 }
 

@@ -1,5 +1,3 @@
-//! Why a dataset cannot be made, merged or verified.
-
 use crate::record::MeshFailure;
 use formats::FormatError;
 use sim_gpu::internals::cast_error::CastError;
@@ -121,7 +119,6 @@ impl DatasetError {
         Self::Malformed { path: path.into(), cause: cause.to_string() }
     }
 
-    /// The system's error `source` on `path`.
     pub(crate) fn io(path: &Path, source: std::io::Error) -> Self {
         FormatError::io(path, source).into()
     }

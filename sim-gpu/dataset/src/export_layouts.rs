@@ -1,5 +1,3 @@
-//! Writes the layouts of other projects.
-
 use crate::clouds::{Packed, Part, Scans};
 use crate::config::{DatasetConfig, Layout};
 use crate::error::DatasetError;

@@ -1,6 +1,3 @@
-//! Makes a dataset of files: begins or resumes it, scans its meshes, packs the clouds and writes
-//! the manifest.
-
 use crate::config::Layout;
 use crate::difference::difference;
 use crate::error::DatasetError;

@@ -1,5 +1,3 @@
-//! Merges the parts of a dataset, which several machines made, into one.
-
 use crate::difference::difference;
 use crate::error::DatasetError;
 use crate::finish::complete;

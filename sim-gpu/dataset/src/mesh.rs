@@ -42,7 +42,6 @@ pub(crate) struct Prepared<'a> {
     pub record: MeshRecord,
     /// Its views, each with a job of the same index.
     pub views: Vec<View<'a>>,
-    /// The rays of each view.
     pub jobs: Vec<CastJob>,
     /// The mesh, where the views see it.
     pub scene: Scene,

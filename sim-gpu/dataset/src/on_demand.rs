@@ -1,5 +1,3 @@
-//! The clouds of a dataset, cast on demand.
-
 use crate::clouds::Source;
 use crate::config::{DatasetConfig, Variant, Viewpoints};
 use crate::error::DatasetError;

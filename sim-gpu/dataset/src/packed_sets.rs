@@ -14,11 +14,9 @@ const MESHES_AT_ONCE: usize = 64;
 
 /// A cloud of one of the sets.
 pub(crate) struct Drawn {
-    /// The index of the set.
     pub set: usize,
     /// `CLASS/NAME` or `CLASS/NAME_vK`.
     pub name: String,
-    /// Its points.
     pub points: Vec<[f32; 3]>,
     /// Points before they were resampled.
     pub n_raw: u32,

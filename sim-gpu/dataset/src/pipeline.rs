@@ -37,7 +37,6 @@ const RAYS_PER_BATCH: usize = 1 << 20;
 /// Batches that the adapter has at once: while it traces one, the next is uploaded.
 const BATCHES_IN_FLIGHT: usize = 2;
 
-/// The records and the failures of a run.
 type Scanned = (Vec<MeshRecord>, Vec<MeshFailure>);
 
 struct Shared<'a> {
@@ -175,7 +174,6 @@ impl<'a> Shared<'a> {
         }
     }
 
-    /// Writes the scans of the meshes that were cast.
     fn write_all(&self, cast: &Receiver<(Held, Vec<Cast>)>) {
         for (held, casts) in cast {
             if self.stopped.load(SeqCst) {
@@ -243,7 +241,6 @@ impl<'a, 'b> Batch<'a, 'b> {
         Ok(Self { meshes, jobs, casting })
     }
 
-    /// The meshes, each with the answers of the caster.
     fn wait(self) -> Result<Vec<(Held<'a, 'b>, Vec<Cast>)>, CastError> {
         let mut casts = self.casting.wait()?.into_iter();
         let mut jobs = self.jobs.into_iter();

@@ -1,5 +1,3 @@
-//! The plan of a dataset of files.
-
 use crate::config::DatasetConfig;
 use sim_gpu::internals::job::Culling;
 use sim_gpu::internals::mesh::tree::MeshEntry;

@@ -1,5 +1,3 @@
-//! The records of meshes and scans, which manifests list.
-
 use crate::config::Variant;
 use formats::Split;
 use formats::hash::FileHash;
@@ -117,13 +115,11 @@ pub struct MeshFailure {
 }
 
 impl MeshFailure {
-    /// The mesh of `entry` cannot be scanned, because of `cause`.
     pub(crate) fn new(entry: &MeshEntry, cause: impl ToString) -> Self {
         let (source, cause) = (entry.relative.clone(), cause.to_string());
         Self { entry: entry.into(), source, line: None, cause }
     }
 
-    /// The mesh of `entry` cannot be read, because of `error`.
     pub(crate) fn unreadable(entry: &MeshEntry, error: &MeshError) -> Self {
         match error {
             MeshError::Malformed { line, cause, .. } => {

@@ -1,5 +1,3 @@
-//! Removes what describes a dataset to others.
-
 use crate::error::DatasetError;
 use crate::layout;
 use std::path::Path;

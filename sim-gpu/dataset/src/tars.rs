@@ -391,7 +391,6 @@ fn made_by(plan: &Plan, cut: Cut, caster: &OpenCaster) -> String {
     formats::hash::of_bytes(all.to_string().as_bytes())
 }
 
-/// Clouds of `n_points` points that one sample holds.
 fn clouds_per_sample(n_points: u32) -> usize {
     (POINTS_PER_SAMPLE / n_points.max(1) as usize).clamp(1, CLOUDS_PER_SAMPLE)
 }

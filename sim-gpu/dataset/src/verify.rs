@@ -1,5 +1,3 @@
-//! Checks a dataset against its manifest.
-
 use crate::error::DatasetError;
 use crate::finish::failure_lines;
 use crate::journal::{Journal, read_json};

@@ -22,19 +22,14 @@ use std::sync::Arc;
 /// What all views of a dataset share.
 #[derive(Clone, Copy)]
 pub(crate) struct Rig<'a> {
-    /// The settings of the dataset.
     pub config: &'a DatasetConfig,
-    /// The beams of each set's sensor.
     pub patterns: &'a [BeamPattern],
-    /// The effects that the caster models.
     pub cast_effects: &'a Effects,
     /// Whether beams that cannot hit the mesh are cast.
     pub culling: Culling,
 }
 
-/// One view of one mesh.
 pub(crate) struct View<'a> {
-    /// The set.
     pub set: &'a SetConfig,
     /// The number of the view in its set.
     pub number: u32,
@@ -82,12 +77,10 @@ impl<'a> Rig<'a> {
 }
 
 impl View<'_> {
-    /// The beams of the sensor.
     pub fn pattern(&self) -> &BeamPattern {
         self.request.pattern
     }
 
-    /// Where the sensor stands.
     pub fn pose(&self) -> &Pose {
         &self.request.pose
     }
@@ -114,7 +107,6 @@ impl View<'_> {
         resolve(job, cast, self.pattern(), self.rig.cast_effects)
     }
 
-    /// The scan with the effects of `variant`.
     pub fn scan(&self, variant: Variant, hits: &ObjectHits) -> Result<(Scan, Tally), InvalidValue> {
         assemble(&self.request_of(variant)?, self.rig.cast_effects, from_ref(hits))
     }

@@ -73,7 +73,6 @@ pub fn label_clusters(
     clusters.collect()
 }
 
-/// The mean horizontal distance and the lowest height of the `chosen` points.
 fn range_and_lowest(points: &[[f32; 3]], chosen: &[u32]) -> (f32, f32) {
     let chosen = chosen.iter().map(|&i| points[i as usize]);
     let sum_m: f64 = chosen.clone().map(|[x, y, _]| f64::from(x.hypot(y))).sum();

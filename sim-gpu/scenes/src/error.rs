@@ -1,5 +1,3 @@
-//! The errors of this crate.
-
 use formats::FormatError;
 use sim_gpu::internals::cast_error::CastError;
 use sim_gpu::internals::config::{ConfigError, InvalidValue};

@@ -20,7 +20,6 @@ const MARGIN_M: f64 = 0.15;
 pub(crate) struct Lane {
     /// y of its middle.
     pub(crate) y_m: f64,
-    /// Half its width.
     pub(crate) half_m: f64,
     pub(crate) velocity_m_s: f64,
     /// The entries of the recipe whose objects move in it.

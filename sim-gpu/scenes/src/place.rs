@@ -1,5 +1,3 @@
-//! Draws the places of the objects in a scene.
-
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use edgepuck_shapes::Sampler;
@@ -59,7 +57,6 @@ impl<'a> Placer<'a> {
         Self { stage, ground, s, taken, half_length_m, objects: Vec::new() }
     }
 
-    /// Places the objects of entry number `entry` of the recipe.
     pub(crate) fn place(&mut self, entry: usize) {
         let objects = &self.stage.recipe().object[entry];
         let mut queue = self.draw(entry);
@@ -260,7 +257,6 @@ impl<'a> Placer<'a> {
     }
 }
 
-/// The properties that the objects of one row share.
 struct RowStyle {
     /// The side of the road, 1 or -1.
     side: f64,

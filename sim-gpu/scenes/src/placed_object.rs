@@ -1,5 +1,3 @@
-//! An object and where it stands in a scene.
-
 use glam::{DAffine3, DQuat, DVec3};
 
 /// An object of a scene.

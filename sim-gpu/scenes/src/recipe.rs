@@ -21,8 +21,7 @@ pub struct Recipe {
     /// A description in one line.
     #[serde(default)]
     pub description: String,
-    /// The number of different models of each built-in object. Each placed object is scaled a
-    /// little.
+    /// The number of different models of each built-in object.
     #[serde(default = "variants")]
     pub variants: u32,
     /// The ground.

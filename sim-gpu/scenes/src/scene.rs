@@ -1,5 +1,3 @@
-//! One scene: its ground, its objects and the sensor in it.
-
 use std::f64::consts::TAU;
 
 use edgepuck_shapes::Sampler;

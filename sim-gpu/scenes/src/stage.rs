@@ -112,7 +112,6 @@ impl Stage {
         self.models[entry].len() as u32
     }
 
-    /// Model number `variant` of an entry of the recipe.
     pub(crate) fn model(&self, entry: usize, variant: u32) -> &Model {
         self.models[entry][variant as usize].get_or_init(|| {
             let kind = self.recipe.object[entry].built_in();

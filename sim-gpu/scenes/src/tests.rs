@@ -1,5 +1,3 @@
-//! Tests of whole scenes and drives: drawing, scanning, segmenting.
-
 use std::collections::BTreeMap;
 use std::path::Path;
 

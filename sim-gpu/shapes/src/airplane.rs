@@ -1,5 +1,3 @@
-//! Airplanes: a fuselage, wings, a tail, engines.
-
 mod details;
 mod fuselage;
 mod jet;

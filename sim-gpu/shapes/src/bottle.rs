@@ -1,5 +1,3 @@
-//! Bottles, flasks, jars, jugs and dispensers.
-
 use crate::primitives::{
     Builder, DAffine3, DVec3, Profile, Sampler, Section, Vessel, Wall, block, cylinder, frustum,
     smooth_tube,

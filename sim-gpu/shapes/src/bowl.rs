@@ -1,5 +1,3 @@
-//! Bowls.
-
 use crate::primitives::{Builder, DVec3, Profile, Sampler, Section, Vessel, Wall, smooth, tube};
 
 /// Builds a bowl. Deep bowls have the proportions of cups or vases.

@@ -76,12 +76,10 @@ impl Builder {
         self.placement = outer;
     }
 
-    /// Runs `build` in a frame at `origin`.
     pub fn shifted(&mut self, origin: DVec3, build: impl FnOnce(&mut Self)) {
         self.place(DAffine3::from_translation(origin), build);
     }
 
-    /// Runs `build` in a frame at `origin` that is rotated by `turn`.
     pub fn turned(&mut self, origin: DVec3, turn: DAffine3, build: impl FnOnce(&mut Self)) {
         self.place(DAffine3::from_translation(origin) * turn, build);
     }
@@ -92,7 +90,6 @@ impl Builder {
         self.place(DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0)), build);
     }
 
-    /// Runs `build` twice, the second time mirrored at the plane y = 0.
     pub fn mirrored_y(&mut self, build: impl Fn(&mut Self)) {
         build(self);
         self.place(DAffine3::from_scale(DVec3::new(1.0, -1.0, 1.0)), build);

@@ -1,5 +1,3 @@
-//! Chairs: a seat on a base, with a back and sometimes arms.
-
 mod back;
 mod base;
 
@@ -10,7 +8,6 @@ use crate::primitives::{
 /// The seat of a chair that faces -y. All other parts are fitted to it.
 struct Seat {
     half: DVec2,
-    /// Height of the seat's upper side.
     top_m: f64,
     thick_m: f64,
     shape: Shape,

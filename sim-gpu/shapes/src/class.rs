@@ -1,5 +1,3 @@
-//! The classes of shapes.
-
 use crate::primitives::Makes;
 use crate::{airplane, bottle, bowl, chair, cone, cup, lamp, monitor, table, vase};
 

@@ -1,5 +1,3 @@
-//! Cones: plain ones, traffic cones, party hats, ice-cream cones, funnels.
-
 use std::f64::consts::PI;
 
 use crate::primitives::{

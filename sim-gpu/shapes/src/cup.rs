@@ -1,5 +1,3 @@
-//! Cups, mugs, tumblers, goblets.
-
 use crate::primitives::{
     Builder, DVec2, DVec3, Profile, Sampler, Section, Vessel, Wall, outline, smooth, sweep,
 };

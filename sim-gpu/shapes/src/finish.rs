@@ -27,7 +27,6 @@ pub struct Finish {
     vertices: Vertices,
 }
 
-/// The orientation of the triangles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Winding {
     AsBuilt,

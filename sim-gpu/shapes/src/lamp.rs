@@ -1,5 +1,3 @@
-//! Lamps: for tables, floors, desks and ceilings.
-
 mod shade;
 
 use std::f64::consts::{PI, TAU};

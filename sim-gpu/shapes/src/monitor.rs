@@ -1,5 +1,3 @@
-//! Monitors and televisions.
-
 mod screen;
 
 use crate::primitives::{

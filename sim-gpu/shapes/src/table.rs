@@ -1,5 +1,3 @@
-//! Tables and desks.
-
 mod desk;
 
 use desk::desk;

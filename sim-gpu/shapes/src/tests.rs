@@ -1,6 +1,3 @@
-//! Properties of every class: numbers of triangles, sizes, open surfaces, variety, determinism, and
-//! separability.
-
 mod descriptors;
 mod separability;
 mod soundness;
@@ -10,7 +7,6 @@ use rayon::prelude::*;
 use super::{ShapeClass, generate};
 use sim_gpu::internals::mesh::TriangleMesh;
 
-/// The number of tested shapes of each class.
 const INSTANCES: u32 = 200;
 const SEED: u64 = 11;
 

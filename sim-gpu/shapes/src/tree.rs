@@ -1,5 +1,3 @@
-//! Writes a dataset of shapes in the layout of ModelNet.
-
 use std::fs;
 use std::path::Path;
 

@@ -1,5 +1,3 @@
-//! Vases.
-
 use std::f64::consts::TAU;
 
 use crate::primitives::{

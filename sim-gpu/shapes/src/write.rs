@@ -1,5 +1,3 @@
-//! Writes meshes as OFF and OBJ.
-
 use std::fmt::Write as _;
 use std::path::Path;
 

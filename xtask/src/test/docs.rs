@@ -16,7 +16,6 @@ const MDBOOK: &str = "0.5.4";
 /// Debian's Python, whose PyTorch has 100 MB and needs no GPU; that of PyPI has 5 GB.
 const SYSTEM_PYTHON: &str = "/usr/bin/python3";
 
-/// Starts to build mdBook in the background.
 pub fn build_meanwhile(install: bool) -> Option<anyhow::Result<Meanwhile>> {
     (install && !mdbook().exists()).then(|| {
         let mut build = cargo(&["install", "mdbook", "--version", MDBOOK, "--locked"]);

@@ -9,7 +9,6 @@ use std::process::Command;
 use std::thread::available_parallelism;
 use xtask::workspace::{cargo, root};
 
-/// The targets. Each is a program.
 const TARGETS: [&str; 6] = ["off", "mesh", "clouds", "model", "packets", "live"];
 
 /// The target is named, so that build scripts are compiled without the flags below.
@@ -21,7 +20,6 @@ const COVERAGE: &str = "-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-l
      -Cllvm-args=-sanitizer-coverage-pc-table \
      -Cllvm-args=-sanitizer-coverage-trace-compares -Ccodegen-units=1";
 
-/// Starts to build the targets in the background.
 pub fn build_meanwhile(seconds: u32) -> Option<anyhow::Result<Meanwhile>> {
     let is_known = cfg!(all(target_os = "linux", target_arch = "x86_64"));
     (seconds > 0 && is_known).then(|| {
@@ -63,7 +61,6 @@ fn folder() -> PathBuf {
     root().join("tests/fuzz")
 }
 
-/// Starts fuzzing `target`.
 fn start(target: &str, seconds: u32) -> anyhow::Result<Meanwhile> {
     let folder = folder();
     let mut command = Command::new(folder.join(format!("target/{TRIPLE}/release/{target}")));

@@ -17,7 +17,6 @@ use std::thread::JoinHandle;
 use xtask::venv::{Environment, cache_dir};
 use xtask::workspace::{LAB, executable, output, root};
 
-/// The folder of the scripts.
 const SCRIPTS: &str = "tests/peers";
 
 /// The folder of the module that all scripts share.

@@ -21,7 +21,6 @@ const BUILD: Environment<'_> = Environment {
     size: "about 100 MB",
 };
 
-/// The list of the packages that all tests need.
 const TESTS_NEED: &str = "python/tests/requirements.txt";
 
 /// The systems that a wheel for Linux runs on: all since glibc 2.28.
@@ -33,11 +32,9 @@ const AARCH64: &str = "aarch64-unknown-linux-gnu";
 const NATIVE: &str =
     if cfg!(target_arch = "aarch64") { AARCH64 } else { "x86_64-unknown-linux-gnu" };
 
-/// A wheel of the package.
 pub struct Wheel {
     /// The interpreter that has the packages of [`BUILD`].
     pub tools: PathBuf,
-    /// The wheel's path.
     pub file: PathBuf,
 }
 
@@ -181,7 +178,6 @@ pub fn pytest(python: &Path, folder: &Path) -> Command {
     pytest
 }
 
-/// Runs `pytest` and counts its tests.
 pub fn counts(pytest: &mut Command) -> anyhow::Result<Counts> {
     let done = pytest.output().context("cannot start pytest")?;
     let printed = String::from_utf8_lossy(&done.stdout);

@@ -25,7 +25,6 @@ struct Crate {
     is_library: bool,
 }
 
-/// Runs the checks on every crate.
 pub fn check(summary: &mut Summary) -> anyhow::Result<Counts> {
     let crates = crates()?;
     let unsafe_allowed = quoted_in("CONTRIBUTING.md", "- **`unsafe` blocks**")?;

@@ -30,7 +30,6 @@ const CHECKS: [(&str, &str, Check); 5] = [
 const LIBRARY: [&str; 6] =
     ["--package", "infer-cpu", "--no-default-features", "--lib", "--test", "parity"];
 
-/// Starts to build the binary in the background.
 pub fn build_meanwhile() -> anyhow::Result<Meanwhile> {
     ensure!(standard_library(pi_target::TRIPLE)?.is_dir(), "there is no standard library for it");
     Meanwhile::start("build-pi", &mut nice(Command::new(current_exe()?).arg("build-pi")))

@@ -1,5 +1,3 @@
-//! Runs test programs and counts their tests.
-
 use crate::summary::{Counts, Summary};
 use anyhow::Context;
 use std::fs;

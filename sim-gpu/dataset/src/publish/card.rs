@@ -29,7 +29,6 @@ const SIZES: [(u64, &str); 10] = [
 /// The category of smaller datasets.
 const SMALLEST: &str = "n<1K";
 
-/// The card of a dataset.
 pub fn card(publication: &Publication, facts: &Facts) -> String {
     let mut card = front_matter(publication, facts);
     let mut add = |text: &str| write!(card, "{text}\n\n").expect("invariant: a string takes all");

@@ -13,7 +13,6 @@ use serde_json::{Map, Value, json};
 /// The vocabulary of Croissant that is used here, as its specification maps it.
 const CONTEXT: &str = include_str!("context.json");
 
-/// The metadata of a dataset.
 pub fn metadata(publication: &Publication, facts: &Facts) -> Value {
     let context: Value = serde_json::from_str(CONTEXT).expect("invariant: the context is JSON");
     let (manifest, sha256) = &facts.manifest;

@@ -146,7 +146,6 @@ pub(super) fn write_root(out: &Path, own: &PartManifest) -> Result<(), DatasetEr
     Ok(())
 }
 
-/// The name of the list of parts.
 const ROOT_FILE: &str = "dataset.json";
 
 /// The path of the list of parts.

@@ -1,5 +1,3 @@
-//! The order of the clouds of a split.
-
 use crate::on_demand::Clouds;
 use formats::Split;
 use formats::rng::StreamKey;

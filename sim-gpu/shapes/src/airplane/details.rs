@@ -1,5 +1,3 @@
-//! Engines, propellers, canopies, struts, wheels.
-
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::fuselage::Fuselage;

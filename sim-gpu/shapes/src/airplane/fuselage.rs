@@ -1,5 +1,3 @@
-//! An airplane's body.
-
 use crate::primitives::{Builder, DVec2, DVec3, loft, outline};
 
 /// A body from its nose at y = -length / 2 to its tail at y = length / 2.

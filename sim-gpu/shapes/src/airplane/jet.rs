@@ -1,5 +1,3 @@
-//! Fighters.
-
 use super::details;
 use super::fuselage::Fuselage;
 use super::wing::{Wing, fin};

@@ -1,5 +1,3 @@
-//! Wings, stabilizers, fins.
-
 use crate::primitives::{Builder, DAffine3, DVec3, cap, outline, skin};
 
 /// A pair of wings. Slopes are per metre of span.
@@ -7,9 +5,7 @@ use crate::primitives::{Builder, DAffine3, DVec3, cap, outline, skin};
 pub struct Wing {
     /// The leading edge at the plane of symmetry.
     pub root: DVec3,
-    /// From the plane of symmetry to the tip.
     pub half_span_m: f64,
-    /// Chord at the plane of symmetry.
     pub root_chord_m: f64,
     /// Chord at the tip over that at the root.
     pub taper: f64,

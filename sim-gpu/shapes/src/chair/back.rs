@@ -1,5 +1,3 @@
-//! A chair's back.
-
 use std::f64::consts::{PI, TAU};
 
 use super::Seat;
@@ -16,13 +14,11 @@ struct Back {
     high_m: f64,
 }
 
-/// The makes, some of them more frequent.
 const MAKES: [fn(&mut Builder, &mut Sampler, Back); 13] = [
     panel, panel, padded, shell, shell, slats, slats, ladder, ladder, railed, hooped, medallion,
     headrest,
 ];
 
-/// Adds a back that leans to the rear.
 pub fn build(b: &mut Builder, s: &mut Sampler, seat: &Seat) {
     let low = s.chance(0.15);
     let high_m = if low { s.uniform(0.16, 0.3) } else { s.uniform(0.34, 0.68) };

@@ -1,5 +1,3 @@
-//! The base of a chair.
-
 use super::Seat;
 use crate::primitives::{Builder, DVec2, DVec3, Sampler, outline, smooth, sweep, tube};
 use crate::supports::{

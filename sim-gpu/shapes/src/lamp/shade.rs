@@ -1,5 +1,3 @@
-//! Lamp shades.
-
 use crate::primitives::{Builder, DVec3, Profile, Sampler, Section, Vessel, Wall, ellipsoid, rod};
 
 /// A shade below `top_m`, `high_m` high and `radius_m` wide at its lower edge, with the bulb

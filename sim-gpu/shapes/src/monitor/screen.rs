@@ -11,7 +11,6 @@ pub struct Screen {
     housing: Housing,
 }
 
-/// Builds the housing of a screen of this size.
 type Housing = fn(&mut Builder, &mut Sampler, DVec3);
 
 impl Screen {

@@ -1,5 +1,3 @@
-//! Passenger cars, vans and pick-ups.
-
 mod body;
 mod cabin;
 mod extras;

@@ -1,5 +1,3 @@
-//! Furniture at real size.
-
 pub mod cabinet;
 pub mod door;
 pub mod shelf;

@@ -1,5 +1,3 @@
-//! Lorries, buses and coaches.
-
 pub mod bus;
 mod cab;
 mod cargo;

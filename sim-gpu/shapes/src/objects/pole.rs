@@ -1,5 +1,3 @@
-//! Poles, lamp posts, traffic signs and traffic lights.
-
 pub mod lamp_post;
 pub mod traffic_light;
 pub mod traffic_sign;
@@ -20,7 +18,6 @@ fn shaft(b: &mut Builder, radii_m: [f64; 2], height_m: f64, section: Section) {
         .revolve(b, section);
 }
 
-/// Draws the section of a pole: round, square or eight-sided.
 fn draw_section(s: &mut Sampler) -> Section {
     s.weighted(&[(5, Section::Round), (2, Section::Polygon(4)), (1, Section::Polygon(8))])
 }

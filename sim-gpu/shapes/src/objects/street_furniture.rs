@@ -1,5 +1,3 @@
-//! Objects on pavements and in yards.
-
 pub mod bench;
 pub mod bin;
 pub mod clutter;

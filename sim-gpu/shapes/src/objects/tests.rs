@@ -1,6 +1,3 @@
-//! Properties of every kind of object: valid meshes of real size on the ground, determinism,
-//! variety.
-
 use std::collections::BTreeSet;
 
 use glam::DVec3;

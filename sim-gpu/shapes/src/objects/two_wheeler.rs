@@ -25,7 +25,6 @@ pub fn bicycle(b: &mut Builder, s: &mut Sampler) {
     leaning(b, s.uniform(-12.0, 12.0), |b| bicycle.build(b, s));
 }
 
-/// Builds a bicycle with its rider.
 pub fn cyclist(b: &mut Builder, s: &mut Sampler) {
     let bicycle = Bicycle::draw(s);
     leaning(b, s.uniform(-4.0, 4.0), |b| {
@@ -40,7 +39,6 @@ pub fn motorcycle(b: &mut Builder, s: &mut Sampler) {
     leaning(b, s.uniform(-12.0, 12.0), |b| motorcycle.build(b, s));
 }
 
-/// Builds a motorcycle or a scooter with its rider.
 pub fn motorcyclist(b: &mut Builder, s: &mut Sampler) {
     let motorcycle = Motorcycle::draw(s);
     leaning(b, s.uniform(-6.0, 6.0), |b| {

@@ -1,5 +1,3 @@
-//! Boxes, sharp or with rounded edges.
-
 use std::f64::consts::FRAC_PI_2;
 
 use glam::{DVec2, DVec3};
@@ -16,7 +14,6 @@ pub fn block(b: &mut Builder, centre: DVec3, size: DVec3) {
     }
 }
 
-/// The box between two opposite corners.
 pub fn block_between(b: &mut Builder, low: DVec3, high: DVec3) {
     block(b, (low + high) / 2.0, (high - low).abs());
 }

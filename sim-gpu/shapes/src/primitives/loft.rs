@@ -1,5 +1,3 @@
-//! Surfaces through cross-sections.
-
 use glam::{DVec2, DVec3};
 
 use super::{Builder, outline};

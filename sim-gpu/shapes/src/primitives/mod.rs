@@ -24,7 +24,6 @@ pub use spline::smooth;
 pub use sweep::{bar, rod, smooth_tube, sweep, tube};
 pub use vessel::{Vessel, Wall};
 
-/// A function that builds one shape or object.
 pub type Make = fn(&mut Builder, &mut Sampler);
 
 /// The makes of a class or kind, with their weights.

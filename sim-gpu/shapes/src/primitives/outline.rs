@@ -4,7 +4,6 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use glam::{DVec2, DVec3};
 
-/// An ellipse with `n` corners.
 pub fn ellipse(half: DVec2, n: usize) -> Vec<DVec2> {
     superellipse(half, 2.0, n)
 }
@@ -64,7 +63,6 @@ pub fn upright(x: f64, half_y: f64, [low, high]: [f64; 2]) -> Vec<DVec3> {
         .to_vec()
 }
 
-/// The outline in the plane z = `z`.
 pub fn at_height(outline: &[DVec2], z: f64) -> Vec<DVec3> {
     outline.iter().map(|p| p.extend(z)).collect()
 }

@@ -20,12 +20,10 @@ enum Span {
 }
 
 impl Profile {
-    /// A profile that begins at (`radius_m`, `height_m`).
     pub fn from(radius_m: f64, height_m: f64) -> Self {
         Self { corners: vec![DVec2::new(radius_m, height_m)], spans: Vec::new() }
     }
 
-    /// Continues with a straight line to (`radius_m`, `height_m`).
     pub fn line(mut self, radius_m: f64, height_m: f64) -> Self {
         self.corners.push(DVec2::new(radius_m, height_m));
         self.spans.push(Span::Line(DVec2::new(radius_m, height_m)));

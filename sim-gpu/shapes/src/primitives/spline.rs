@@ -1,5 +1,3 @@
-//! Smooth curves through given points.
-
 use glam::DVec3;
 
 use super::Builder;

@@ -1,5 +1,3 @@
-//! Compares primitives with formulas for volumes and areas.
-
 use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3};

@@ -1,5 +1,3 @@
-//! Desks with drawers.
-
 use super::Top;
 use crate::primitives::{Builder, DVec3, Sampler, block, block_between};
 

@@ -1,5 +1,3 @@
-//! Finite numbers, plausible sizes, open surfaces, connected parts.
-
 use glam::{DVec3, IVec3};
 use rayon::prelude::*;
 

@@ -12,17 +12,13 @@ pub type Name = Vec<String>;
 /// A path of Rust, such as `crate::mesh::Mesh`.
 pub type Words = Vec<String>;
 
-/// The modules of a crate.
 pub type Modules = BTreeMap<Name, Module>;
 
 /// What the source of a module contains, apart from tests.
 #[derive(Default)]
 pub struct Module {
-    /// Its file.
     pub file: PathBuf,
-    /// The modules in it.
     pub children: BTreeSet<String>,
-    /// The items that it defines.
     pub items: BTreeSet<String>,
     /// The names that `use` brings into it.
     pub imports: BTreeMap<String, Import>,
@@ -34,7 +30,6 @@ pub struct Module {
 
 /// A name that `use` brings into a module.
 pub struct Import {
-    /// The path of the item.
     pub path: Words,
     /// Whether other modules can import the name from here.
     pub is_public: bool,

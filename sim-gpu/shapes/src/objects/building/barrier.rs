@@ -1,5 +1,3 @@
-//! Barriers beside and on roads.
-
 use crate::primitives::{
     Builder, DVec2, DVec3, Makes, Sampler, block, cylinder, loft, outline, rod, skin,
 };

@@ -1,5 +1,3 @@
-//! Fences of boards, bars or wire between posts.
-
 use crate::primitives::{Builder, DVec3, Sampler, block, rod};
 
 /// A stretch of fence along y about the origin.

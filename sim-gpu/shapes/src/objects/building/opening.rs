@@ -45,7 +45,6 @@ pub struct Opening {
     pub hole: Rect,
     /// The distance of the filling behind the face of the wall.
     pub recess_m: f64,
-    /// The width of the frame around the filling.
     pub frame_m: f64,
     pub filling: Filling,
 }

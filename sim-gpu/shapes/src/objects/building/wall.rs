@@ -1,5 +1,3 @@
-//! Free-standing walls.
-
 use crate::objects::plant::uneven::{Ripple, warped_box};
 use crate::primitives::{Builder, DAffine3, DVec3, Sampler, block};
 

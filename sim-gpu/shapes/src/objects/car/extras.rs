@@ -1,5 +1,3 @@
-//! Parts that stand out from a car: mirrors, roof rails and boxes, racks, spare wheels.
-
 use super::body::Body;
 use super::form::{Form, Style};
 use super::wheel;

@@ -1,5 +1,3 @@
-//! Cabinets with doors or drawers.
-
 use crate::primitives::{Builder, DVec2, DVec3, Sampler, block};
 
 /// The usual sizes of cabinets: ranges of depth, width and height, metres (Neufert's Architects'

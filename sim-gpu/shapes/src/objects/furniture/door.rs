@@ -1,5 +1,3 @@
-//! Doors in their frames.
-
 use crate::primitives::{Builder, DAffine3, DVec3, Sampler, block, block_between, rod};
 
 /// Builds a door that faces +x, shut or ajar, with one or two leaves of 0.735 to 0.985 m by 1.985

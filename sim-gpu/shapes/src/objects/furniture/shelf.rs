@@ -1,5 +1,3 @@
-//! Shelves with and without books.
-
 use crate::primitives::{Builder, DVec3, Sampler, block, block_between};
 
 /// The measures of a shelf that is open to +x, with its width along y.

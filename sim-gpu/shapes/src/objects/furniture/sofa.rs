@@ -1,5 +1,3 @@
-//! Sofas and armchairs.
-
 use crate::primitives::{Builder, DVec3, Sampler, block_between, cushion, cylinder};
 
 /// Builds a sofa that faces +x: one to four seats of 0.62 to 0.75 m width at 0.38 to 0.48 m height,

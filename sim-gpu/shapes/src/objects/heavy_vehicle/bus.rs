@@ -1,5 +1,3 @@
-//! City buses, articulated buses, coaches and minibuses.
-
 use std::ops::Range;
 
 use super::shell::Shell;

@@ -1,5 +1,3 @@
-//! The cabs of lorries.
-
 use super::shell::Shell;
 use crate::objects::car::panel::Arch;
 use crate::primitives::{Builder, DVec3, Sampler, block, block_between, loft, outline};

@@ -1,5 +1,3 @@
-//! Lorries: rigid ones, tractors with semi-trailers, and delivery trucks.
-
 use super::cab::Cab;
 use super::cargo::{Cargo, Space};
 use crate::objects::car::wheel;

@@ -103,7 +103,6 @@ impl Measures {
         ellipsoid(b, middle, half_m * DVec3::new(0.86, 0.69, 1.0));
     }
 
-    /// A leg from the hip joint to the toes.
     pub fn leg(&self, b: &mut Builder, hip: DVec3, leg: Leg) {
         let h = self.stature_m * (0.5 + 0.5 * self.girth);
         let cloth_m = self.cloth_m[2];

@@ -1,5 +1,3 @@
-//! Things that persons carry and push.
-
 use super::body::Measures;
 use super::pose::Pose;
 use crate::objects::car::wheel;

@@ -1,5 +1,3 @@
-//! Coats, skirts, hair, hats and hoods.
-
 use super::body::{Leg, Measures};
 use super::pose::Pose;
 use crate::primitives::{Builder, DVec2, DVec3, Sampler, ellipsoid, frustum, outline, skin};

@@ -1,5 +1,3 @@
-//! Bushes: loose ones, cut balls and domes, grasses.
-
 use std::f64::consts::TAU;
 
 use super::foliage::{Clump, blade, fill, leaf, leaf_length_m};

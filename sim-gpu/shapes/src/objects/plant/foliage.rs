@@ -1,5 +1,3 @@
-//! Leaves, needles and twigs.
-
 use std::f64::consts::PI;
 
 use super::uneven::direction;

@@ -1,5 +1,3 @@
-//! Hedges: trimmed to a box, dense or loose, with or without gaps.
-
 use super::foliage::{blade, leaf, leaf_length_m};
 use super::uneven::{BoxFace, Ripple, warped_box};
 use crate::primitives::{Builder, DVec3, Sampler};

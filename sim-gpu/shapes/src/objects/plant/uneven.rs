@@ -105,7 +105,6 @@ impl BoxFace {
     pub const SEEN: [Self; 5] =
         [Self::End(1.0), Self::End(-1.0), Self::Side(1.0), Self::Side(-1.0), Self::Top];
 
-    /// The face's width and height on a box of `size_m`.
     pub fn size_m(self, size_m: DVec3) -> [f64; 2] {
         match self {
             Self::End(_) => [size_m.y, size_m.z],

@@ -1,5 +1,3 @@
-//! Stems and branches.
-
 use std::f64::consts::TAU;
 
 use super::foliage::blade;
@@ -86,7 +84,6 @@ pub struct Branch {
     pub from: DVec3,
     /// Its direction times its length.
     pub along: DVec3,
-    /// Its radius where it begins.
     pub radius_m: f64,
 }
 

@@ -1,5 +1,3 @@
-//! Bins for litter and waste.
-
 use crate::primitives::{
     Builder, DAffine3, DVec2, DVec3, Makes, Profile, Sampler, Section, Vessel, Wall, block,
     cylinder, ellipsoid, loft, outline, prism, rod,

@@ -1,5 +1,3 @@
-//! Traffic cones.
-
 use crate::primitives::{Builder, DVec2, Profile, Sampler, Section, outline, prism};
 
 /// Builds a traffic cone: 0.3, 0.5, 0.75 or 1 m high (EN 13422) or 0.45, 0.7 or 0.9 m (MUTCD: 18,

@@ -1,5 +1,3 @@
-//! Bicycles: city, touring, mountain, racing and children's.
-
 use super::Contacts;
 use super::parts::{Filling, handlebar, mudguard, wheel};
 use crate::primitives::{Builder, DVec3, Sampler, block, cushion, ellipsoid, rod, tube};

@@ -1,5 +1,3 @@
-//! Motorcycles (naked, sports, touring, cruisers) and scooters.
-
 use super::Contacts;
 use super::parts::{Filling, handlebar, mudguard, wheel};
 use crate::primitives::{

@@ -1,5 +1,3 @@
-//! Wheels, bars and bags of two-wheelers.
-
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use crate::primitives::{Builder, DAffine3, DVec2, DVec3, Profile, Section, smooth_tube};

@@ -1,5 +1,3 @@
-//! Riders of bicycles and motorcycles.
-
 use super::Contacts;
 use crate::objects::person::body::{Leg, Measures, bent};
 use crate::primitives::{Builder, DAffine3, DVec3, Sampler, cushion, ellipsoid};
