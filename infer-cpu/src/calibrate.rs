@@ -17,7 +17,6 @@ use crate::precision::F32;
 use crate::source::ModelSource;
 use crate::team::Team;
 
-/// Points of a calibration shape.
 const SHAPE_POINTS: usize = 512;
 /// Shapes of each kind.
 const SHAPES: u32 = 12;
@@ -84,7 +83,6 @@ pub fn on_shapes(path: &Path) -> Result<BTreeMap<String, f32>, Error> {
     on_shapes_of(&ModelSource::File(path.to_path_buf()))
 }
 
-/// [`on_shapes`] for a model from any source.
 pub fn on_shapes_of(model: &ModelSource) -> Result<BTreeMap<String, f32>, Error> {
     let clouds: Vec<_> = (0..4 * SHAPES).map(shape).collect();
     on_clouds_of(model, clouds.iter().map(Vec::as_slice))

@@ -41,7 +41,6 @@ pub fn choose(points: &[[f64; 3]], spec: &SamplerSpec) -> Result<Vec<u32>, Error
     Ok(Sampler::new(spec)?.select(&normalized, kernel::fastest())?.to_vec())
 }
 
-/// Checks that all coordinates are finite.
 pub fn check_finite(points: &[[f64; 3]]) -> Result<(), Error> {
     match points.iter().position(|point| !point.iter().all(|x| x.is_finite())) {
         Some(index) => Err(Error::NotFinite { index, point: points[index] }),

@@ -1,5 +1,3 @@
-//! The classifier: from a cloud to a class.
-
 use std::path::Path;
 use std::sync::Arc;
 
@@ -42,7 +40,6 @@ pub struct Classifier {
     /// Height of the ground under the current cloud, if known.
     ground_z: Option<f64>,
     normalized: Vec<[f32; 3]>,
-    /// Drops outliers before sampling, if enabled.
     outliers: Option<OutlierFilter>,
     /// Indices of the points that [`Classifier::sample`] has chosen.
     sampled: Vec<u32>,
@@ -94,7 +91,6 @@ impl Classifier {
         Self::around(network, kernels, selection, source, card, options)
     }
 
-    /// A classifier around a network.
     fn around(
         network: Box<dyn Forward>,
         kernels: &'static Kernels,
@@ -140,12 +136,10 @@ impl Classifier {
         Self::around(network, self.kernels, self.selection.twin()?, source, card, &options)
     }
 
-    /// The options of the classifier.
     pub(crate) fn options(&self) -> &Options {
         &self.options
     }
 
-    /// An empty prediction, with room for all logits.
     pub(crate) fn no_prediction(&self) -> Prediction {
         Prediction::empty(&self.classes, self.card.temperature, self.options.precision)
     }

@@ -20,7 +20,6 @@ pub struct ClassifierTeam {
     team: Team<Clouds>,
 }
 
-/// The clouds of a batch, the classifiers and the predictions.
 struct Clouds {
     clouds: Vec<RwLock<Cloud>>,
     /// One for each thread.
@@ -34,7 +33,6 @@ struct Cloud {
     ground_z: Option<f32>,
 }
 
-/// The result for a cloud.
 struct Answer {
     prediction: Prediction,
     error: Option<Error>,

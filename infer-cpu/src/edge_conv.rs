@@ -26,7 +26,6 @@ const TILE: usize = 64;
 /// multiples of it.
 const LANES: usize = 32;
 
-/// A vector of channels.
 type Lanes = [f32; LANES];
 
 /// The layers of all radii.
@@ -65,14 +64,12 @@ pub struct EdgeScratch {
 }
 
 impl Neighborhood {
-    /// Allocates memory for `n` points.
     pub fn reserve(&mut self, n: usize) {
         for axis in &mut self.axes {
             axis.reserve(n.next_multiple_of(TILE).saturating_sub(axis.len()));
         }
     }
 
-    /// Replaces the points.
     pub fn set(&mut self, points: &[[f32; 3]]) {
         for (k, axis) in self.axes.iter_mut().enumerate() {
             axis.clear();
@@ -112,12 +109,10 @@ impl EdgeConv {
         edges
     }
 
-    /// Whether there are no layers.
     pub fn is_empty(&self) -> bool {
         self.layers.is_empty()
     }
 
-    /// Memory for blocks of up to `n` points.
     pub fn scratch(&self, n: usize) -> EdgeScratch {
         EdgeScratch {
             products: vec![[[0.0; LANES]; TILE]; self.bias.len()],

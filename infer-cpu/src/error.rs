@@ -1,5 +1,3 @@
-//! Errors of loading a model and classifying a cloud.
-
 use formats::FormatError;
 
 use crate::kernel::KernelName;
@@ -83,7 +81,6 @@ pub enum Error {
     },
 }
 
-/// The kernels that this machine runs.
 fn names_here() -> String {
     let names: Vec<&str> = crate::kernel::available().map(|kernels| kernels.name.name()).collect();
     names.join(", ")

@@ -16,11 +16,8 @@ use crate::precision::{F16, F32, F32Fc16, Format, I8, Precision};
 use crate::source::ModelSource;
 use crate::team::Team;
 
-/// A loaded model.
 pub struct Loaded {
-    /// Its metadata.
     pub card: ModelCard,
-    /// Its network.
     pub network: Box<dyn Forward>,
     /// The optional parts that it has.
     pub parts: Parts,

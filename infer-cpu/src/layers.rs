@@ -28,7 +28,6 @@ pub enum Conv<T: Format> {
 
 /// A layer that takes coordinates.
 pub struct First {
-    /// Its weights.
     pub panels: Panels<f32>,
     /// Its weights before packing, which are multiplied by the input transform.
     pub dense: Dense,
@@ -40,9 +39,7 @@ pub struct First {
 
 /// A layer that takes features.
 pub struct Packed<T: Format> {
-    /// The layer's name.
     pub name: String,
-    /// Its weights.
     pub panels: Panels<T::Weight>,
     /// The prefilter of its pooling, if that is faster.
     pub prefilter: Option<Int8Prefilter>,
@@ -74,7 +71,6 @@ impl Largest {
 
 /// A layer after a pooling.
 pub struct Vector<T: Format> {
-    /// Its weights.
     pub columns: Panels<T::Stored>,
     /// Whether negative outputs become 0.
     pub relu: bool,

@@ -39,16 +39,12 @@ pub struct Network<C, F> {
 /// The optional parts of a network that decide what a Critical Points Layer can pool.
 #[derive(Clone, Copy, Debug)]
 pub struct Parts {
-    /// Whether it has a T-Net of coordinates.
     pub stn: bool,
-    /// Whether it has a T-Net of features.
     pub fstn: bool,
-    /// Whether it has a front end of its own.
     pub front: bool,
 }
 
 impl<C, F> Network<C, F> {
-    /// The optional parts that it has.
     pub(crate) fn parts(&self) -> Parts {
         let Self { stn, fstn, front, .. } = self;
         Parts { stn: stn.is_some(), fstn: fstn.is_some(), front: front.is_some() }
@@ -180,7 +176,6 @@ impl<C, F> Reader<'_, C, F> {
         Ok(TNet { k: inputs, convs, fcs })
     }
 
-    /// The EdgeConv layers, each with its radius.
     fn edges(&mut self, card: &ModelCard) -> Result<Vec<(f32, Dense)>, FormatError> {
         let (n, radii) = (self.count("edge.conv"), &card.edge_radii);
         if radii.len() != n {

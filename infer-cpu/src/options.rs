@@ -1,5 +1,3 @@
-//! The options of a classifier.
-
 use std::collections::BTreeMap;
 
 use formats::model_card::Normalization;
@@ -112,7 +110,6 @@ pub struct Options {
 /// The largest capacity.
 pub const MOST_POINTS: usize = 1 << 28;
 
-/// The largest number of threads.
 pub const MOST_THREADS: usize = 1024;
 
 impl Default for Options {

@@ -117,7 +117,6 @@ pub trait Format: Send + Sync + 'static {
     type Activation: Copy + Default + Send + Sync;
     /// A weight of a point-wise layer.
     type Weight: Weight;
-    /// A sum of products.
     type Sum: Sum;
     /// A stored weight of a vector layer.
     type Stored: Weight;
@@ -162,13 +161,9 @@ pub trait Format: Send + Sync + 'static {
 
 /// fp32, with weights of vector layers stored as `S`.
 pub struct Single<S>(PhantomData<S>);
-/// [`Precision::F32`].
 pub type F32 = Single<f32>;
-/// [`Precision::F32Fc16`].
 pub type F32Fc16 = Single<f16>;
-/// [`Precision::F16`].
 pub struct F16;
-/// [`Precision::I8`].
 pub struct I8;
 
 impl<S: Weight> Format for Single<S> {

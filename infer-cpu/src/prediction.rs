@@ -1,5 +1,3 @@
-//! The result of a classification.
-
 use std::sync::Arc;
 
 use formats::model_card::ModelCard;
@@ -56,7 +54,6 @@ impl Clone for Prediction {
 }
 
 impl Prediction {
-    /// An empty prediction, with room for a logit of each of `classes`.
     pub(crate) fn empty(classes: &[Arc<str>], temperature: f64, precision: Precision) -> Self {
         Self {
             class: 0,
@@ -108,7 +105,6 @@ pub struct UnknownRule {
 }
 
 impl UnknownRule {
-    /// The rule of `card` for `classes`.
     pub fn new(card: &ModelCard, classes: &[Arc<str>]) -> Self {
         let is_unknown =
             |class: &Arc<str>| card.unknown_classes.iter().any(|name| **name == **class);

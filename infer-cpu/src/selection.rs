@@ -55,7 +55,6 @@ impl Selection {
         Self::new(&self.spec, self.front)
     }
 
-    /// The specification of the sampler.
     pub fn spec(&self) -> &SamplerSpec {
         &self.spec
     }
@@ -71,7 +70,6 @@ impl Selection {
         self.pooled_stn
     }
 
-    /// Changes the seed of random draws.
     pub fn set_seed(&mut self, seed: u64) {
         self.spec.seed = seed;
         self.sampler.set_seed(seed);
@@ -127,7 +125,6 @@ impl Selection {
         self.spec.resize.apply(rows, scores, self.spec.points, &mut self.rows);
     }
 
-    /// Allocates memory for clouds of `n` points.
     pub fn reserve(
         &mut self,
         n: usize,

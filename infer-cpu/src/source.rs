@@ -1,5 +1,3 @@
-//! Sources of models.
-
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -13,22 +11,18 @@ use formats::weights::WeightsFile;
 pub enum ModelSource {
     /// A file, which is read when the model is loaded.
     File(PathBuf),
-    /// The bytes of a model file.
     Memory {
         /// Its name in errors.
         name: PathBuf,
-        /// The bytes.
         bytes: Arc<[u8]>,
     },
 }
 
 impl ModelSource {
-    /// A model in memory.
     pub fn from_bytes(bytes: &[u8]) -> Self {
         Self::Memory { name: PathBuf::from("model in memory"), bytes: bytes.into() }
     }
 
-    /// Reads a file into memory.
     pub fn into_memory(self) -> Result<Self, FormatError> {
         match self {
             Self::File(name) => {

@@ -84,7 +84,6 @@ struct TaskQueue {
     ticket: AtomicU64,
     /// The number of finished chunks of the current task.
     done: AtomicU32,
-    /// The number of workers that have started.
     started: AtomicU32,
     /// Which workers sleep.
     parked: Vec<AtomicBool>,

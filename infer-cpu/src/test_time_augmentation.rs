@@ -35,19 +35,16 @@ impl TestTimeAugmentation {
         })
     }
 
-    /// The number of votes.
     pub fn n(&self) -> u32 {
         self.n
     }
 
-    /// Allocates memory for clouds of `n_points`.
     pub fn reserve(&mut self, n_points: usize) {
         if self.n > 1 {
             self.cloud.reserve(n_points);
         }
     }
 
-    /// Begins a new `cloud`.
     pub fn begin(&mut self, cloud: &[[f32; 3]]) {
         self.cloud.clear();
         self.cloud.extend(cloud);
@@ -82,7 +79,6 @@ impl TestTimeAugmentation {
         }
     }
 
-    /// Adds the log-probabilities of `logits`.
     pub fn count(&mut self, logits: &[f32]) {
         let largest = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
         let shifted = |logit: f32| f64::from(logit) - f64::from(largest);

@@ -115,7 +115,6 @@ fn a_team_answers_as_a_classifier_does_for_each_cloud() {
     }
 }
 
-/// A model whose card enables the outlier filter.
 fn filtering_model(folder: &std::path::Path) -> std::path::PathBuf {
     let card = ModelCard {
         outlier_filter: true,
@@ -126,7 +125,6 @@ fn filtering_model(folder: &std::path::Path) -> std::path::PathBuf {
     model(folder, &card)
 }
 
-/// [`cloud`] after a stray.
 fn cloud_with_stray() -> Vec<[f32; 3]> {
     [vec![[90.0, -40.0, 30.0]], cloud()].concat()
 }

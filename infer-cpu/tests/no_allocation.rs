@@ -39,7 +39,6 @@ fn clouds() -> Vec<Vec<[f32; 3]>> {
     distinct.chain(repeated).chain(equal).chain([stray]).collect()
 }
 
-/// The number of allocations of `n` classifications.
 fn allocations(model: &Path, options: &Options, clouds: &[Vec<[f32; 3]>], n: usize) -> usize {
     let mut classifier = Classifier::load(model, options).unwrap();
     let mut total = 0.0;

@@ -17,7 +17,6 @@ fn channels_first(tensor: &Tensor) -> Vec<[f32; 3]> {
     (0..n).map(|i| [0, 1, 2].map(|axis| tensor.values[axis * n + i])).collect()
 }
 
-/// The numbers of points of the golden clouds.
 const SIZES: [usize; 4] = [16, 64, 128, 1024];
 
 /// The largest errors of log-probabilities against PyTorch's, for golden clouds of up to `largest`

@@ -1,5 +1,3 @@
-//! The classifier for C.
-
 use std::ffi::{CString, c_char};
 use std::path::Path;
 use std::ptr::null;

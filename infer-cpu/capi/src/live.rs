@@ -1,5 +1,3 @@
-//! The pipeline from packets to objects for C.
-
 use std::collections::VecDeque;
 use std::ffi::{CString, c_char};
 use std::ptr::null;

@@ -1,5 +1,3 @@
-//! The options of a classifier for C.
-
 use std::ffi::{CStr, c_char};
 use std::fmt::Display;
 use std::ptr::null;

@@ -1,5 +1,3 @@
-//! The result of a classification for C.
-
 use infer_cpu::{Precision, Prediction};
 
 /// The class of a cloud, and how it was computed.

@@ -1,5 +1,3 @@
-//! The status of a call.
-
 /// The status of a call. edgepuck_last_error returns a message.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,11 +1,9 @@
 //! The definitions of messages, from the packages common_interfaces, geometry2, rcl_interfaces and
 //! vision_msgs (4.x) of ROS 2, without comments.
 
-/// The separator of definitions: 80 times `=`.
 const SEPARATOR: &str =
     "================================================================================";
 
-/// The name and the text of each definition.
 const DEFINITIONS: [(&str, &str); 24] = [
     ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n"),
     ("builtin_interfaces/Duration", "int32 sec\nuint32 nanosec\n"),

@@ -1,5 +1,3 @@
-//! Messages of named, tracked objects.
-
 use serde::Deserialize;
 
 use crate::messages::{

@@ -101,7 +101,6 @@ mod tests {
         .replace('\n', " ")
     }
 
-    /// The topics and lengths of the published messages.
     fn published(input: &[u8]) -> anyhow::Result<Vec<(String, usize)>> {
         let mut all = Vec::new();
         read(input, |message| {

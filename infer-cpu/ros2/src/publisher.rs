@@ -21,7 +21,6 @@ const DEPTH: usize = 10;
 /// The time for the last messages to arrive after the input ends.
 const FAREWELL: Duration = Duration::from_millis(500);
 
-/// A node and its publishers, one per topic.
 pub struct Publisher {
     node: Node,
     topics: BTreeMap<String, ros2_client::Publisher<Body>>,
@@ -42,7 +41,6 @@ impl Serialize for Body {
 }
 
 impl Publisher {
-    /// Creates a node with a name in a domain.
     pub fn new(domain: u16, node: &str) -> anyhow::Result<Self> {
         let name = NodeName::new("/", node).map_err(|_| {
             Usage(format!("--node: expected letters, digits and _, found {node:?}"))

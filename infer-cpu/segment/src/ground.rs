@@ -19,7 +19,6 @@ const NEAR_M: f32 = 20.0;
 /// The range within which the plane is fitted: farther streets may climb.
 const PLANE_M: f32 = 20.0;
 
-/// Scratch memory.
 #[derive(Default)]
 pub struct GroundFinder {
     lowest: Vec<f32>,

@@ -29,7 +29,6 @@ struct Cell {
     height_m: f32,
 }
 
-/// Sums of ground points.
 #[derive(Clone, Copy, Default)]
 struct Sum {
     position: [f32; 3],
@@ -52,14 +51,12 @@ pub struct HeightGrid {
 }
 
 impl HeightGrid {
-    /// Forgets all points and heights.
     pub fn reset(&mut self) {
         self.cells.clear();
         self.sums.clear();
         self.sums.resize(SECTORS * BINS, Sum::default());
     }
 
-    /// Adds a ground point.
     pub fn add(&mut self, sector: usize, range_m: f32, position: [f32; 3]) {
         let sum = &mut self.sums[sector * BINS + bin(range_m)];
         (0..3).for_each(|axis| sum.position[axis] += position[axis]);

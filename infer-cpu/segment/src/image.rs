@@ -21,7 +21,6 @@ pub struct Return {
 
 /// A range image, column by column.
 pub trait Columns {
-    /// The number of columns all around the sensor.
     fn n_columns(&self) -> usize;
     /// The returns of a column from the lowest row up.
     fn column(&self, column: usize) -> &[Return];
@@ -29,11 +28,9 @@ pub trait Columns {
 
 /// A range image, cell by cell.
 pub trait Cells {
-    /// The number of columns all around the sensor.
     fn n_columns(&self) -> usize;
     /// The elevation of each row in radians, ascending.
     fn elevations(&self) -> &[f32];
-    /// The returns of a cell.
     fn cell(&self, column: usize, row: usize) -> &[Return];
 }
 
@@ -240,7 +237,6 @@ impl Cells for RangeImage {
     }
 }
 
-/// The number of columns all around the sensor.
 pub fn n_columns(settings: &Settings) -> usize {
     (360.0 / settings.column_width_deg).round() as usize
 }

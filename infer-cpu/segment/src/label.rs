@@ -1,5 +1,3 @@
-//! The result for one point.
-
 /// The part of the sweep that a point belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Label {

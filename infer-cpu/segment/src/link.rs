@@ -24,9 +24,7 @@ pub const MOST_COLUMNS: usize = 40;
 /// all points in one cell.
 pub const MOST_IN_CELL: usize = 16;
 
-/// Links between points.
 pub trait Links {
-    /// Joins two points, which then belong together.
     fn join(&mut self, a: u32, b: u32);
 }
 

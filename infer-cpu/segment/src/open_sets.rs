@@ -17,11 +17,9 @@ pub struct OpenSets<T> {
     capacity: u32,
     /// The first free slot; each free slot names the next one.
     free: u32,
-    /// The number of points added so far.
     n_points: u64,
 }
 
-/// A point.
 #[derive(Clone, Copy)]
 pub struct Slot<T> {
     pub position: [f32; 3],
@@ -39,7 +37,6 @@ pub struct Slot<T> {
     pub link: u32,
 }
 
-/// A set of linked points.
 #[derive(Clone, Copy, Default)]
 pub struct Set {
     pub extent: Extent,
@@ -61,7 +58,6 @@ impl Set {
 }
 
 impl<T: Copy + Default> OpenSets<T> {
-    /// With room for `capacity` points.
     pub fn new(capacity: u32) -> Self {
         Self {
             slots: Vec::with_capacity(capacity as usize),
@@ -126,12 +122,10 @@ impl<T: Copy + Default> OpenSets<T> {
         }
     }
 
-    /// The set of this root.
     pub fn set(&self, root: u32) -> &Set {
         &self.sets[root as usize]
     }
 
-    /// The points of the set of this root.
     pub fn members(&self, root: u32) -> impl Iterator<Item = u32> {
         let mut next = Some(root);
         std::iter::from_fn(move || {
@@ -149,7 +143,6 @@ impl<T: Copy + Default> OpenSets<T> {
         self.free = point;
     }
 
-    /// Removes the set of this root.
     pub fn remove_set(&mut self, root: u32) {
         let mut here = self.slots[root as usize].next;
         while here != root {

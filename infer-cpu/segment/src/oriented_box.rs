@@ -1,5 +1,3 @@
-//! The oriented bounding box of a cluster.
-
 /// The direction is searched over a quarter turn in steps of three degrees, and then by single
 /// degrees around the best of them.
 const COARSE_DEG: i32 = 3;

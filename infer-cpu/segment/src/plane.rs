@@ -14,7 +14,6 @@ const ROUNDS: usize = 10;
 pub const STEEPEST: f32 = 0.364;
 
 impl Plane {
-    /// The plane `z = z_m`.
     pub fn level(z_m: f32) -> Self {
         Self { base: z_m, slope: [0.0; 2] }
     }
@@ -49,12 +48,10 @@ impl Plane {
         Self { base: base as f32, slope: [x as f32, y as f32] }
     }
 
-    /// The height of a point above the plane.
     pub fn height_m(&self, [x, y, z]: [f32; 3]) -> f32 {
         z - self.z_m(x, y)
     }
 
-    /// The plane's z at `(x, y)`.
     pub fn z_m(&self, x: f32, y: f32) -> f32 {
         self.base + x * self.slope[0] + y * self.slope[1]
     }

@@ -1,5 +1,3 @@
-//! The result of a segmentation.
-
 use crate::height_grid::HeightGrid;
 use crate::label::Label;
 use crate::sets::Sets;
@@ -120,7 +118,6 @@ impl Extent {
         Self { count: 1, low: [x, y], high: [x, y] }
     }
 
-    /// Adds another set.
     pub fn add(&mut self, other: &Self) {
         self.count += other.count;
         for axis in 0..2 {

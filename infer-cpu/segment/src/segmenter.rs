@@ -1,5 +1,3 @@
-//! The segmentation of whole sweeps.
-
 use crate::components::Components;
 use crate::ground::{GroundFinder, sector};
 use crate::image::{Columns, RangeImage};

@@ -1,5 +1,3 @@
-//! Disjoint sets of linked points.
-
 use crate::link::Links;
 
 /// A disjoint-set forest; the root of a set is its first point, in any order of the links.

@@ -1,5 +1,3 @@
-//! The parameters of a segmentation.
-
 /// The most rings: at 2,000 columns, the cells of the range image then take 16 MB.
 pub const MOST_ROWS: usize = 2048;
 

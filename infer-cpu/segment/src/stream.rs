@@ -57,7 +57,6 @@ pub struct Stream<T> {
     /// The first column that may still get returns. Columns are counted as the sensor turns,
     /// clockwise; in images they are numbered the other way round.
     front: Option<u64>,
-    /// The last column that has returns.
     newest: u64,
     /// The first column of the current turn.
     turn_start: u64,
@@ -438,7 +437,6 @@ impl Window {
         self.columns[place as usize % WINDOW].clear();
     }
 
-    /// Adds a return to the newest column, if there is room.
     fn push(&mut self, row: u16, this: Return) -> bool {
         let column = &mut self.columns[self.newest as usize % WINDOW];
         let has_room = column.returns.len() < column.returns.capacity();

@@ -117,7 +117,6 @@ pub struct ClassifyArgs {
     how: SamplerArgs,
 }
 
-/// Classifies the clouds that `args` name, one after the other.
 pub fn run(args: &ClassifyArgs) -> anyhow::Result<Outcome> {
     input::check_names(args.files.iter().map(PathBuf::as_path))?;
     let (model, card) = args.model.open()?;

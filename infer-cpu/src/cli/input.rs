@@ -9,7 +9,6 @@ use formats::cloud_file::{CloudFormat, read_cloud, read_cloud_from};
 
 use super::Usage;
 
-/// The file name that stands for standard input.
 const STANDARD_INPUT: &str = "-";
 
 /// Reads a cloud from a file or from standard input. Without a `format`, the extension of the file
@@ -21,7 +20,6 @@ pub fn read(name: &Path, format: Option<CloudFormat>) -> Result<Vec<[f64; 3]>, F
     read_file(name, format)
 }
 
-/// Reads the cloud in the file at `path`.
 pub fn read_file(path: &Path, format: Option<CloudFormat>) -> Result<Vec<[f64; 3]>, FormatError> {
     if path.is_dir() {
         return Err(FormatError::malformed(

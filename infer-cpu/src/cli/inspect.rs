@@ -30,7 +30,6 @@ pub struct InspectArgs {
     json: bool,
 }
 
-/// Shows the model.
 pub fn run(args: &InspectArgs) -> anyhow::Result<Outcome> {
     let path = model::find(args.model.as_deref())?;
     let summary = infer_cpu::inspect(&path)?;

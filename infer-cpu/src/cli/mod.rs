@@ -1,5 +1,3 @@
-//! The command line.
-
 mod bench;
 mod classify;
 mod input;
@@ -41,7 +39,6 @@ enum Command {
     Bench(Box<bench::BenchArgs>),
 }
 
-/// Runs the command.
 pub fn run(cli: &Cli) -> anyhow::Result<Outcome> {
     match &cli.command {
         Command::Classify(args) => classify::run(args),

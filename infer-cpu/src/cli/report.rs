@@ -8,7 +8,6 @@ use formats::outcome::say;
 use infer_cpu::{Precision, Prediction};
 use serde::Serialize;
 
-/// The format of lines.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Style {
     /// Name, class and confidence, separated by tabs; warnings go to standard error.
@@ -17,7 +16,6 @@ pub enum Style {
     Json,
 }
 
-/// A prediction as a line of JSON.
 #[derive(Serialize)]
 struct Classified<'a> {
     file: &'a str,
@@ -42,7 +40,6 @@ fn is_zero(n: &usize) -> bool {
     *n == 0
 }
 
-/// A failure as a line of JSON.
 #[derive(Serialize)]
 struct Failed<'a> {
     file: &'a str,
@@ -82,7 +79,6 @@ impl Style {
         })
     }
 
-    /// Prints that the cloud `name` failed with `error`.
     pub fn failed(self, name: &Path, error: &str) -> io::Result<()> {
         match self {
             Self::Json => json_line(&Failed { file: &name.to_string_lossy(), error }),

@@ -54,7 +54,6 @@ pub struct SampleArgs {
     output: PathBuf,
 }
 
-/// Writes the chosen points.
 pub fn run(args: &SampleArgs) -> anyhow::Result<Outcome> {
     // An unknown extension fails before a long computation.
     CloudFormat::of_path(&args.output)?;
@@ -80,7 +79,6 @@ pub fn run(args: &SampleArgs) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-/// The indices of the chosen points.
 fn choose(args: &SampleArgs, points: &[[f64; 3]]) -> anyhow::Result<Vec<u32>> {
     let here = || args.input.display().to_string();
     if args.sampler != SamplerKind::Cpl {

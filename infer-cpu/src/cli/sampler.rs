@@ -1,5 +1,3 @@
-//! The flags of samplers.
-
 use infer_cpu::sampler::{FpsStart, FrontChoice, Resize, SamplerKind, SamplerSpec};
 
 use super::Usage;

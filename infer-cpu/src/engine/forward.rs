@@ -44,7 +44,6 @@ pub struct Scratch {
 }
 
 impl Scratch {
-    /// Allocates memory for a pooling of `channels`.
     pub fn reserve(&mut self, channels: usize) {
         self.values.reserve(channels.saturating_sub(self.values.len()));
         self.winners.reserve(channels.saturating_sub(self.winners.len()));
@@ -55,7 +54,6 @@ impl Scratch {
 ///
 /// A run depends on its arguments alone, not on earlier calls.
 pub trait Forward: Send + Sync {
-    /// Allocates memory for clouds of `n` points.
     fn reserve(&self, n: usize);
     /// Runs the whole network; the logits are in `scratch.values` afterwards, and range events are
     /// added to `scratch.events`.
@@ -67,7 +65,6 @@ pub trait Forward: Send + Sync {
     fn channels(&self, pass: Pass) -> usize;
     /// Working memory that is large enough for every run.
     fn scratch(&self) -> Scratch;
-    /// The number of classes.
     fn n_classes(&self) -> usize;
     /// The same network, for one thread and with its own working memory.
     fn twin(&self) -> std::io::Result<Box<dyn Forward>>;

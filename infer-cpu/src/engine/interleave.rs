@@ -4,7 +4,6 @@
 //! a golden section of the cloud, every block is a sample of the whole. The first blocks then come
 //! close to the largest products, which leaves less for the [`crate::prefilter`] to compute.
 
-/// A permutation of the points.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Interleave {
     n: u64,
@@ -12,7 +11,6 @@ pub struct Interleave {
 }
 
 impl Interleave {
-    /// The order for `n` points.
     pub fn new(n: usize) -> Self {
         let n = n as u64;
         // (√5 - 1) / 2: no other ratio leaves rows more evenly spread (Knuth, TAOCP vol. 3, §6.4,
@@ -22,7 +20,6 @@ impl Interleave {
         Self { n, step }
     }
 
-    /// The point in row `row`.
     pub fn point(self, row: usize) -> usize {
         (row as u64 * self.step % self.n.max(1)) as usize
     }

@@ -157,7 +157,6 @@ pub struct RangeEvents {
 }
 
 impl RangeEvents {
-    /// Adds the events of further passes.
     pub fn add(&mut self, further: Self) {
         self.clipped += further.clipped;
         self.overflow |= further.overflow;
@@ -322,7 +321,6 @@ impl Widths {
     }
 }
 
-/// The layers whose outputs are pooled.
 fn pooled_layers<T: Format>(layers: &Layers<T>) -> impl Iterator<Item = &Packed<T>> {
     stacks(layers).filter_map(<[_]>::last).map(Conv::packed)
 }

@@ -12,7 +12,6 @@ fn convs<T: Format>(net: &Option<TNet<Conv<T>, Vector<T>>>) -> &[Conv<T>] {
     net.as_ref().map_or(&[], |net| &net.convs)
 }
 
-/// The layers of a front end, if there is one.
 fn front<T: Format>(layers: &Layers<T>) -> &[Conv<T>] {
     layers.front.as_deref().unwrap_or_default()
 }

@@ -100,7 +100,6 @@ impl<'a, T> Rows<'a, T> {
         Self { data, stride, n }
     }
 
-    /// All elements.
     pub fn data(&self) -> &'a [T] {
         self.data
     }
@@ -110,7 +109,6 @@ impl<'a, T> Rows<'a, T> {
         self.stride
     }
 
-    /// The number of rows.
     pub fn n(&self) -> usize {
         self.n
     }
@@ -201,9 +199,7 @@ pub(crate) struct LevelSums {
 /// A product that a prefilter could not rule out as the largest of its channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Candidate {
-    /// Its row.
     pub row: u16,
-    /// Its channel.
     pub channel: u16,
 }
 
@@ -213,9 +209,7 @@ pub(crate) struct PrefilterKernels {
     pub levels: fn(&[f32], per_unit: f32, out: &mut [u8]) -> LevelSums,
     /// Finds each column's largest value and the first row that has it. No value may be NaN.
     pub peaks: fn(values: &[f32], peaks: &mut [f32], rows: &mut [u32]),
-    /// Finds the values above the floors.
     pub above_floors: AboveFloors,
-    /// Computes the products of candidates.
     pub dots: Dots,
 }
 
@@ -248,7 +242,6 @@ pub(crate) struct Soa<'a> {
 pub struct Kernels {
     /// The instruction set.
     pub name: KernelName,
-    /// fp32.
     pub(crate) f32: Option<Gemm<f32, f32, f32>>,
     /// fp16 activations and weights.
     pub(crate) f16: Option<Gemm<f16, f16, f32>>,
@@ -256,9 +249,7 @@ pub struct Kernels {
     pub(crate) i8: Option<Gemm<u8, i8, i32>>,
     /// Whether int8 products are so much faster than fp32 ones that the prefilter pays.
     pub(crate) prefilters: bool,
-    /// The kernels of the prefilter.
     pub(crate) prefilter: PrefilterKernels,
-    /// fp32 weights.
     pub(crate) gemv_f32: Gemv<f32>,
     /// fp16 weights, fp32 arithmetic.
     pub(crate) gemv_f16: Gemv<f16>,

@@ -74,7 +74,6 @@ impl<W: Copy + Default> Panels<W> {
         Self::zeros(inputs, outputs, (GEMV_NR, 1, 1))
     }
 
-    /// Inputs of the layer.
     pub fn inputs(&self) -> usize {
         self.inputs
     }
@@ -84,7 +83,6 @@ impl<W: Copy + Default> Panels<W> {
         self.padded_inputs
     }
 
-    /// Output channels of the layer.
     pub fn outputs(&self) -> usize {
         self.outputs
     }
@@ -128,12 +126,10 @@ impl<W: Copy + Default> Panels<W> {
         (row * nr + output % nr) * group + input % group
     }
 
-    /// The weight of `input` for `output`.
     pub fn weight(&self, input: usize, output: usize) -> W {
         self.data[self.index(input, output)]
     }
 
-    /// Sets the weight of `input` for `output`.
     pub fn set(&mut self, input: usize, output: usize, weight: W) {
         let at = self.index(input, output);
         self.data[at] = weight;
@@ -148,7 +144,6 @@ impl<W: Copy + Default> Panels<W> {
         }
     }
 
-    /// The number of panels.
     pub fn n_panels(&self) -> usize {
         self.padded_outputs() / self.nr
     }
@@ -158,7 +153,6 @@ impl<W: Copy + Default> Panels<W> {
         self.bias.len()
     }
 
-    /// The weights of one panel.
     pub fn panel(&self, panel: usize) -> &[W] {
         let size = self.padded_inputs * self.nr;
         &self.data[panel * size..][..size]

@@ -173,7 +173,6 @@ impl Bounded for I8 {
     }
 }
 
-/// The reference kernels.
 fn reference() -> &'static Kernels {
     super::scalar::kernels().unwrap()
 }
@@ -238,7 +237,6 @@ impl<T: Bounded> Problem<T> {
         out
     }
 
-    /// The largest products of a range of panels.
     fn maxima(&self, gemm: &Products<T>, panels: Range<usize>) -> Vec<T::Sum> {
         let mut maxima = vec![T::LOWEST; self.weights.channels(&panels).len()];
         (gemm.max)(&self.rows(), &self.weights, panels, &mut maxima);
@@ -246,7 +244,6 @@ impl<T: Bounded> Problem<T> {
     }
 }
 
-/// The matrix products of a format.
 type Products<T> = Gemm<<T as Format>::Activation, <T as Format>::Weight, <T as Format>::Sum>;
 
 fn assert_near(found: f32, exact: f64, bound: f64, place: impl Debug) {
@@ -259,7 +256,6 @@ fn assert_near(found: f32, exact: f64, bound: f64, place: impl Debug) {
     }
 }
 
-/// Checks the matrix products of format `T`.
 pub fn products_are_sound<T: Bounded>(kernels: &Kernels) -> Result<(), String> {
     let gemm = T::gemm(kernels)
         .ok_or_else(|| "this set of kernels leaves these products to another".to_owned())?;
@@ -283,7 +279,6 @@ pub fn products_are_sound<T: Bounded>(kernels: &Kernels) -> Result<(), String> {
 
 type Case = ((usize, usize, usize), Values);
 
-/// Checks that products are exact within the format's bound.
 fn rows_are_near_exact<T: Bounded>(gemm: &Products<T>, problem: &Problem<T>, case: Case) {
     let ((_, inputs, outputs), _) = case;
     let out = problem.products(gemm);
@@ -393,7 +388,6 @@ pub fn gemv_is_near_exact<W: Weight + From<i8>>(gemv: Gemv<W>, unread: W) {
     }
 }
 
-/// Checks that narrowing equals the reference to the bit.
 pub fn narrowing_is_the_reference(kernels: &Kernels) {
     let reference = reference();
     let mut draw = Draw::new("narrow");
@@ -464,7 +458,6 @@ pub fn candidates_are_those_of_the_reference(kernels: &Kernels) {
     }
 }
 
-/// Checks that single products are exact within the bound of fp32.
 pub fn dots_are_near_exact(kernels: &Kernels) {
     let mut draw = Draw::new("dots");
     for &values in F32::VALUES {
@@ -512,7 +505,6 @@ pub fn fps_is_the_reference(kernels: &Kernels) {
     }
 }
 
-/// Checks that EdgeConv features are near the reference.
 pub fn edge_features_are_near_the_reference(kernels: &Kernels) {
     let mut draw = Draw::new("edges");
     let mut dense = |outputs: usize| Dense {
@@ -546,7 +538,6 @@ pub fn edge_features_are_near_the_reference(kernels: &Kernels) {
     assert!(features(kernels).iter().zip(&expected).all(near));
 }
 
-/// Checks that `work` panics with a message that contains `words`.
 pub fn panics_with<T>(words: &str, work: impl FnOnce() -> T) {
     let panic = catch_unwind(AssertUnwindSafe(|| drop(work()))).expect_err("it goes through");
     let message = panic.downcast_ref::<String>().map(String::as_str);

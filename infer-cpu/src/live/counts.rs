@@ -1,5 +1,3 @@
-//! Counters of packets, returns and clusters.
-
 /// Packets, returns and clusters since the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {

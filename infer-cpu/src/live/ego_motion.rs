@@ -1,5 +1,3 @@
-//! The motion of the sensor.
-
 use std::path::Path;
 
 use formats::FormatError;

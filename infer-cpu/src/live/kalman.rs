@@ -1,5 +1,3 @@
-//! A Kalman filter for one axis.
-
 /// A Kalman filter for the position and velocity along one axis, with the constant-velocity model
 /// and random accelerations.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,7 +38,6 @@ impl Axis {
         self.p[0] + sigma.powi(2)
     }
 
-    /// Updates the state with a measurement `place` with noise `sigma`.
     pub fn update(&mut self, place: f64, sigma: f64) {
         let innovation = place - self.place;
         let variance = self.variance(sigma);

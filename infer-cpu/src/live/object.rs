@@ -1,5 +1,3 @@
-//! The result for a cluster.
-
 use std::sync::Arc;
 
 use serde::{Serialize, Serializer};

@@ -22,7 +22,6 @@ pub struct PacketClock {
 #[derive(Clone, Copy, Debug)]
 struct Last {
     stamp_us: f64,
-    /// The duration of the packet.
     duration_us: f64,
     /// When it was sent, in seconds since the start.
     after_s: f64,
@@ -31,14 +30,11 @@ struct Last {
 /// The relation of a packet to the one before.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Succession {
-    /// It is the first packet.
     First,
     /// It follows, after a number of missing packets.
     Follows {
-        /// The number of missing packets in between.
         missing: u64,
     },
-    /// It is the same packet again.
     Duplicate,
     /// It was sent before the last packet.
     Late,

@@ -1,5 +1,3 @@
-//! The pipeline from packets to objects.
-
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::ops::{Range, RangeInclusive};
 use std::sync::Arc;
@@ -155,7 +153,6 @@ struct Cluster {
     turn: u64,
 }
 
-/// Classifies clusters and tracks.
 struct ObjectClassifier {
     team: ClassifierTeam,
     classes: Vec<Arc<str>>,
@@ -390,7 +387,6 @@ impl Pipeline {
 }
 
 impl Sensor {
-    /// The sensor that sent `payload`.
     fn new(payload: &[u8], options: &LiveOptions, start_s: f64) -> Result<Self, Flaw> {
         let mut decoder = Decoder::new(options.ouster.as_ref(), payload)?;
         let facts = decoder.decode(payload, &mut Vec::new())?;
@@ -528,7 +524,6 @@ impl ObjectClassifier {
     }
 }
 
-/// The position of a cluster.
 struct Place {
     frame: &'static str,
     position_m: [f64; 3],

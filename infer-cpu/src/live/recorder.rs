@@ -30,7 +30,6 @@ const FIELDS: [(&str, u32, u8); 6] = [
     ("ring", 16, ros::PointField::UINT16),
     ("time", 18, ros::PointField::FLOAT32),
 ];
-/// The bytes of a point.
 const POINT_BYTES: usize = 22;
 
 /// The most points of a cloud: this bounds the memory if a head stands still and its turn does not
@@ -61,7 +60,6 @@ pub struct Recorder {
     n_turns: u32,
 }
 
-/// The numbers of the channels.
 struct Channels {
     points: u16,
     objects: u16,

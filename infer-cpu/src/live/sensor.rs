@@ -41,7 +41,6 @@ pub enum Decoder {
     Velodyne(velodyne::Decoder),
     /// An OS0, OS1 or OS2.
     Ouster {
-        /// The decoder.
         decoder: Box<ouster::Decoder>,
         /// The yaw of the lidar in the sensor's frame, radians counterclockwise.
         yaw_rad: f64,
@@ -56,7 +55,6 @@ pub enum Decoder {
 /// The header of a packet, for all sensors.
 #[derive(Clone, Copy, Debug)]
 pub struct Facts {
-    /// Its time stamp, microseconds.
     pub stamp_us: f64,
     /// The duration of its firings, microseconds.
     pub duration_us: f64,
@@ -82,7 +80,6 @@ impl Decoder {
         Ok(Self::Ouster { decoder, yaw_rad, n_unsent: unsent.into(), before })
     }
 
-    /// Decodes a packet into `returns`.
     pub fn decode(&mut self, payload: &[u8], returns: &mut Vec<Return>) -> Result<Facts, Flaw> {
         returns.clear();
         match self {
@@ -120,7 +117,6 @@ impl Decoder {
         }
     }
 
-    /// The elevation of each ring, degrees.
     pub fn elevations_deg(&self) -> Vec<f32> {
         let radians = match self {
             Self::Velodyne(decoder) => decoder.elevations_rad(),

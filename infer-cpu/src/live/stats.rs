@@ -1,5 +1,3 @@
-//! Durations of stages, and latencies.
-
 use std::time::Duration;
 
 use hdrhistogram::Histogram;

@@ -38,7 +38,6 @@ const LEAST_WEIGHT: f64 = 0.05;
 /// A cluster for the tracker.
 #[derive(Clone, Copy, Debug)]
 pub struct Observation<'a> {
-    /// The time, seconds.
     pub time_s: f64,
     /// The middle of its box, metres, in a fixed frame.
     pub position_m: [f64; 3],
@@ -52,7 +51,6 @@ pub struct Observation<'a> {
     pub view: Option<(&'a [f64], f64)>,
 }
 
-/// A tracked object.
 #[derive(Clone, Debug, Default)]
 pub struct Track {
     /// Its number, from 1.
@@ -61,7 +59,6 @@ pub struct Track {
     footprint: Footprint,
     /// The time of the last cluster.
     last_s: f64,
-    /// The number of its clusters.
     pub n_seen: u64,
     /// Weighted means of the log-probabilities over all views; empty without a view.
     pub log_probabilities: Vec<f64>,
@@ -198,7 +195,6 @@ impl Track {
 }
 
 impl Tracker {
-    /// A tracker of objects with `n_classes` classes.
     pub fn new(n_classes: usize) -> Self {
         let track =
             || Track { log_probabilities: Vec::with_capacity(n_classes), ..Track::default() };
@@ -206,7 +202,6 @@ impl Tracker {
         Self { tracks, n_used: 0, n_ids: 0, turn_s: 0.1 }
     }
 
-    /// Sets the duration of a turn, seconds.
     pub fn set_turn(&mut self, turn_s: f64) {
         self.turn_s = turn_s.clamp(LEAST_TURN_S, MOST_TURN_S);
     }

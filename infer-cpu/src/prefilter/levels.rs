@@ -21,7 +21,6 @@ pub struct Levels {
 }
 
 impl Levels {
-    /// Memory for `n` activations.
     pub fn with_room(n: usize) -> Self {
         Self { bytes: vec![0; n], ..Self::default() }
     }

@@ -67,7 +67,6 @@ pub struct Int8Prefilter {
 
 /// Channels that are pooled together.
 struct Channels {
-    /// The first channel.
     first: usize,
     panels: Panels<i8>,
     bounds: Vec<Bound>,
@@ -99,7 +98,6 @@ pub struct PrefilterScratch {
 }
 
 impl PrefilterScratch {
-    /// Memory for blocks of this number of rows.
     pub fn new(rows: usize) -> Self {
         let channels = GROUP;
         let most = (channels + 1).max(rows * channels / ONE_IN);

@@ -1,5 +1,3 @@
-//! Specifications of samplers.
-
 use std::path::Path;
 
 use formats::FormatError;

@@ -3,7 +3,6 @@
 use formats::rng::StreamKey;
 use proptest::prelude::*;
 
-/// A cloud in another order.
 pub fn shuffled(cloud: &[[f32; 3]], seed: u32) -> Vec<[f32; 3]> {
     let key = StreamKey::new(0, "shuffled", seed);
     let mut shuffled: Vec<_> = (0..).map(|i| key.unit(i)).zip(cloud.iter().copied()).collect();
@@ -18,7 +17,6 @@ pub fn uniform(n: usize, seed: u32) -> Vec<[f32; 3]> {
     (0..n).map(|i| [0, 1, 2].map(|axis| coordinate(3 * i + axis))).collect()
 }
 
-/// The points at `indices`.
 pub fn gather(cloud: &[[f32; 3]], indices: &[u32]) -> Vec<[f32; 3]> {
     indices.iter().map(|&index| cloud[index as usize]).collect()
 }

@@ -228,7 +228,6 @@ mod tests {
         assert_eq!(by_size(&cloud, 1.0), [1]);
     }
 
-    /// The number of cells of `grid` with points.
     fn n_occupied(points: &[[f32; 3]], grid: &Grid) -> usize {
         let cells = points.iter().map(|point| grid.place(point).map(f64::to_bits));
         cells.collect::<HashSet<_>>().len()

@@ -96,7 +96,6 @@ fn poses_bring_objects_into_the_world() {
     assert_eq!(steady[0]["frame"], "world");
 }
 
-/// A port that is free now.
 pub fn free_port() -> u16 {
     UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
 }

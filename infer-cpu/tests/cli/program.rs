@@ -10,7 +10,6 @@ use tempfile::TempDir;
 
 use crate::tiny_model;
 
-/// A folder to run the program in.
 pub struct Folder {
     folder: TempDir,
 }
@@ -30,17 +29,14 @@ impl Folder {
         folder
     }
 
-    /// The path of `name` in the folder.
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
-    /// Writes a file.
     pub fn write(&self, name: &str, content: impl AsRef<[u8]>) {
         fs::write(self.path(name), content).unwrap();
     }
 
-    /// Writes a cloud as text.
     pub fn cloud(&self, name: &str, points: &[[f64; 3]]) {
         let lines = points.iter().map(|[x, y, z]| format!("{x:e} {y:e} {z:e}\n"));
         self.write(name, lines.collect::<String>());
@@ -54,12 +50,10 @@ impl Folder {
         command
     }
 
-    /// Runs the program to its end.
     pub fn run(&self, line: &str) -> Ran {
         Ran::from_output(self.command(line).output().unwrap())
     }
 
-    /// The same with `input` as standard input.
     pub fn run_with(&self, line: &str, input: &[u8]) -> Ran {
         let mut command = self.command(line);
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
@@ -82,7 +76,6 @@ impl Folder {
     }
 }
 
-/// The result of a program.
 pub struct Ran {
     pub code: i32,
     pub out: String,
@@ -111,7 +104,6 @@ impl Ran {
     }
 }
 
-/// The card of the folder's model.
 pub fn card() -> ModelCard {
     ModelCard { classes: ["a", "b", "c", "d"].map(str::to_owned).to_vec(), ..ModelCard::default() }
 }

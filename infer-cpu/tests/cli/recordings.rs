@@ -32,7 +32,6 @@ fn a_recording_has_a_cloud_and_the_objects_of_each_turn() {
     let folder = folder();
     let ran = folder.run(&format!("{LIVE} --pcap drive.pcap --mcap run.mcap"));
     assert_eq!((ran.code, ran.out.as_str(), ran.err.as_str()), (0, "", ""));
-    // A second.
     let per_turn = ["/points", "/objects", "/objects/markers"].map(|topic| (topic.to_owned(), 10));
     let mut expected = BTreeMap::from(per_turn);
     expected.insert("/tf_static".to_owned(), 1);

@@ -7,9 +7,7 @@ pub const PACKET: usize = 1206;
 /// Firing sequences of a packet, and the time of one.
 const SEQUENCES: usize = 24;
 const SEQUENCE_S: f64 = 55.296e-6;
-/// The time of a packet, seconds.
 pub const PACKET_S: f64 = SEQUENCES as f64 * SEQUENCE_S;
-/// Turns per second.
 const TURNS_PER_S: f64 = 10.0;
 /// Packets of ten turns and a bit.
 pub const PACKETS_PER_S: usize = 754;
@@ -18,7 +16,6 @@ const LASERS_DEG: [f64; 16] =
     [-15.0, 1.0, -13.0, 3.0, -11.0, 5.0, -9.0, 7.0, -7.0, 9.0, -5.0, 11.0, -3.0, 13.0, -1.0, 15.0];
 /// Height of the sensor above the street, metres.
 const HEIGHT_M: f64 = 1.2;
-/// The farthest return, metres.
 const FARTHEST_M: f64 = 60.0;
 
 /// A moving box on the street, metres and metres per second.
@@ -108,7 +105,6 @@ const ROWS_DEG: [[f64; 2]; 16] = {
 /// Columns of its turn and of its packet.
 const COLUMNS: usize = 1024;
 const COLUMNS_PER_PACKET: usize = 16;
-/// Packets of a second.
 pub const OUSTER_PACKETS_PER_S: usize = 640;
 
 /// The metadata of that Ouster, whose lidar faces the sensor's rear.

@@ -31,12 +31,10 @@ pub fn tensors(n_classes: usize) -> BTreeMap<String, Tensor> {
     tensors
 }
 
-/// Multiplies a tensor by `factor`.
 pub fn scale(tensors: &mut BTreeMap<String, Tensor>, name: &str, factor: f32) {
     tensors.get_mut(name).unwrap().values.iter_mut().for_each(|value| *value *= factor);
 }
 
-/// Writes `tensors` to `path` with `card`.
 pub fn write(path: &Path, tensors: &BTreeMap<String, Tensor>, card: &ModelCard) -> PathBuf {
     write_weights(path, tensors, &card.to_metadata()).unwrap();
     path.to_path_buf()

@@ -36,12 +36,10 @@ pub struct Compiler {
 }
 
 impl Compiler {
-    /// A compiler of C, see [`Compiler::find`].
     pub fn c() -> Result<Self, String> {
         Self::find("CC", "cc", "-std=c99")
     }
 
-    /// A compiler of C++, see [`Compiler::find`].
     pub fn c_plus_plus() -> Result<Self, String> {
         Self::find("CXX", "c++", "-std=c++11")
     }
@@ -95,14 +93,12 @@ pub fn library_folder() -> PathBuf {
     test.parent().unwrap().to_path_buf()
 }
 
-/// What to hand a linker to link this library statically.
 pub fn static_link() -> Vec<String> {
     let archive = library_folder().join("libedgepuck.a");
     let system = ["-lpthread", "-ldl", "-lm"].map(str::to_owned);
     [archive.to_str().unwrap().to_owned()].into_iter().chain(system).collect()
 }
 
-/// What to hand a linker to link this library dynamically.
 pub fn dynamic_link() -> Vec<String> {
     let folder = library_folder();
     let folder = folder.to_str().unwrap();

@@ -147,7 +147,6 @@ fn points_of_clusters_are_ascending_and_agree_with_the_labels() {
     });
 }
 
-/// Nothing but a cage: all of its points are one cluster.
 #[test]
 fn a_sweep_may_be_one_cluster() {
     let cage: Vec<_> = (-20..20)

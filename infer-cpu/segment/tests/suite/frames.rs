@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use edgepuck_segment::{Label, Segmentation};
 use formats::labelled_sweep::{LabelledBox, read_labelled_sweep};
 
-/// All archives in `folder`.
 pub fn paths(folder: &Path) -> Vec<PathBuf> {
     let mut paths: Vec<_> = folder.read_dir().unwrap().map(|entry| entry.unwrap().path()).collect();
     paths.sort();
@@ -29,7 +28,6 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// Reads an archive of the developers' data.
     pub fn read(path: &Path) -> Self {
         let name = path.file_stem().unwrap().to_string_lossy().into_owned();
         // The mean of the two sensors over the rear axle (the data set's calibration).
@@ -85,7 +83,6 @@ impl Frame {
     }
 }
 
-/// The horizontal distance of a box from the sensor.
 pub fn range_m(object: &LabelledBox) -> f64 {
     object.centre_m[0].hypot(object.centre_m[1])
 }

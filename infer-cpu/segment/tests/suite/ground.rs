@@ -100,7 +100,6 @@ fn a_sensor_tilted_by_5_degrees_sees_the_same_ground() {
     });
 }
 
-/// A surface above the ground, such as a bridge, is not ground.
 #[test]
 fn a_deck_above_the_street_is_no_ground() {
     let scan = scan(&VLP32C, &[flat(), block([20.0, 0.0], [8.0, 60.0], 4.0, 1.0)]);

@@ -25,7 +25,6 @@ pub fn ground(slope: f64, step: f64, is_there: impl Fn(f64, f64) -> bool + 'stat
     })
 }
 
-/// Flat ground everywhere.
 pub fn flat() -> Surface {
     ground(0.0, 0.0, |_, _| true)
 }
@@ -45,7 +44,6 @@ pub fn block(middle: [f64; 2], size: [f64; 2], above: f64, height: f64) -> Surfa
     })
 }
 
-/// A sweep and the surface of each of its points.
 pub struct Scan {
     pub points: Vec<[f32; 3]>,
     pub rings: Vec<u16>,
@@ -97,7 +95,6 @@ impl Scan {
         labels.iter().filter(|label| is_it(**label)).count() as f64 / labels.len() as f64
     }
 
-    /// The surfaces of each cluster's points.
     pub fn surfaces_of_clusters(&self, segmentation: &Segmentation) -> Vec<Vec<usize>> {
         let surfaces = segmentation.clusters().map(|cluster| {
             let mut on: Vec<_> =

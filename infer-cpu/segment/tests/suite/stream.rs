@@ -25,7 +25,6 @@ struct Turn {
 type HandedOut = (Vec<(u32, u32)>, f32);
 
 impl Turn {
-    /// A turn that begins with the encoder at `start_rad`.
     fn new(points: &[[f32; 3]], rings: &[u16], start_rad: f32) -> Self {
         let encoder_rad = |i: usize| {
             let offset = OFFSETS_DEG[usize::from(rings[i]) % 4].to_radians();
@@ -69,7 +68,6 @@ impl Turn {
         found.clusters().map(|cluster| sorted(cluster.points)).collect()
     }
 
-    /// The clusters of `n_turns` such turns.
     fn stream(&self, settings: &Settings, n_turns: u32) -> (Vec<HandedOut>, Dropped) {
         let mut stream = Stream::new(settings.clone(), 300_000).unwrap();
         let mut found = Vec::new();
@@ -224,7 +222,6 @@ fn a_head_that_stands_still_fills_the_room_and_no_more() {
     stream.end(|cluster| sizes.push(cluster.points.len()));
     // A column holds as many as its cells compare: 16 of each ring.
     assert_eq!(sizes, [16 * 32]);
-    // And it goes on from there.
     stream.advance(0.0, |_| ());
     (0..20).for_each(|ring| stream.push([10.0, -1.0, 1.0], ring, ()));
     stream.end(|cluster| sizes.push(cluster.points.len()));

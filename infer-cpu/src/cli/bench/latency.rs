@@ -16,7 +16,6 @@ use super::machine::Machine;
 use super::variant::Variant;
 use super::{BenchArgs, table};
 
-/// All measurements of a run.
 #[derive(Serialize)]
 struct Record {
     machine: Machine,
@@ -24,7 +23,6 @@ struct Record {
     rows: Vec<Timing>,
 }
 
-/// The measurements of one setting.
 #[derive(Serialize)]
 struct Timing {
     sampler: String,
@@ -42,9 +40,7 @@ struct Timing {
     samples_ms: Vec<f64>,
 }
 
-/// A setting to measure.
 struct Setting<'a> {
-    /// The sampler.
     sampler: &'a Variant,
     t_nets: TNets,
     /// The number of points that the network processes.
@@ -53,7 +49,6 @@ struct Setting<'a> {
     precision: Precision,
 }
 
-/// Measures and prints every setting that `args` name.
 pub fn run(args: &BenchArgs, model: &Path) -> anyhow::Result<()> {
     let ranges = super::calibration(args, model)?;
     // fp32 comes first, as the baseline of the others.
@@ -151,7 +146,6 @@ fn measure(
     })
 }
 
-/// The durations of `repeats` calls of `classify`.
 fn samples_ms(
     repeats: u32,
     mut classify: impl FnMut() -> anyhow::Result<()>,

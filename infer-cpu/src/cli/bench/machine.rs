@@ -2,21 +2,16 @@
 
 use serde::Serialize;
 
-/// A description of the machine.
 #[derive(Serialize)]
 pub struct Machine {
-    /// The name of the processor or board.
     processor: String,
-    /// Its architecture.
     architecture: &'static str,
     /// Cores that this process may use.
     cores: usize,
-    /// The version of this program.
     version: &'static str,
 }
 
 impl Machine {
-    /// This machine.
     pub fn here() -> Self {
         Self {
             processor: processor().unwrap_or_else(|| "unknown".to_owned()),

@@ -1,5 +1,3 @@
-//! Aligned tables of text.
-
 use std::io::Write;
 
 /// Prints rows of cells with the names of their columns, with the first `n_left` columns aligned to

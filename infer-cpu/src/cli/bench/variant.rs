@@ -7,7 +7,6 @@ use formats::FormatError;
 use infer_cpu::Options;
 use infer_cpu::sampler::{SamplerKind, SamplerSpec};
 
-/// A sampler and its options.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Variant {
     name: String,

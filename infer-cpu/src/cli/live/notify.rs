@@ -18,14 +18,12 @@ const STATUS_PERIOD: Duration = Duration::from_secs(5);
 /// Sends messages to systemd, if it listens.
 pub struct Notifier {
     manager: Option<Manager>,
-    /// The timeout of the watchdog.
     watchdog: Option<Duration>,
     /// When the next keep-alive message is due.
     due: Instant,
 }
 
 impl Notifier {
-    /// A notifier for the environment variables that systemd sets.
     pub fn of_environment() -> anyhow::Result<Self> {
         Self::new(|name| env::var_os(name))
     }
@@ -86,7 +84,6 @@ mod manager {
     use std::os::unix::ffi::OsStrExt;
     use std::os::unix::net::{SocketAddr, UnixDatagram};
 
-    /// The socket of systemd.
     pub struct Manager {
         socket: UnixDatagram,
         address: SocketAddr,
@@ -112,7 +109,6 @@ mod manager {
     }
 }
 
-/// systemd exists on Linux only.
 #[cfg(not(target_os = "linux"))]
 mod manager {
     use super::{OsStr, io};

@@ -4,7 +4,6 @@ use std::io::{self, BufWriter, ErrorKind, StdoutLock, Write};
 
 use infer_cpu::live::{Object, Pipeline, RecordError, Recorder};
 
-/// The requested outputs and their failures.
 pub struct Outputs {
     lines: Option<BufWriter<StdoutLock<'static>>>,
     recorder: Option<Recorder>,
@@ -52,7 +51,6 @@ impl Outputs {
         self.lines_failure.is_none() && (self.lines.is_some() || self.recorder_failure.is_none())
     }
 
-    /// Ends the recording.
     pub fn end(self, pipeline: &Pipeline) -> anyhow::Result<()> {
         let recorded = self.recorder.map_or(Ok(()), |recorder| recorder.finish(pipeline));
         if let Some(failure) = self.lines_failure.filter(|f| f.kind() != ErrorKind::BrokenPipe) {

@@ -27,25 +27,18 @@ const KERNEL_BUFFER: usize = 8 << 20;
 /// messages.
 const PATIENCE: Duration = Duration::from_millis(100);
 
-/// An event of a source.
 pub enum Tick<'a> {
-    /// A packet has come.
     Packet(&'a [u8], Arrival),
     /// No packet has come for a while.
     Quiet,
-    /// No more will come.
     End,
 }
 
-/// A source of packets.
 pub enum Source {
-    /// A capture.
     Capture { file: PathBuf, from: Option<IpAddr>, realtime: bool },
-    /// A socket.
     Udp(Box<Listener>),
 }
 
-/// The counters of a source.
 #[derive(Default)]
 pub struct Read {
     /// All UDP packets.
@@ -72,7 +65,6 @@ struct ListenerCounts {
     overrun: AtomicU64,
 }
 
-/// Memory for a packet.
 struct Slot {
     bytes: Box<[u8]>,
     n_bytes: usize,

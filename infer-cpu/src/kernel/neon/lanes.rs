@@ -7,11 +7,8 @@ use std::array::from_fn;
 pub trait Lanes: Copy {
     /// The number in a lane.
     type Element: Copy;
-    /// Copies a number to all lanes.
     fn splat(value: Self::Element) -> Self;
-    /// Reads four.
     fn load(from: &[Self::Element; 4]) -> Self;
-    /// Writes four.
     fn store(self, to: &mut [Self::Element; 4]);
     /// `other` where `mask` is all ones.
     fn replaced(self, mask: uint32x4_t, other: Self) -> Self;
@@ -23,7 +20,6 @@ pub trait Sums: Lanes {
     fn larger(self, than: Self) -> Self;
     /// All ones in lanes where `self` is larger than `other`.
     fn exceeds(self, other: Self) -> uint32x4_t;
-    /// Rounds to fp32.
     fn to_f32(self) -> float32x4_t;
 }
 

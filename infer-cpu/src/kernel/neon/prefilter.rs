@@ -8,7 +8,6 @@ use super::lanes::{Lanes, Sums};
 /// Estimates that are compared together, since candidates are few.
 const BATCH: usize = 16;
 
-/// The table of these kernels.
 pub const PREFILTER: PrefilterKernels = PrefilterKernels { levels, peaks, above_floors, dots };
 
 /// [`PrefilterKernels::levels`].

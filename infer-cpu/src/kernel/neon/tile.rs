@@ -20,7 +20,6 @@ pub trait Tile<const V: usize> {
     type Activation;
     /// An element of panels.
     type Weight: Copy + Default;
-    /// A vector of sums.
     type Sums: Sums;
     /// The inputs of one round of the inner loop.
     const STEP: usize = VECTOR_BYTES / size_of::<Self::Activation>();
@@ -43,7 +42,6 @@ pub struct Strip<A, W> {
     pub rows: *const A,
     /// The distance from one row to the next.
     pub stride: usize,
-    /// The number of tiles.
     pub n_tiles: usize,
     /// `4 * V` weights for each input.
     pub weights: *const W,
@@ -166,7 +164,6 @@ type Four<T, const V: usize> = <T as Tile<V>>::Sums;
 /// A sum of a tile.
 type Sum<T, const V: usize> = <Four<T, V> as Lanes>::Element;
 
-/// The matrix products of one format.
 pub const fn gemm<T, const V: usize>() -> Gemm<T::Activation, T::Weight, Sum<T, V>>
 where
     T: Tile<V> + Feed<Finish<V>, V> + Feed<Max<Four<T, V>, V>, V> + Feed<ArgMax<Four<T, V>, V>, V>,

@@ -58,7 +58,6 @@ impl HalfSink for ArgMax<float32x4_t, 4> {
 
 /// Adds up the sums of a tile's blocks.
 pub struct Blocks<const ROWS: usize> {
-    /// The sums so far.
     pub sums: [[float32x4_t; 4]; ROWS],
 }
 

@@ -25,7 +25,6 @@ pub(in crate::kernel) trait Vector: Copy {
     unsafe fn max(self, other: Self) -> Self;
     /// Where `self` is greater than `best`, sets `best` to it and `who` to `index`.
     unsafe fn keep_greater(self, best: &mut Self, who: &mut Self::Int, index: Self::Int);
-    /// Rounds to f32.
     unsafe fn to_float(self) -> Self::Float;
 }
 

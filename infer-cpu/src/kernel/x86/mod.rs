@@ -45,7 +45,6 @@ macro_rules! declare {
             edge_features,
         });
 
-        /// The matrix products of one format.
         const fn gemm<T: Tile<$lanes>>()
         -> Gemm<T::Activation, T::Weight, <T::Sums as x86::Vector>::Element> {
             Gemm {

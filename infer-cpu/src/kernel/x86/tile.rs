@@ -18,7 +18,6 @@ const WIDENED: usize = 128;
 pub(in crate::kernel) trait Tile<L: Lanes> {
     type Activation: Copy;
     type Weight: Copy + Default;
-    /// A vector of sums.
     type Sums: Vector<Float = L, Int = L::Int>;
     /// The inputs of one round of the loop; a panel has a multiple of it.
     const STEP: usize;
