@@ -1,5 +1,3 @@
-//! The brightness of the points of a recorded scan.
-
 use crate::Usage;
 use formats::Scan;
 use sim_gpu::internals::config::within;

@@ -1,5 +1,3 @@
-//! The plan of corruptions: their names, severities and sources.
-
 use anyhow::{Context, bail, ensure};
 use edgepuck_assets::CORRUPTIONS;
 use edgepuck_dataset::ObjectCorruption;

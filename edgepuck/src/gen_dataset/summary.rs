@@ -1,5 +1,3 @@
-//! The closing summary of a run.
-
 use edgepuck_dataset::internals::layout;
 use edgepuck_dataset::{Manifest, Progress, Stage};
 use std::path::Path;

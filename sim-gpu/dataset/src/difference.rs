@@ -1,5 +1,3 @@
-//! The difference of two configurations, in words.
-
 use serde::Serialize;
 use serde_json::Value;
 

@@ -1,5 +1,3 @@
-//! Labels the clusters of a sweep with the objects that they show.
-
 use edgepuck_segment::Segmentation;
 
 use crate::recipe::OTHER;

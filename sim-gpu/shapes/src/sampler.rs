@@ -1,5 +1,3 @@
-//! Random numbers for the proportions of shapes.
-
 use std::iter::repeat_n;
 
 use formats::rng::StreamKey;
