@@ -28,12 +28,11 @@ pub struct ModelArgs {
 }
 
 impl ModelArgs {
-    /// The path and the card of the model.
     pub fn open(&self) -> anyhow::Result<(PathBuf, ModelCard)> {
         self.open_or(&NAMES)
     }
 
-    /// The same, with `names` as the file names of suitable bundled weights.
+    /// Opens the model, with `names` as the file names of suitable bundled weights.
     pub fn open_or(&self, names: &[&str]) -> anyhow::Result<(PathBuf, ModelCard)> {
         let path = find_or(self.model.as_deref(), names)?;
         let card = ModelCard::read(&path)?;

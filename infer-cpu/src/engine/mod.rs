@@ -61,7 +61,6 @@ pub enum Pass {
     Stn,
     /// The T-Net of the features.
     Fstn,
-    /// The trunk.
     Trunk,
 }
 

@@ -110,7 +110,6 @@ unsafe extern "C" fn call_flushed(data: *mut c_void, entry: Entry) {
     )
 }
 
-/// The logits of a small model.
 fn logits(model: &Path, precision: Precision, kernel: KernelName) -> Vec<f32> {
     let options = Options { precision, kernel: Some(kernel), ..Options::default() };
     let mut classifier = Classifier::load(model, &options).unwrap();

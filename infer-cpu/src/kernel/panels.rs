@@ -119,7 +119,6 @@ impl<W: Copy + Default> Panels<W> {
         &mut self.bias
     }
 
-    /// The index of the weight of `input` for `output`.
     fn index(&self, input: usize, output: usize) -> usize {
         let Self { nr, group, padded_inputs, .. } = self;
         let row = output / nr * (padded_inputs / group) + input / group;
@@ -158,7 +157,6 @@ impl<W: Copy + Default> Panels<W> {
         &self.data[panel * size..][..size]
     }
 
-    /// The output channels of a range of panels.
     pub fn channels(&self, panels: &Range<usize>) -> Range<usize> {
         panels.start * self.nr..panels.end * self.nr
     }

@@ -422,7 +422,6 @@ impl Sensor {
         }
     }
 
-    /// Its motion, if `options` state it.
     fn motion<'a>(&self, options: &'a LiveOptions) -> Option<Motion<'a>> {
         let start_s = self.start_s;
         options.ego_motion.as_ref().map(|motion| Motion { motion, start_s })

@@ -10,7 +10,6 @@ const BATCH: usize = 16;
 
 pub const PREFILTER: PrefilterKernels = PrefilterKernels { levels, peaks, above_floors, dots };
 
-/// [`PrefilterKernels::levels`].
 fn levels(row: &[f32], per_unit: f32, out: &mut [u8]) -> LevelSums {
     assert!(row.len().is_multiple_of(WIDTH_STEP) && out.len() == row.len());
     let (batches, _) = row.as_chunks::<BATCH>();
@@ -40,7 +39,6 @@ fn levels(row: &[f32], per_unit: f32, out: &mut [u8]) -> LevelSums {
     unsafe { LevelSums { lost: vaddvq_f32(lost), squares: vaddvq_f32(squares) } }
 }
 
-/// [`PrefilterKernels::peaks`].
 fn peaks(values: &[f32], peaks: &mut [f32], rows: &mut [u32]) {
     let width = peaks.len();
     assert!(rows.len() == width && width.is_multiple_of(WIDTH_STEP));
@@ -62,7 +60,6 @@ fn peaks(values: &[f32], peaks: &mut [f32], rows: &mut [u32]) {
     }
 }
 
-/// [`PrefilterKernels::above_floors`].
 fn above_floors(values: &[f32], floors: &[f32], found: &mut [Candidate]) -> Option<usize> {
     let width = floors.len();
     assert!(width.is_multiple_of(WIDTH_STEP));

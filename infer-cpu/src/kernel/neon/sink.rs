@@ -90,7 +90,6 @@ pub struct ArgMax<L, const V: usize> {
     pub largest: [L; V],
     /// The first row that has it.
     pub winners: [uint32x4_t; V],
-    /// The number of the next row.
     pub next_row: uint32x4_t,
 }
 

@@ -158,7 +158,6 @@ macro_rules! tile_8x8 {
 }
 pub(in crate::kernel) use tile_8x8;
 
-/// The vector of sums of a tile.
 type Four<T, const V: usize> = <T as Tile<V>>::Sums;
 
 /// A sum of a tile.
