@@ -1,7 +1,4 @@
 //! Reading TOML files that users write: sensors, poses and scenes.
-//!
-//! Every error names the file, the key and the cause. A `toml` error has a line and a column, an
-//! [`InvalidValue`] the path of the key, such as `object[2].scale`.
 
 use std::fmt;
 use std::io::Read;

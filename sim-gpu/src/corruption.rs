@@ -118,15 +118,13 @@ impl Corruption {
 
 /// Every returned scan has the brightness of its points as `intensity`.
 impl Recorded<'_> {
-    /// The number of points that are below the detection limit as recorded: the sensor that
-    /// recorded them has a lower limit.
+    /// The number of points that are below the detection limit as recorded.
     #[must_use]
     pub fn too_weak_before(&self) -> usize {
         let is_too_weak = |i: &usize| self.power(*i, 1.0) < self.limit.power();
         (0..self.scan.len()).filter(is_too_weak).count()
     }
 
-    /// The power of point `i`, times `left`.
     fn power(&self, i: usize, left: f64) -> f64 {
         f64::from(self.brightness[i]) * left / self.seen_from_sensor(i).length_squared()
     }
@@ -210,8 +208,7 @@ impl Recorded<'_> {
         Some(self.where_point(|i| !is_missing[usize::from(rings[i])]))
     }
 
-    /// The scan in which this share of the points are another sensor's pulses, uniformly
-    /// distributed along the beam.
+    /// The scan in which this share of points are another sensor's pulses, uniform along the beam.
     #[must_use]
     pub fn crosstalk(&self, share: f64) -> Scan {
         let mut scan = self.scan.clone();
@@ -261,13 +258,11 @@ impl Recorded<'_> {
         scan
     }
 
-    /// Point `i` relative to the sensor.
     fn seen_from_sensor(&self, i: usize) -> DVec3 {
         let point = DVec3::from(self.scan.positions[i].map(f64::from));
         DVec3::from_array(self.scan.origin) + point - self.sensor_m
     }
 
-    /// A place relative to the sensor, in the frame of the file.
     fn in_file(&self, from_sensor: DVec3) -> [f32; 3] {
         let at = from_sensor + self.sensor_m - DVec3::from_array(self.scan.origin);
         at.as_vec3().to_array()

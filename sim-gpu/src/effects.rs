@@ -46,8 +46,7 @@ pub struct Effects {
     pub footprint: Option<Footprint>,
     /// The returns of a beam that the sensor reports; `None` is the strongest.
     pub returns: Option<ReturnMode>,
-    /// Rain, snow, fog, haze, dust and spray. Weather needs a detection limit: that of `detection`, or
-    /// else the sensor's own.
+    /// Rain, snow, fog and others. They need a detection limit: `detection`'s or the sensor's own.
     pub weather: Option<Box<Weather>>,
     /// The motion of a sensor without a trajectory.
     pub motion: Option<Box<EvenMotion>>,
@@ -269,7 +268,6 @@ impl Effects {
     /// Checks all numbers.
     ///
     /// # Errors
-    ///
     /// On the first number that is not finite or out of its bounds.
     pub fn validate(&self) -> Result<(), InvalidValue> {
         if let Some(noise) = self.noise {
@@ -296,7 +294,6 @@ impl Effects {
     }
 }
 
-/// [`Effects`] as written in TOML and JSON.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct EffectsTable {

@@ -1,5 +1,4 @@
-//! The input and the output of casters: the rays of one sensor at one object, and the triangle
-//! that each hits.
+//! The input and the output of casters.
 
 use crate::aim::aim;
 use crate::lanes::{Vectors, each};

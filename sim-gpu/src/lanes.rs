@@ -56,7 +56,6 @@ impl<const N: usize> Vectors<N> {
         *self * each(|i| 1.0 / length_squared[i].sqrt())
     }
 
-    /// Each vector mapped by `map`.
     #[inline(always)]
     pub fn mapped(&self, map: &DMat3) -> Self {
         let row = |i: usize| {
@@ -106,9 +105,7 @@ impl<const N: usize> Mul<[f64; N]> for Vectors<N> {
     }
 }
 
-/// Work on lanes.
 pub(crate) trait Lanewise: Sized {
-    /// Its result.
     type Output;
 
     /// Does the work with the instruction set of `simd`. Implementations are `#[inline(always)]`:
@@ -121,7 +118,6 @@ pub(crate) fn widest<W: Lanewise>(work: W) -> W::Output {
     run_at(Level::new(), work)
 }
 
-/// Does `work` with the instruction set of `level`.
 pub(crate) fn run_at<W: Lanewise>(level: Level, work: W) -> W::Output {
     dispatch!(level, simd => work.run(simd))
 }

@@ -81,7 +81,6 @@ impl MaterialChoice {
     }
 }
 
-/// A material as TOML holds it.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(
     untagged,
@@ -173,7 +172,6 @@ pub struct Materials {
     of_triangle: Vec<Paint>,
 }
 
-/// The material of a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Paint {
     /// One material, by its index in `even`.
@@ -254,8 +252,7 @@ impl Materials {
         Ok(Named::Even(self.even.len() as u32 - 1))
     }
 
-    /// The material of triangle `index` of the mesh, at a point whose barycentric coordinates are
-    /// computed if they matter.
+    /// The material of triangle `index` at a point; `barycentric` is called only if it matters.
     #[must_use]
     #[doc(hidden)]
     pub fn at(&self, index: u32, barycentric: impl FnOnce() -> DVec3) -> Material {
@@ -276,16 +273,12 @@ impl Materials {
     }
 }
 
-/// The material behind a name.
 enum Named<'a> {
     Nothing,
-    /// One material, by its index.
     Even(u32),
-    /// An image, by its index, and its colour.
     Textured(u32, &'a Colour),
 }
 
-/// The colours in the MTL files that the OBJ file at `path` names.
 fn read_libraries(path: &Path, libraries: &[String]) -> Result<Vec<Colour>, MeshError> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let read = libraries.iter().map(|library| colours(&folder.join(library)));
@@ -296,7 +289,6 @@ fn unfit(colour: &Colour, cause: String) -> MaterialError {
     MaterialError::Colour { path: colour.library.clone(), name: colour.name.clone(), cause }
 }
 
-/// The texture coordinates of the corners of `face` in the image of `colour`.
 fn corners_in_image(
     appearance: &Appearance,
     face: &Face,

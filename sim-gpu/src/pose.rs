@@ -47,8 +47,7 @@ impl Pose {
         Self { rotation: self.rotation * turn, ..self }
     }
 
-    /// `distance_m` from the origin at this elevation and azimuth (counterclockwise from x),
-    /// looking at the origin.
+    /// `distance_m` from the origin, looking at it; the azimuth is counterclockwise from x.
     #[must_use]
     pub fn looking_at_origin_deg(distance_m: f64, elevation_deg: f64, azimuth_deg: f64) -> Self {
         let (elevation_rad, azimuth_rad) = (elevation_deg.to_radians(), azimuth_deg.to_radians());
@@ -59,7 +58,6 @@ impl Pose {
     /// Straight above or below the target, its orientation is the limit along azimuth 0.
     ///
     /// # Errors
-    ///
     /// If a coordinate is not finite, or the two points are equal or so far
     /// apart that their distance overflows.
     pub fn look_at(position_m: DVec3, target_m: DVec3) -> Result<Self, InvalidValue> {
@@ -131,7 +129,6 @@ struct PosesFile {
     pose: Vec<PoseKeys>,
 }
 
-/// The poses in the text of `file`.
 fn poses(PosesFile { pose }: PosesFile, file: &Path) -> Result<Vec<Pose>, ConfigError> {
     let tables = pose.iter().enumerate();
     let poses: Result<_, InvalidValue> =
@@ -148,7 +145,6 @@ fn facing_inwards(elevation_rad: f64, azimuth_rad: f64) -> DQuat {
     DQuat::from_mat3(&DMat3::from_cols(forward, left, forward.cross(left))).normalize()
 }
 
-/// The unit vector at this elevation and azimuth.
 fn outwards(elevation_rad: f64, azimuth_rad: f64) -> DVec3 {
     let (sin_elevation, cos_elevation) = elevation_rad.sin_cos();
     let (sin_azimuth, cos_azimuth) = azimuth_rad.sin_cos();

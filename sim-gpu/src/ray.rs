@@ -150,8 +150,7 @@ impl RayFrame {
         (nearest_m * (1.0 - 1e-9)).max(0.0)
     }
 
-    /// The record of `ray` for a tree whose root is node `root`; `None` if the ray misses the
-    /// bounding sphere.
+    /// The record of `ray` for the tree at `root`; `None` if the ray misses the bounding sphere.
     #[must_use]
     pub fn trace_ray(&self, ray: &Ray, root: u32) -> Option<TraceRay> {
         let entry = Entries::new(&Rays::one(ray), self.radius);
@@ -231,7 +230,6 @@ impl Rays<1> {
     }
 }
 
-/// Where rays enter a bounding sphere.
 struct Entries<const N: usize> {
     /// The starts of the rays.
     origin: Vectors<N>,
@@ -240,7 +238,6 @@ struct Entries<const N: usize> {
     /// The distance from its start at which each ray enters the sphere; for a ray that misses it,
     /// a distance within which it meets nothing.
     skipped: [f64; N],
-    /// Whether each ray meets the sphere.
     is_hit: [bool; N],
 }
 

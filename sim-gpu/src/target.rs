@@ -91,8 +91,7 @@ impl Surface {
         if shares.is_finite() { shares } else { DVec3::splat(1.0 / 3.0) }
     }
 
-    /// As [`corners`](Self::corners), sorted by coordinates: triangles with the same three corners
-    /// give the same.
+    /// As [`corners`](Self::corners), sorted by coordinates, whatever their order in the mesh.
     #[must_use]
     #[inline]
     pub(crate) fn sorted_corners(&self, index: u32) -> [DVec3; 3] {
@@ -145,7 +144,6 @@ impl Target {
     }
 }
 
-/// `corners` sorted by coordinates.
 fn sorted(mut corners: [u32; 3], vertices: &[DVec3]) -> [u32; 3] {
     corners.sort_unstable_by(|&a, &b| {
         let [p, q] = [a, b].map(|v| vertices[v as usize]);

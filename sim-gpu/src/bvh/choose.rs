@@ -7,11 +7,7 @@ use super::Builder;
 const RAYS_PER_TRIANGLE_TO_BREAK_EVEN: usize = 4;
 
 impl Builder {
-    /// The builder that minimizes the CPU time for building a tree over `triangles` triangles and
-    /// tracing `rays` rays through it.
-    ///
-    /// The time to build grows with the number of triangles, and the saving per ray hardly does:
-    /// rays per triangle alone decide.
+    /// The builder that takes the least CPU time to build a tree of `triangles` and trace `rays`.
     #[must_use]
     pub fn for_rays(triangles: usize, rays: usize) -> Self {
         if rays / RAYS_PER_TRIANGLE_TO_BREAK_EVEN > triangles { Self::Sah } else { Self::Morton }

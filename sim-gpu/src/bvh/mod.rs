@@ -27,7 +27,6 @@ pub const MAX_DEPTH: usize = 64;
 /// `HALVING_DEPTH + log2(triangles) <= MAX_DEPTH` for up to 2^31 triangles.
 const HALVING_DEPTH: usize = 32;
 
-/// The most triangles of a leaf.
 const MAX_LEAF: usize = 4;
 
 /// How far boxes reach beyond their triangles, in the unit frame, whose coordinates are at most 1.
@@ -57,7 +56,6 @@ pub struct Bvh {
     pub wide: WideBvh,
 }
 
-/// A triangle to be put into a tree.
 #[derive(Clone, Copy)]
 struct Primitive {
     bounds: Bounds,

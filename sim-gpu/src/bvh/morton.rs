@@ -9,7 +9,6 @@ use glam::Vec3A;
 /// Bits of a Morton code per axis.
 const BITS: u32 = 10;
 
-/// Sorts `primitives` into leaf order and returns the nodes above them.
 pub(super) fn build(primitives: &mut [Primitive]) -> Vec<Node> {
     let (_, centres) = extent(primitives);
     let mut keys: Vec<(u32, u32)> = primitives

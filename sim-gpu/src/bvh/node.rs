@@ -73,11 +73,9 @@ impl Node {
         }
     }
 
-    /// The same node in a buffer where this tree's nodes start at `node_base`
-    /// and its triangles at `triangle_base`.
+    /// The node in a buffer where this tree begins at `node_base` and `triangle_base`.
     #[must_use]
     pub fn moved(mut self, node_base: u32, triangle_base: u32) -> Self {
-        // Children without triangles are nodes.
         let base = |count: u32| if count == 0 { node_base } else { triangle_base };
         self.left += base(self.left_count);
         self.right += base(self.right_count);

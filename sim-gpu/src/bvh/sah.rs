@@ -20,7 +20,6 @@ const TRIANGLE_COST: f32 = 1.0;
 /// Subtrees of more triangles are built in parallel.
 const PARALLEL_ABOVE: usize = 8192;
 
-/// Sorts `primitives` into leaf order and returns the nodes above them.
 pub(super) fn build(primitives: &mut [Primitive]) -> Vec<Node> {
     let mut nodes = Vec::with_capacity(primitives.len() / 2 + 1);
     let root = subtree(primitives, 0, 0, &mut nodes);

@@ -42,7 +42,6 @@ impl<Distance: Copy + Default> Default for Stack<Distance> {
 }
 
 impl<Distance: PartialOrd + Copy + Default> Stack<Distance> {
-    /// Drops what an earlier search left.
     #[inline(always)]
     pub(crate) fn clear(&mut self) {
         self.height = 0;
@@ -87,8 +86,7 @@ impl<Distance: PartialOrd + Copy + Default> Stack<Distance> {
     }
 }
 
-/// Visits the leaves at or below `from` that matter to `search`, in order of their boxes'
-/// distances.
+/// Visits the leaves at or below `from` that matter to `search`, those of the nearest boxes first.
 #[inline(always)]
 pub fn traverse<S: Search>(
     tree: &WideBvh,

@@ -58,7 +58,6 @@ impl WideChild {
     const IS_LEAF: u32 = 1 << 31;
     const NOTHING: Self = Self(Self::IS_LEAF);
 
-    /// The number of the leaf, if this is one.
     #[inline]
     pub(crate) fn leaf(self) -> Option<usize> {
         (self.0 & Self::IS_LEAF != 0).then_some((self.0 & !Self::IS_LEAF) as usize)
@@ -155,13 +154,11 @@ struct Collapse<'a> {
 struct Cost {
     /// The cost if it becomes at most 1, 2, ... children of one wide node.
     as_children: [f32; WIDTH],
-    /// The first triangle, and the number of triangles.
     first: u32,
     count: u32,
     is_leaf: bool,
 }
 
-/// A child of a two-wide node.
 #[derive(Clone, Copy)]
 struct Subtree {
     bounds: Bounds,
@@ -172,7 +169,6 @@ struct Subtree {
 }
 
 impl Collapse<'_> {
-    /// The children of two-wide node `at`.
     fn children(&self, at: usize) -> [Subtree; 2] {
         let node = &self.nodes[at];
         let child = |min, max, child: u32, count| {
@@ -211,7 +207,6 @@ impl Collapse<'_> {
         (2..n).map(split).fold(first, |best, next| if next.0 < best.0 { next } else { best })
     }
 
-    /// Computes `costs` from the leaves up.
     fn count_costs(&mut self) {
         self.costs = vec![Cost::default(); self.nodes.len()];
         // Builders put nodes before their children.

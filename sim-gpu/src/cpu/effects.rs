@@ -10,8 +10,7 @@ use crate::target::Target;
 use formats::rng::StreamKey;
 use glam::DVec3;
 
-/// Appends the outputs of all `effects` for a return of `beam` from triangle
-/// `index` to `outputs`, in the order of [`Effects::per_ray`].
+/// Appends to `outputs` those of `effects` for one return, in the order of [`Effects::per_ray`].
 pub fn append_outputs(
     outputs: &mut Vec<f32>,
     effects: &Effects,
@@ -60,8 +59,7 @@ pub fn dropout(dropout: &Dropout, stream: StreamKey, beam: u32) -> bool {
     unit < dropout.probability as f32
 }
 
-/// The intensity of a return from triangle `index`, 0 to 1: the cosine of the
-/// incidence times the reflectivity, BLAINDER's model.
+/// The intensity of a return, 0 to 1: |cos(incidence)| x reflectivity, BLAINDER's model.
 #[must_use]
 pub fn intensity(target: &Target, ray: &Ray, index: u32, reflectivity: f64) -> f64 {
     // Rounded as casters get it, so that both sources of a direction give the same intensity.

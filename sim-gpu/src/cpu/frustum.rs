@@ -15,7 +15,6 @@ const WIDEST: f32 = 0.3;
 /// accepts triangles up to 48u from the ray (`intersect::DISPLACEMENT`).
 const MARGIN: f32 = 128.0 / 16_777_216.0;
 
-/// A lower and an upper bound.
 type Interval = [f32; 2];
 
 /// Bounds of rays that share the axis of their largest component, the main axis, and its sign.

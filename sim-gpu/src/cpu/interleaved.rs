@@ -14,12 +14,10 @@ const CACHED: usize = 2 << 20;
 /// The number of rays in flight in larger trees: more do not raise the speed.
 const IN_FLIGHT: usize = 8;
 
-/// The rays in flight.
 pub struct Interleaved {
     walks: Vec<Walk>,
 }
 
-/// A ray in flight.
 struct Walk {
     /// Its place among the rays to trace.
     number: usize,
@@ -55,7 +53,6 @@ impl Interleaved {
         Self { walks: repeat_with(walk).take(in_flight).collect() }
     }
 
-    /// Fills `codes` with the code of each of `rays`.
     #[inline(always)]
     pub fn trace(
         &mut self,
@@ -93,7 +90,6 @@ impl Interleaved {
     }
 }
 
-/// Prefetches the node or leaf `at` into the cache.
 #[inline(always)]
 fn prefetch(tree: &WideBvh, at: WideChild) {
     #[cfg(target_arch = "x86_64")]

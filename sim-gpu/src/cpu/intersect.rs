@@ -55,8 +55,7 @@ pub struct Candidates4 {
 /// along the ray. All are below 48u.
 pub const DISPLACEMENT: f32 = 48.0 / 16_777_216.0;
 
-/// The tangent of the steepest incidence at which a range keeps its promised
-/// accuracy: 1 / tan(0.1 degree).
+/// The tangent of the steepest incidence with the promised accuracy: 1 / tan(0.1 degree).
 pub const STEEPEST: f32 = 573.0;
 
 /// The axes in cyclic order, the one of largest size last.

@@ -17,9 +17,7 @@ pub struct Crossing {
     pub index: u32,
 }
 
-/// The nearest crossing of `ray`, in f64.
-///
-/// Two triangles at exactly the same range: the lower index.
+/// The nearest crossing of `ray`, in f64; of two at exactly the same range, the lower index.
 #[must_use]
 pub fn nearest(target: &Target, ray: &Ray) -> Option<Crossing> {
     if target.surface.is_empty() {

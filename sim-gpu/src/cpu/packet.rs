@@ -18,7 +18,6 @@ const FEW: u32 = 3;
 
 type Lanes = [f32; PACKET];
 
-/// A node or leaf that rays have yet to visit.
 #[derive(Clone, Copy)]
 struct Pending {
     /// The distance at which each ray enters it; infinity for a ray that does not.
@@ -26,7 +25,6 @@ struct Pending {
     child: WideChild,
 }
 
-/// The traversal stacks of a packet and of a single ray.
 pub struct Stacks {
     packet: Vec<Pending>,
     single: Stack<f32>,
@@ -266,7 +264,6 @@ impl<S: Simd> Packet<S> {
         Sheared { x, y, along }
     }
 
-    /// A coordinate of a corner relative to the origin of each ray.
     #[inline(always)]
     fn corner_from_origin(&self, corner: &[[f32; LEAF]; 3], i: usize, to: usize) -> f32x8<S> {
         self.by.splat(corner[self.axes[to]][i]) - self.origin[to]
@@ -356,7 +353,6 @@ fn within<S: Simd>(edge: f32x8<S>, x: f32x8<S>, y: f32x8<S>) -> mask32x8<S> {
     (edge * edge).simd_le((x * x + y * y) * (DISPLACEMENT * DISPLACEMENT))
 }
 
-/// The numbers of the lanes whose bits are set.
 #[inline(always)]
 fn lanes_of(mut bits: u32) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {

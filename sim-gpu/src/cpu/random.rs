@@ -1,10 +1,8 @@
-//! Random bits and normal deviates. Counterpart of `shaders/shared/stream.wgsl`
-//! and `shaders/shared/normal_deviate.wgsl`.
+//! Random bits and normal deviates. Counterpart of `shaders/shared/{stream,normal_deviate}.wgsl`.
 
 use formats::rng::StreamKey;
 
-/// The random bits of `stream` for one beam and one purpose (1 is noise, 2 is
-/// dropout, 3 the receiver, 16 glass).
+/// Random bits of a beam for one purpose: 1 noise, 2 dropout, 3 the receiver, 16 glass.
 #[must_use]
 pub fn random_bits(stream: StreamKey, beam: u32, purpose: u32) -> [u32; 4] {
     stream.words([beam, purpose, 0, 0])

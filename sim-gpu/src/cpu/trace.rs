@@ -32,7 +32,6 @@ pub fn trace(tree: &WideBvh, rays: &[TraceRay]) -> Vec<u32> {
     codes
 }
 
-/// The rays of one task, and the place of their codes.
 struct Task<'a> {
     tree: &'a WideBvh,
     rays: &'a [TraceRay],

@@ -74,7 +74,6 @@ impl Prepared {
     }
 }
 
-/// The search for the nearest triangle along a ray.
 pub(super) struct Along<'a, I> {
     pub ray: &'a Prepared,
     pub nearest: &'a mut Nearest,
@@ -105,13 +104,10 @@ pub(super) const PACKET: usize = 8;
 
 /// The instruction sets that trace rays. All give the same codes.
 pub(super) trait Instructions: Copy {
-    /// The traversal stacks.
     type Stacks: Default;
 
-    /// The boxes of `node` that the ray enters before `farthest`, and at which distances.
     fn enter(self, ray: &Prepared, node: &WideNode, farthest: f32) -> Entered<f32>;
 
-    /// The codes of coherent `rays`, which `frustum` bounds.
     fn trace(
         self,
         tree: &WideBvh,
@@ -178,7 +174,6 @@ impl Nearest {
         }
     }
 
-    /// Considers the triangles of `leaf` that `ray` meets.
     #[inline(always)]
     pub(super) fn consider_all(&mut self, ray: &Prepared, leaf: &Leaf4) {
         let Some(found) = intersect4(ray.origin, &ray.shear, leaf) else { return };

@@ -34,7 +34,6 @@ impl Detection {
     }
 }
 
-/// [`Detection`] as written in TOML and JSON.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 #[serde(
     untagged,

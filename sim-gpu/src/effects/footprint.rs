@@ -1,5 +1,4 @@
-//! Beams with a width, which may meet several surfaces, and the returns that the sensor reports of
-//! them.
+//! Beams with a width, and the returns that the sensor reports of them.
 
 use serde::{Deserialize, Serialize};
 
@@ -42,7 +41,6 @@ impl Footprint {
     /// The possible numbers of rays per beam: a centre and up to three rings around it.
     pub const SAMPLES: [u32; 4] = [1, 7, 19, 37];
 
-    /// The default number of rays per beam.
     const USUAL_SAMPLES: u32 = 19;
 
     /// The same footprint with missing values taken from `sensor`.
@@ -75,7 +73,6 @@ impl Footprint {
     }
 }
 
-/// [`Footprint`] as written in TOML and JSON.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 #[serde(
     untagged,

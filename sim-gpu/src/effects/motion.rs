@@ -11,8 +11,7 @@ use crate::pose::{Pose, Trajectory};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EvenMotion {
-    /// The velocity along x, y and z of the sensor's frame at the start of the scan, metres per
-    /// second.
+    /// The velocity in the sensor's frame at the start of the scan, metres per second.
     #[serde(default)]
     pub velocity_m_s: [f64; 3],
     /// The yaw rate about the sensor's z axis, to the left, degrees per second.

@@ -1,5 +1,3 @@
-//! Tests that the shader makes the same rays as its twin, to the bit.
-
 use super::adapters;
 use super::batch::View;
 use super::compose::constants;
@@ -10,7 +8,6 @@ use edgepuck_shaders as shaders;
 use test_support::need;
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
-/// Makes each ray from its own view and beam.
 const MAIN: &str = "
 @group(0) @binding(0) var<storage, read> views: array<View>;
 @group(0) @binding(1) var<storage, read> beams: array<vec3i>;

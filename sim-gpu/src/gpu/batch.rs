@@ -104,8 +104,7 @@ pub struct Batch {
 }
 
 impl Batch {
-    /// Whether `rays` more rays of `job` fit. The caller checks that the target fits an empty
-    /// batch.
+    /// Whether `rays` more rays of `job` fit; its target must fit an empty batch.
     #[must_use]
     pub fn has_room(&self, job: &CastJob, rays: usize, limits: &BatchLimits) -> bool {
         let view_bytes = (self.views.len() + 1) * size_of::<View>();

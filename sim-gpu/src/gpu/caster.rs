@@ -28,7 +28,6 @@ struct Core {
     failure: Arc<Mutex<Option<String>>>,
 }
 
-/// The rays of a job in one dispatch.
 struct Part {
     job: usize,
     rays: usize,
@@ -90,8 +89,7 @@ impl GpuCaster {
         &self.core.limits
     }
 
-    /// The bytes of device memory reserved for this caster's buffers; `None` if the graphics
-    /// interface does not report them.
+    /// The bytes of device memory reserved for the caster's buffers, if the interface reports them.
     #[must_use]
     pub fn held_bytes(&self) -> Option<u64> {
         let report = self.core.pipeline.device.generate_allocator_report()?;
@@ -146,7 +144,6 @@ impl GpuCaster {
 }
 
 impl Core {
-    /// An error if the device reported one.
     fn check(&self) -> Result<(), CastError> {
         match &*lock(&self.failure) {
             None => Ok(()),
@@ -235,7 +232,6 @@ mod tests {
     use glam::{DAffine3, DVec3};
     use test_support::need;
 
-    /// A caster of all effects; an error if there is no adapter.
     fn caster() -> Result<GpuCaster, String> {
         let effects = Effects {
             noise: Some(Noise { mean_m: 0.0, sigma_m: 1.0, model: NoiseModel::Xyz }),

@@ -41,7 +41,6 @@ impl Clock {
         })
     }
 
-    /// Makes a pass write timestamps at its beginning and its end.
     pub(super) fn around_pass(&self) -> wgpu::ComputePassTimestampWrites<'_> {
         wgpu::ComputePassTimestampWrites {
             query_set: &self.queries,
@@ -50,18 +49,15 @@ impl Clock {
         }
     }
 
-    /// Copies both timestamps to the readback buffer.
     pub(super) fn resolve(&self, encoder: &mut wgpu::CommandEncoder) {
         encoder.resolve_query_set(&self.queries, 0..2, &self.resolved, 0);
         encoder.copy_buffer_to_buffer(&self.resolved, 0, &self.readback, 0, Self::BYTES);
     }
 
-    /// The buffer that holds both timestamps once the pass is done.
     pub(super) fn readback(&self) -> &wgpu::Buffer {
         &self.readback
     }
 
-    /// The seconds between two `ticks`.
     pub(super) fn seconds(&self, ticks: &[u64]) -> f64 {
         ticks[1].wrapping_sub(ticks[0]) as f64 * self.seconds_per_tick
     }

@@ -3,7 +3,6 @@
 use super::compose::{compose, reads_random_bits};
 use crate::effects::Effects;
 
-/// A device, its queue and the compiled shader.
 pub(super) struct Pipeline {
     pub(super) device: wgpu::Device,
     pub(super) queue: wgpu::Queue,
@@ -16,7 +15,6 @@ pub(super) struct Pipeline {
 }
 
 impl Pipeline {
-    /// Compiles the variant that models `effects`.
     pub(super) fn new(device: wgpu::Device, queue: wgpu::Queue, effects: &Effects) -> Self {
         let layout = |label, entries: &[wgpu::BindGroupLayoutEntry]| {
             device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {

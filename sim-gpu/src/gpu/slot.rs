@@ -14,7 +14,6 @@ const OUTPUT: wgpu::BufferUsages = wgpu::BufferUsages::STORAGE.union(wgpu::Buffe
 const READBACK: wgpu::BufferUsages =
     wgpu::BufferUsages::MAP_READ.union(wgpu::BufferUsages::COPY_DST);
 
-/// A buffer that is replaced by a larger one when needed.
 struct Growing {
     label: &'static str,
     usage: wgpu::BufferUsages,
@@ -62,7 +61,6 @@ struct BindGroups {
     effects: Option<wgpu::BindGroup>,
 }
 
-/// The buffers of one dispatch.
 pub(super) struct Slot {
     nodes: Growing,
     triangles: Growing,
@@ -91,7 +89,6 @@ struct AnswerBytes {
     clock: u64,
 }
 
-/// The adapter's answer for one batch.
 pub(super) struct Answer {
     pub(super) codes: Vec<u32>,
     pub(super) outputs: Vec<f32>,
@@ -252,7 +249,6 @@ impl Slot {
     }
 }
 
-/// Maps the first `bytes` of `buffer`, and sends the result to `done`.
 fn map(
     buffer: Option<&wgpu::Buffer>,
     bytes: u64,

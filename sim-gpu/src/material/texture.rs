@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-/// The luminance of the pixels of an image.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Texture {
     width: usize,

@@ -10,7 +10,6 @@ use super::format::MeshFormat;
 use super::load::read;
 use super::obj::{data, for_each_line, words};
 
-/// The colours of an OBJ file's faces.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Appearance {
     /// The MTL files, as the OBJ file names them.
@@ -30,9 +29,7 @@ pub(crate) struct Appearance {
 pub(crate) struct Face {
     /// The index of its material's name.
     pub material: Option<u32>,
-    /// Its vertices in the file.
     pub vertices: [u32; 3],
-    /// Its texture coordinates.
     pub texture: Option<[u32; 3]>,
 }
 
@@ -40,7 +37,6 @@ pub(crate) struct Face {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Colour {
     pub name: String,
-    /// Its MTL file.
     pub library: PathBuf,
     /// `Kd`: red, green and blue, sRGB, 0 to 1.
     pub diffuse: Option<[f64; 3]>,
@@ -49,7 +45,6 @@ pub(crate) struct Colour {
 }
 
 impl Appearance {
-    /// Reads the OBJ file at `path`.
     pub fn load(path: &Path) -> Result<Self, MeshError> {
         if MeshFormat::from_path(path) != Some(MeshFormat::Obj) {
             let cause = "expected an OBJ file, whose faces have colours, found another format";

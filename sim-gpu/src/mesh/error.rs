@@ -85,7 +85,6 @@ pub struct ParseError {
 }
 
 impl Malformed {
-    /// The fault that a file has `found` instead of `expected`.
     pub(super) fn expected(expected: &str, found: &[u8]) -> Self {
         Self::Syntax(format!("expected {expected}, found {:?}", excerpt(found)))
     }
@@ -98,7 +97,6 @@ impl Malformed {
         Err(Self::Syntax(format!("expected at most {} vertices, found {n_vertices}", u32::MAX)))
     }
 
-    /// The fault, at `line`.
     pub(super) fn at(self, line: usize) -> ParseError {
         ParseError { line: Some(line), cause: self }
     }

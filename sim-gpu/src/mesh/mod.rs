@@ -1,7 +1,4 @@
 //! Triangle meshes in f64, as files hold them.
-//!
-//! [`tree`] finds the meshes of a dataset, [`load()`] reads one, [`frame`] transforms it into the
-//! world, and [`validate`] finds the triangles that a ray can meet.
 
 mod appearance;
 mod error;

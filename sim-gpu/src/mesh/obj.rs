@@ -12,11 +12,8 @@ use tobj::{LoadError, LoadOptions};
 use super::error::{Malformed, ParseError, excerpt};
 use super::triangle_mesh::{Parsed, TriangleMesh};
 
-/// Reads an OBJ file from its bytes.
-///
 /// All objects become one mesh. It has the vertices that faces refer to, in the order of their
-/// first use. Polygons become fans around their first corner; faces of fewer than three corners are
-/// dropped and counted.
+/// first use.
 pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, ParseError> {
     let geometry = Geometry::parse(bytes)?;
     let options = LoadOptions {

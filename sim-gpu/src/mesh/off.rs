@@ -12,10 +12,6 @@ use super::error::{Malformed, ParseError, excerpt};
 use super::tokens::{Tokens, integer};
 use super::triangle_mesh::Parsed;
 
-/// Reads an ASCII OFF file from its bytes.
-///
-/// Polygons become fans around their first corner. Faces of fewer than three
-/// corners are dropped and counted.
 pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, ParseError> {
     let mut tokens = Tokens::new(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes));
     if !tokens.seek_data() {

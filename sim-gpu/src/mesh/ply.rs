@@ -15,11 +15,8 @@ const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 const KINDS: [&str; 2] = ["vertex", "face"];
 const FACE: usize = 1;
 
-/// Reads a PLY file from its bytes.
-///
-/// It reads x, y and z of the element `vertex` and the list of vertex indices of `face`, and skips
-/// everything else. Polygons become fans around their first corner; faces of fewer than three
-/// corners are dropped and counted.
+/// Reads x, y and z of the element `vertex` and the list of vertex indices of `face`, and skips
+/// everything else.
 ///
 /// A coordinate of type `float` is rounded to f32 in text too, so that both
 /// encodings of a mesh give the same positions.
@@ -73,7 +70,6 @@ pub(super) fn parse(mut bytes: &[u8]) -> Result<Parsed, ParseError> {
     }
 }
 
-/// The reader's error, with its line, if known.
 fn syntax(error: FormatError) -> ParseError {
     let FormatError::Malformed { part, cause, .. } = error else {
         return Malformed::Syntax(error.to_string()).into();
@@ -209,7 +205,6 @@ mod tests {
         ];
         let with = |face: &str| header.clone() + &BODY.replace("3 0 1 2", face);
         fails(parse, bad_faces.map(|(face, message)| (with(face), message)));
-        // The check of all formats.
         let parsed = parse_any(with("3 0 1 3").as_bytes(), MeshFormat::Ply);
         assert_eq!(
             parsed.unwrap_err().to_string(),

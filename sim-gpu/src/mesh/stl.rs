@@ -26,7 +26,6 @@ const FACET: [(&str, usize); 7] = [
     ("endfacet", 0),
 ];
 
-/// Reads an STL file from its bytes.
 pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, ParseError> {
     let begins_solid = begins_with_word(bytes, "solid");
     let promised = bytes.as_chunks::<4>().0.get(HEADER / 4).copied().map(u32::from_le_bytes);
@@ -109,7 +108,6 @@ fn begins_with_word(line: &[u8], word: &str) -> bool {
         && line.get(word.len()).is_none_or(u8::is_ascii_whitespace)
 }
 
-/// The vertices and triangles read so far.
 #[derive(Default)]
 struct Corners {
     parsed: Parsed,

@@ -1,5 +1,3 @@
-//! Assertions for the tests of all readers.
-
 use glam::DVec3;
 
 use super::error::ParseError;
@@ -7,7 +5,6 @@ use super::triangle_mesh::{Parsed, TriangleMesh};
 
 type Parse = fn(&[u8]) -> Result<Parsed, ParseError>;
 
-/// Asserts that `file` holds one triangle and nothing else.
 #[track_caller]
 pub fn is_the_triangle(parse: Parse, file: impl AsRef<[u8]>) {
     let vertices = vec![DVec3::ZERO, DVec3::X, DVec3::Y];
@@ -16,7 +13,6 @@ pub fn is_the_triangle(parse: Parse, file: impl AsRef<[u8]>) {
     assert_eq!(found, Ok((expected, 0)), "{}", String::from_utf8_lossy(file.as_ref()));
 }
 
-/// Asserts that each file is refused with its message.
 #[track_caller]
 pub fn fails<File: AsRef<[u8]>>(
     parse: Parse,

@@ -80,7 +80,6 @@ impl<'a> Tokens<'a> {
     }
 }
 
-/// Parses `token` as an integer.
 pub(super) fn integer(token: &[u8], expected: &str) -> Result<i64, Malformed> {
     let number = match token {
         // Nearly every token of a face is short, and nine digits cannot overflow.

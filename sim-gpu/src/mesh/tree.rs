@@ -158,7 +158,6 @@ fn entry(root: &Path, absolute: &Path, path: PathBuf, seed: u64) -> Result<MeshE
     Ok(MeshEntry { path, relative, class, split, name })
 }
 
-/// Appends a hash of its path to each name that is not unique.
 fn make_unique(entries: &mut [MeshEntry]) -> Result<(), TreeError> {
     let place =
         |entry: &MeshEntry| (entry.class.to_lowercase(), entry.split, entry.name.to_lowercase());

@@ -38,8 +38,7 @@ impl UnitFrame {
     }
 }
 
-/// The lowest and the highest coordinates of `points`; infinity and minus infinity if there are
-/// none.
+/// The lowest and the highest coordinates of `points`; of none, infinity and minus infinity.
 #[must_use]
 pub fn bounding_box(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
     points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), point| {

@@ -25,8 +25,7 @@ pub struct MeshDefects {
 pub struct TriangleStats {
     /// The defects.
     pub defects: MeshDefects,
-    /// The indices of the triangles that are neither degenerate nor duplicates of an earlier one,
-    /// ascending.
+    /// The indices of the triangles that are neither degenerate nor duplicates, ascending.
     pub kept: Vec<u32>,
 }
 

@@ -11,9 +11,7 @@ use crate::config::{InvalidValue, finite};
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct PoseKeys {
-    /// Metres.
     pub position_m: [f64; 3],
-    /// The point to look at, metres.
     pub look_at_m: Option<[f64; 3]>,
     /// Angle about z, counterclockwise seen from above, applied last.
     pub yaw_deg: Option<f64>,
@@ -26,8 +24,7 @@ pub(crate) struct PoseKeys {
 }
 
 impl PoseKeys {
-    /// The pose of a sensor, whose orientation is required. `table` is the path of the TOML table,
-    /// for errors.
+    /// The pose of a sensor, whose orientation is required. Errors name the TOML `table`.
     pub fn pose(&self, table: &str) -> Result<Pose, InvalidValue> {
         let position_m = self.position_m(table)?;
         if let Some(target_m) = self.look_at_m {

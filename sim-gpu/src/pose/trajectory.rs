@@ -65,8 +65,7 @@ impl Trajectory {
         }
     }
 
-    /// Bounds of the distance, metres, and the turn, radians, from the pose at `from_s` until
-    /// `to_s`.
+    /// Bounds of the distance, metres, and turn, radians, from the pose at `from_s` until `to_s`.
     #[must_use]
     pub fn reach(&self, from_s: f64, to_s: f64) -> (f64, f64) {
         let start = self.at(from_s);

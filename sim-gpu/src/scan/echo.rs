@@ -16,7 +16,6 @@ pub(super) struct Echo {
     pub source: Source,
 }
 
-/// The source of an echo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Source {
     /// A surface.
@@ -25,7 +24,6 @@ pub(super) enum Source {
     Air { ray: u32, medium: Medium, draw: u32 },
 }
 
-/// The strength of an echo.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Signal {
     /// Relative to the power of a white surface that faces the sensor at 1 m.
@@ -70,7 +68,6 @@ impl Echo {
         merged
     }
 
-    /// Adds the light of a farther echo.
     fn add(&mut self, farther: &Self) {
         let power = self.signal.power + farther.signal.power;
         let share = farther.signal.power / power;

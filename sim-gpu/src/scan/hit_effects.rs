@@ -8,7 +8,6 @@ use crate::sensor::BeamPattern;
 use formats::rng::StreamKey;
 use glam::DVec3;
 
-/// The outputs of the effects for one hit.
 #[derive(Default)]
 pub(super) struct HitEffects {
     /// Metres, in world axes; range noise is in x alone.
@@ -52,7 +51,6 @@ impl HitEffects {
         Self { noise, dropped, intensity: 0.0 }
     }
 
-    /// Reads the outputs that a caster of `cast_effects` computed for one hit.
     fn read(cast_effects: &Effects, mut outputs: &[f32]) -> Self {
         let mut found = Self::default();
         for effect in cast_effects.per_ray() {

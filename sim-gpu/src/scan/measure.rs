@@ -48,7 +48,6 @@ struct Measurer<'a> {
     receiver: &'a Receiver<'a>,
     returns: Vec<Return>,
     tally: Tally,
-    /// The echoes of the beam at hand.
     echoes: Vec<Echo>,
     normals: Normals,
 }
@@ -86,7 +85,6 @@ impl Measurer<'_> {
         }
     }
 
-    /// Measures one beam, whose rays made these `hits`.
     fn measure_beam(&mut self, beam: u32, hits: &[HitId]) {
         let receiver = self.receiver;
         self.collect_surface_echoes(hits);
@@ -115,7 +113,6 @@ impl Measurer<'_> {
         }
     }
 
-    /// Fills `echoes` with those of the surfaces that a beam hits.
     fn collect_surface_echoes(&mut self, hits: &[HitId]) {
         self.echoes.clear();
         let (mut is_out_of_range, mut is_lost) = (false, false);

@@ -113,7 +113,6 @@ fn cast_nearest_first(
     cast.into_iter().flatten().unzip()
 }
 
-/// Assembles the scan of one request.
 fn finish(
     caster: &OpenCaster,
     objects: &[PlacedTarget],

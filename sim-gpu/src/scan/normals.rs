@@ -39,7 +39,6 @@ impl Normals {
     }
 }
 
-/// The unit normal where `object` was hit, in world axes; zero for a triangle without area.
 pub(super) fn unit_normal(object: &ObjectHits, pattern: &BeamPattern, hit: &Hit) -> DVec3 {
     let world_from_object = object.world_from_object_at(pattern, hit.beam);
     (normal_map(&world_from_object) * oracle::normal(&object.job.target, hit.triangle))

@@ -13,9 +13,7 @@ use std::ops::AddAssign;
 /// A hit, by its place in the lists of a scan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct HitId {
-    /// The place of its object among the scan's objects.
     pub object: u32,
-    /// Its place among the object's hits.
     pub hit: u32,
 }
 
@@ -47,7 +45,6 @@ impl<'a> ObjectHits<'a> {
         Self { object, world_from_object, glass, retroreflection, materials, job, hits }
     }
 
-    /// The pose of the object when `ray` of `pattern` is fired.
     pub(super) fn world_from_object_at(&self, pattern: &BeamPattern, ray: u32) -> DAffine3 {
         let at = |motion: &Motion| motion.world_from_object_at(pattern.time_s[ray as usize]);
         self.job.motion.as_ref().map_or(self.world_from_object, at)
@@ -58,7 +55,6 @@ impl<'a> ObjectHits<'a> {
         self.job.motion.is_some()
     }
 
-    /// The material of the surface at a hit of a ray of `pattern`.
     pub(super) fn material(&self, pattern: &BeamPattern, hit: &Hit) -> Material {
         let (reflectivity, retroreflection) = (self.job.reflectivity.into(), self.retroreflection);
         let Some(materials) = self.materials else {

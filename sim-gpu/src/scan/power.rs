@@ -37,13 +37,11 @@ pub(super) fn brightness(material: Material, cosine: impl FnOnce() -> f64) -> f6
     material.reflectivity * cosine().min(1.0)
 }
 
-/// The power received from a surface of this brightness at this range.
 pub(super) fn received(brightness: f64, range_m: f64) -> f64 {
     // A black surface returns nothing, even at range 0.
     if brightness == 0.0 { 0.0 } else { brightness / (range_m * range_m) }
 }
 
-/// The calibrated reflectivity that a sensor reports.
 pub(super) fn calibrated(brightness: f64, retroreflection: f64) -> u8 {
     let byte = match retroreflection {
         retro if retro > 0.0 => LEAST_RETRO + (IDEAL_RETRO - LEAST_RETRO) * retro,
@@ -53,7 +51,6 @@ pub(super) fn calibrated(brightness: f64, retroreflection: f64) -> u8 {
     byte.round() as u8
 }
 
-/// Whether a return of this power is detected.
 pub(super) fn is_detected(
     detection: &Detection,
     limit: &DetectionLimit,

@@ -25,7 +25,6 @@ pub(super) struct Receiver<'a> {
     pub effects: Effects,
     /// The sensor's detection limit, if detection is among the effects.
     pub limit: Option<DetectionLimit>,
-    /// Rain, snow, fog, haze and dust, if any.
     pub air: Option<Air>,
     /// The part of a beam's power in each of its rays; `None` for beams without width.
     ray_share: Option<f64>,
@@ -33,7 +32,6 @@ pub(super) struct Receiver<'a> {
     needs_signal: bool,
 }
 
-/// Why a hit has no echo.
 pub(super) enum NoEcho {
     /// The ray is off its beam's axis: it was cast for another scan, whose beams have a width.
     NotLit,
@@ -118,7 +116,6 @@ impl<'a> Receiver<'a> {
         Some(self.request.pose_at(ray).rotation * start)
     }
 
-    /// The start of a ray in the world.
     fn origin(&self, ray: u32) -> DVec3 {
         self.request.pose_at(ray).position_m + self.start(ray).unwrap_or_default()
     }
@@ -131,7 +128,6 @@ impl<'a> Receiver<'a> {
         }
     }
 
-    /// The echo of a hit.
     pub fn echo_of_hit(&self, id: HitId, normals: &mut Normals) -> Result<Echo, NoEcho> {
         let hit = self.hit(id);
         let limits = &self.request.sensor.range;
@@ -158,7 +154,6 @@ impl<'a> Receiver<'a> {
         f64::from(bits) >= glass.returned * 2f64.powi(32)
     }
 
-    /// How strong the echo of a hit is.
     fn signal(&self, id: HitId, normals: &mut Normals) -> Signal {
         let (object, hit) = (self.object(id), self.hit(id));
         let material = object.material(self.pattern(), hit);
@@ -175,8 +170,7 @@ impl<'a> Receiver<'a> {
         Signal { power, brightness, retroreflection: material.retroreflection }
     }
 
-    /// Appends to `echoes`, which holds those of the surfaces that `beam` hits, the echoes of
-    /// the air along it.
+    /// Appends the echoes of the air along `beam` to `echoes`, which holds those of its surfaces.
     pub fn add_air_echoes(&self, air: &Air, beam: u32, hits: &[HitId], echoes: &mut Vec<Echo>) {
         let ray = beam * self.pattern().rays_per_beam;
         let (origin, direction) = (self.origin(ray), self.direction(ray));
@@ -209,8 +203,7 @@ impl<'a> Receiver<'a> {
         });
     }
 
-    /// The stream and the ray that key an echo's random numbers: those of the ray that returned
-    /// most of it.
+    /// The stream and the ray of an echo's random numbers: those of the ray that returned most.
     pub fn random_key(&self, source: Source) -> (StreamKey, u32) {
         match source {
             Source::Surface(id) => (self.object(id).job.stream, self.hit(id).beam),

@@ -33,13 +33,11 @@ pub struct ScanRequest<'a> {
     /// Whether the motion of the sensor is compensated in its points. By default points are
     /// motion-distorted, as a driver that ignores ego-motion reports them.
     pub deskew: bool,
-    /// The effects to apply, which must be among those that the caster models;
-    /// `None`, the default, applies all of them.
+    /// The effects to apply, some of the caster's; `None`, the default, applies all of them.
     pub effects: Option<Effects>,
     /// The attributes of points besides their positions; none by default.
     pub attributes: AttributeSet,
-    /// The stream of all random numbers of the scan. Requests of the same stream have the same
-    /// noise.
+    /// The stream of all random numbers of the scan; by default that of seed 0.
     pub stream: StreamKey,
     /// Whether beams that cannot hit an object are cast. The scan is the same.
     pub culling: Culling,
@@ -61,11 +59,9 @@ pub struct PlacedTarget<'a> {
     pub stream: Option<StreamKey>,
     /// Its panes; none by default.
     pub glass: Option<Glass>,
-    /// The quality of a retro-reflector, such as a road sign or a licence plate: up to 1, which is
-    /// ideal. 0, the default, is a surface that scatters.
+    /// As [`Material::retroreflection`](crate::material::Material::retroreflection); default 0.
     pub retroreflection: f64,
-    /// The materials of its triangles, instead of its reflectivity and retroreflection; by default
-    /// it has a single one.
+    /// The materials of its triangles, instead of its reflectivity and retroreflection, if any.
     pub materials: Option<&'a Materials>,
 }
 
@@ -80,8 +76,7 @@ pub struct Glass {
 }
 
 impl<'a> ScanRequest<'a> {
-    /// A scan of `sensor`, whose beams are `pattern`, from `pose`: positions
-    /// alone, with all effects of the caster, and random numbers of seed 0.
+    /// A scan of `sensor`, whose beams are `pattern`, from `pose`, with the defaults of the fields.
     #[must_use]
     pub fn new(sensor: &'a SensorProfile, pattern: &'a BeamPattern, pose: Pose) -> Self {
         Self {
@@ -98,8 +93,7 @@ impl<'a> ScanRequest<'a> {
         }
     }
 
-    /// The effects that this scan applies if the caster models `cast_effects`,
-    /// with the sensor's own quantum filled in.
+    /// The effects that this scan applies of `cast_effects`, with the sensor's quantum filled in.
     pub fn applied_effects(&self, cast_effects: &Effects) -> Result<Effects, InvalidValue> {
         if self.attributes.contains(&Attribute::Intensity) && cast_effects.intensity.is_none() {
             let cause = "expected a caster that models intensity, found one without";
@@ -136,7 +130,6 @@ impl<'a> ScanRequest<'a> {
         self.aim_where(placed, |_| true)
     }
 
-    /// The rays of the wanted beams at `placed`.
     pub(super) fn aim_where(
         &self,
         placed: &PlacedTarget,
@@ -156,12 +149,10 @@ impl<'a> ScanRequest<'a> {
         CastJob { target, frame, motion, beams, aim, stream, reflectivity }
     }
 
-    /// The pose of the sensor at the start of the scan.
     pub(super) fn pose_at_start(&self) -> Pose {
         self.motion.as_ref().map_or(self.pose, |motion| motion.at(self.start_s))
     }
 
-    /// The pose of the sensor when `ray` of the pattern fires.
     pub(super) fn pose_at(&self, ray: u32) -> Pose {
         self.motion
             .as_ref()

@@ -59,8 +59,7 @@ pub struct SceneObject {
     pub scale: DVec3,
     /// The part of the light that it returns at vertical incidence, 0..=1. Default 1.
     pub reflectivity: f64,
-    /// The quality of a retro-reflector, 0..=1: 1 is ideal; 0, the default, is a surface that
-    /// scatters.
+    /// As [`Material::retroreflection`](crate::material::Material::retroreflection); default 0.
     pub retroreflection: f64,
     /// The materials of its faces, for OBJ only; by default a single one.
     pub materials: MaterialChoice,
@@ -93,8 +92,7 @@ impl SceneFile {
         Self::from_table(table, file)
     }
 
-    /// Parses the text of a scene in `file`, which need not exist; relative paths start from its
-    /// folder.
+    /// Parses a scene in `file`, which need not exist; relative paths start from its folder.
     pub fn parse(text: &str, file: &Path) -> Result<Self, ConfigError> {
         Self::from_table(config::parse(text, file)?, file)
     }
@@ -160,8 +158,7 @@ impl SceneFile {
         self.objects.iter().any(|object| self.simplify_of(object).is_some())
     }
 
-    /// Checks that triangle numbers are not an attribute of simplified meshes, whose triangles
-    /// differ from those of the file.
+    /// Checks that triangle numbers are not an attribute of simplified meshes.
     pub fn check_triangles(&self) -> Result<(), InvalidValue> {
         if self.simplifies() && self.attributes.contains(&Attribute::Triangle) {
             let cause = "a simplified mesh does not have the file's triangles, so that the \

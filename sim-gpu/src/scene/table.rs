@@ -18,7 +18,6 @@ use crate::pose::{PoseKeys, Trajectory};
 use crate::sensor::SensorProfile;
 use crate::simplify::Simplify;
 
-/// The keys of a scene.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SceneTable {
@@ -35,7 +34,6 @@ pub(super) struct SceneTable {
     pub simplify: Option<Simplify>,
 }
 
-/// The keys of an object.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ObjectTable {
@@ -62,7 +60,6 @@ pub(super) struct ObjectTable {
     simplify: Option<OwnSimplify>,
 }
 
-/// The keys of a sensor.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SensorTable {
@@ -99,7 +96,6 @@ struct TimedPose {
     quaternion_xyzw: Option<[f64; 4]>,
 }
 
-/// The trajectory at `key`, if there is one.
 fn trajectory(
     key: String,
     folder: &Path,
@@ -190,7 +186,6 @@ enum Scale {
     PerAxis([f64; 3]),
 }
 
-/// The simplification of one object.
 #[derive(Clone, Copy, Deserialize)]
 #[serde(untagged, expecting = "expected \"auto\", metres above 0 or false as simplify")]
 enum OwnSimplify {

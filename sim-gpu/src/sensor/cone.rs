@@ -49,7 +49,6 @@ impl Cone {
 }
 
 impl WidenedCone {
-    /// Whether `direction` lies inside.
     pub(super) fn holds(&self, direction: DVec3) -> bool {
         self.axis.dot(direction) >= self.threshold
     }

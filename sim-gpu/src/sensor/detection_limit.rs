@@ -27,7 +27,6 @@ impl DetectionLimit {
         self.reflectivity / self.range_m.powi(2)
     }
 
-    /// Checks both numbers, under the names that begin with `key`.
     pub(crate) fn validate(&self, key: &str) -> Result<(), InvalidValue> {
         positive(&format!("{key}.reflectivity"), self.reflectivity)?;
         within(&format!("{key}.reflectivity"), self.reflectivity, 0.0..=1.0)?;

@@ -22,7 +22,6 @@ pub struct BeamShape {
 const WIDEST_DEG: f64 = 90.0;
 
 impl BeamShape {
-    /// Checks all numbers, under the names that begin with `key`.
     pub(crate) fn validate(&self, key: &str) -> Result<(), InvalidValue> {
         Self::check_divergence(key, self.divergence_deg)?;
         within(&format!("{key}.separation_m"), self.separation_m, 0.0..=f64::MAX)

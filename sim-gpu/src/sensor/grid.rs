@@ -37,7 +37,6 @@ pub struct Grid {
     pub cy: Option<f64>,
 }
 
-/// The optics of a grid, as its profile states them.
 enum Optics {
     FieldOfView { x_deg: f64, y_deg: f64 },
     Pinhole { fx: f64, fy: f64, cx: f64, cy: f64 },

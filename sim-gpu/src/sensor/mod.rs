@@ -149,8 +149,7 @@ impl SensorProfile {
         Some(sensor.expect("invariant: a test parses all built-in profiles"))
     }
 
-    /// Reads a profile or, if the name of `file` ends with `.json`, the metadata of an Ouster
-    /// sensor.
+    /// Reads a profile, or an Ouster sensor's metadata if the name of `file` ends with `.json`.
     pub fn load(file: &Path) -> Result<Self, ConfigError> {
         if file.extension().is_some_and(|extension| extension == "json") {
             return ouster::load(file);
@@ -227,8 +226,7 @@ impl SensorProfile {
         self
     }
 
-    /// The same sensor with only each `k`-th azimuth step, or column of pixels, starting with the
-    /// first. Its rays are some of this sensor's, in the same order.
+    /// The same sensor with only each `k`-th azimuth step or column of pixels, from the first on.
     #[must_use]
     pub fn decimated(&self, k: NonZeroU32) -> Self {
         Self { decimation: self.decimation.saturating_mul(k), ..self.clone() }
@@ -283,7 +281,6 @@ impl Rays {
     }
 }
 
-/// `n_rays`, if there is at least one and not too many.
 fn checked_ray_count(key: &str, n_rays: u64) -> Result<(), InvalidValue> {
     match n_rays {
         0 => Err(InvalidValue::new(key, "expected at least one ray, found none")),

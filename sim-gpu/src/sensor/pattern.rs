@@ -53,14 +53,11 @@ pub struct BeamPattern {
     pub ring: Vec<u16>,
     /// Time since the start of the revolution, `[n_rays]`.
     pub time_s: Vec<f64>,
-    /// The start of each ray in the sensor frame, metres, `[n_rays]`; empty if all rays start at
-    /// the origin.
+    /// Starts of the rays in the sensor frame, metres, `[n_rays]`; empty if all are the origin.
     pub starts_m: Vec<DVec3>,
-    /// The number of rays of each beam, which are neighbours, the axis first; 1 for beams without
-    /// width.
+    /// Rays of each beam, which are neighbours, the axis first; 1 for beams without width.
     pub rays_per_beam: u32,
-    /// A permutation of the rays, `[n_rays]`, in which neighbours point in similar directions, so
-    /// that they traverse a tree together.
+    /// A permutation, `[n_rays]`, whose neighbours point alike and traverse a tree together.
     pub order: Vec<u32>,
     /// Bounding cones of each [`BLOCK_RAYS`] rays of `order`.
     blocks: Vec<BlockCone>,

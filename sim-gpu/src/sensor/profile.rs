@@ -11,7 +11,6 @@ use super::{
 };
 use crate::config::{self, ConfigError, InvalidValue, positive, within};
 
-/// The keys of a profile.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Profile {
@@ -118,7 +117,6 @@ impl TryFrom<Profile> for SensorProfile {
     }
 }
 
-/// The layout, checked, if there is exactly one.
 fn only_layout(layouts: [Option<Layout>; 5]) -> Result<Layout, InvalidValue> {
     let mut found = layouts.into_iter().flatten();
     let expected = "expected one of [rotating], [uniform], [grid], [risley] and [table]";

@@ -125,12 +125,10 @@ impl Risley {
         Ok(())
     }
 
-    /// The number of rays of consecutive scans.
     pub(super) fn rays_in(&self, scans: u32) -> u64 {
         self.pulses(scans).saturating_mul(self.line.len() as u64)
     }
 
-    /// The number of pulses of each line in consecutive scans.
     fn pulses(&self, scans: u32) -> u64 {
         // The conversion to an integer saturates.
         (self.pulse_hz * self.period_s * f64::from(scans)).round() as u64

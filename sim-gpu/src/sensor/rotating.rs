@@ -58,7 +58,6 @@ impl Rotating {
         self.rays_in(1)
     }
 
-    /// The number of rays in consecutive revolutions.
     pub(super) fn rays_in(&self, revolutions: u32) -> u64 {
         let turns = f64::from(revolutions);
         // The conversion to an integer saturates.
@@ -155,7 +154,6 @@ impl Rotating {
         rays
     }
 
-    /// The encoder's azimuth at `time_s`, in a sequence that started at `start_s`.
     fn encoder_rad(&self, start_s: f64, time_s: f64) -> f64 {
         let turned_rad = |time_s| TAU * time_s / self.period_s();
         let rounded_rad = |angle_rad: f64, quantum_deg: f64| {
@@ -184,7 +182,6 @@ impl Rotating {
     }
 }
 
-/// The direction of `laser` while the encoder reads `encoder_rad`.
 fn direction(laser: &Beam, encoder_rad: f64) -> DVec3 {
     let clockwise_rad = encoder_rad - laser.azimuth_offset_deg.to_radians();
     let (sin_azimuth, cos_azimuth) = clockwise_rad.sin_cos();

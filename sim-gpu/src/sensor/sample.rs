@@ -11,8 +11,7 @@ use crate::config::{InvalidValue, within};
 pub struct Sample {
     /// The number of points drawn.
     pub points: u32,
-    /// Whether a point may be drawn more than once. If not, a scan with fewer points keeps them
-    /// all.
+    /// Whether a point may be drawn repeatedly; if not, a scan of fewer points keeps them all.
     pub with_replacement: bool,
     /// The number of points drawn before the points are snapped to rings: without replacement from
     /// a scan that has as many, with replacement from a smaller one (ModelNet40-C, `occlusion_1`).
@@ -31,8 +30,7 @@ impl Sample {
         }
     }
 
-    /// The indices of the points to keep of `n_available` before the rings: all of them unless
-    /// the profile asks for such a draw.
+    /// As [`Sample::draw`], before the rings: all points unless the profile asks for such a draw.
     #[must_use]
     pub fn draw_before_rings(&self, n_available: u32, key: StreamKey) -> Vec<u32> {
         match self.before_rings {

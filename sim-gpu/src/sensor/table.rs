@@ -24,12 +24,10 @@ pub struct Table {
     /// The start of the first scan, seconds after the first row.
     #[serde(default)]
     pub start_s: f64,
-    /// The number of laser lines that take turns row by row; a point's ring is the index of its
-    /// line.
+    /// Laser lines, which take turns row by row; a point's ring is the index of its line.
     #[serde(default = "one_line")]
     pub lines: u16,
-    /// The azimuth, counterclockwise from forward, and the elevation of each row, instead of a
-    /// file.
+    /// Azimuth, counterclockwise from forward, and elevation of each row, instead of a file.
     #[serde(default)]
     pub directions_deg: Vec<[f64; 2]>,
 }
@@ -79,12 +77,10 @@ impl Table {
         checked_ray_count("table", self.rays_in(1))
     }
 
-    /// The number of rays of consecutive scans.
     pub(super) fn rays_in(&self, scans: u32) -> u64 {
         self.rows(scans)
     }
 
-    /// The number of rows of consecutive scans.
     fn rows(&self, scans: u32) -> u64 {
         // The conversion to an integer saturates.
         (self.pulse_hz * self.period_s * f64::from(scans)).round() as u64
@@ -96,7 +92,6 @@ impl Table {
         ((start + row) % self.directions_deg.len() as u64) as usize
     }
 
-    /// Removes the rows that consecutive scans of this number do not use.
     pub(super) fn trim(&mut self, scans: u32) {
         let needed = self.rows(scans);
         let in_turn = u64::from(self.lines);
@@ -127,7 +122,6 @@ impl Table {
     }
 }
 
-/// The directions of a CSV file.
 fn read(file: &Path) -> Result<Vec<[f64; 2]>, ConfigError> {
     let failed = |line: u64, cause: String| {
         let message = if line > 0 { format!("line {line}: {cause}") } else { cause };

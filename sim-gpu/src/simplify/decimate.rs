@@ -75,7 +75,6 @@ fn repair(
     left
 }
 
-/// The `nth` three of `corners`.
 fn triangle(corners: &[u32], nth: usize) -> [u32; 3] {
     [0, 1, 2].map(|corner| corners[3 * nth + corner])
 }

@@ -105,7 +105,6 @@ pub fn simplified_surface(
     })
 }
 
-/// [`Simplify`] as written.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(untagged, expecting = "expected \"auto\" or metres as simplify")]
 enum Written {

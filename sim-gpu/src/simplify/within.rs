@@ -78,13 +78,11 @@ impl Proof<'_> {
         true
     }
 
-    /// Whether all of `piece` is near the triangle `index`.
     fn is_near(&self, piece: [DVec3; 3], index: u32) -> bool {
         let corners = self.target.surface.corners(index);
         piece.iter().all(|&corner| distance_to_triangle(corner, corners) <= self.bound)
     }
 
-    /// A triangle near all of `piece`.
     fn one_near(&self, piece: [DVec3; 3]) -> Option<u32> {
         self.search(piece, |index| self.is_near(piece, index))
     }

@@ -2,15 +2,12 @@
 
 use crate::sensor::RangeLimits;
 
-/// A beam through drops.
 pub(super) struct Beam {
     /// The geometric mean of the tangents of its angles of divergence.
     pub width: f64,
     /// The extinction of the air, per metre.
     pub extinction: f64,
-    /// The least power that is detected.
     pub least_power: f64,
-    /// The ranges that the sensor measures.
     pub range: RangeLimits,
 }
 
@@ -114,7 +111,6 @@ impl Drops {
         (1000.0 * self.width * range_m * part).max(SMALLEST_MM)
     }
 
-    /// The part of the drops at this range that is detected.
     fn part_detected(&self, range_m: f64) -> f64 {
         (-self.slope * (self.least_mm(range_m) - SMALLEST_MM)).exp()
     }
@@ -135,7 +131,6 @@ impl Drops {
         unseen_m
     }
 
-    /// The mean number of drops that are detected up to this range.
     pub fn mean(&self, range_m: f64) -> f64 {
         let place = (range_m - self.from_m) / self.step_m;
         let last = self.counts.len() - 1;
@@ -150,8 +145,7 @@ impl Drops {
         }
     }
 
-    /// Passes the range and the power of each detected drop up to `end_m` to `take`. `bits` gives
-    /// the random bits of each draw.
+    /// Passes the range and the power of each detected drop up to `end_m` to `take`.
     pub fn draw(&self, end_m: f64, bits: impl Fn(u32) -> [u32; 4], mut take: impl FnMut(f64, f64)) {
         let first = bits(0);
         let uniform = super::unit(first[0]);

@@ -23,7 +23,6 @@ const BACKSCATTER: f64 = 0.046;
 /// The reference of Hahner et al. for fog: 1e-6 / pi.
 const HAHNERS_SURFACE: f64 = 1e-6 / PI;
 
-/// The return of fog.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fog {
     /// The range of the maximum of I(R), metres.
@@ -67,7 +66,6 @@ impl Fog {
         self.is_in_proportion
     }
 
-    /// The return of the fog along `beam`.
     pub fn scattered(&self, beam: &AirBeam) -> Option<Scattered> {
         let (range_m, power, brightness) = if self.is_in_proportion {
             let power = self.power * beam.brightness;

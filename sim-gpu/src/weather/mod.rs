@@ -155,8 +155,7 @@ const DUST_PURPOSE: u32 = 96;
 const WAVELENGTH: f64 = 905.0 / 550.0;
 
 impl Air {
-    /// The air of this `weather`, for beams with these angles of divergence, degrees, and a sensor
-    /// with this detection `limit` and `range`.
+    /// The air of this `weather`, for a sensor whose beams diverge by these angles, degrees.
     #[must_use]
     pub fn new(
         weather: &Weather,
@@ -235,7 +234,6 @@ impl Air {
         }
     }
 
-    /// The return of `volume`, if any.
     fn scattered_in(&self, volume: &Volume, beam: &AirBeam, purpose: u32) -> Option<Scattered> {
         let AirBeam { origin, direction, end_m, stream, number, .. } = *beam;
         let (enters_m, leaves_m) = inside(volume, origin, direction, end_m)?;
@@ -261,7 +259,6 @@ fn unit(bits: u32) -> f64 {
     f64::from(bits) * (1.0 / 4_294_967_296.0)
 }
 
-/// The optical depth of `volume` along a beam up to this range.
 fn depth(volume: &Volume, origin: DVec3, direction: DVec3, range_m: f64) -> f64 {
     inside(volume, origin, direction, range_m).map_or(0.0, |(enters_m, leaves_m)| {
         (leaves_m - enters_m) * extinction_of(volume.visibility_m)

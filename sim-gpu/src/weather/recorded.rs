@@ -15,8 +15,7 @@ pub struct Fates {
     pub scattered: usize,
     /// Points that became too weak to be detected.
     pub lost: usize,
-    /// Those of the lost points that are below the detection limit in clear air, too: the sensor
-    /// that recorded them has a lower limit.
+    /// Those of the lost points that are below the detection limit in clear air, too.
     pub too_weak_before: usize,
     /// Points that are not finite or lie in the sensor. They are kept unchanged.
     pub passed_over: usize,
@@ -73,8 +72,7 @@ pub fn in_weather(
     (moved(scan, sensor_m, &kept, &found), fates)
 }
 
-/// The strongest return of the air along a beam that ends at a surface; `None` if all are weaker
-/// than `least`.
+/// The strongest return of the air along a beam that ends at a surface, if not below `least`.
 fn strongest(air: &Air, beam: &AirBeam, least: f64) -> Option<Scattered> {
     let range_m = beam.end_m;
     let brightness = beam.brightness * air.transmission(beam.origin, beam.direction, range_m);

@@ -1,5 +1,3 @@
-//! Comparisons with closed forms and published figures.
-
 use super::*;
 
 const LISA_DIVERGENCE_DEG: [f64; 2] = [0.171_887_338_539_246_97; 2];

@@ -1,11 +1,8 @@
-//! Rays made in integers are within the documented distance of the true ones.
-
 use super::*;
 use crate::fixed_frame::fixed_direction;
 use formats::rng::StreamKey;
 use glam::{DMat3, DQuat, DVec3};
 
-/// The unit of all errors.
 const U: f64 = 1.0 / 16_777_216.0;
 
 /// The radius of the bounding sphere of a cube of side 2, with the margin of `Surface`.
@@ -19,7 +16,6 @@ impl Random {
         self.0.unit(self.1)
     }
 
-    /// A point whose coordinates are below 1.
     fn point(&mut self) -> DVec3 {
         DVec3::from_array([(); 3].map(|()| 2.0 * self.unit() - 1.0))
     }

@@ -1,5 +1,3 @@
-//! Every way of tracing gives the same answers.
-
 use super::*;
 use crate::bvh::{Builder, Stack};
 use crate::cpu::traverse::traverse;

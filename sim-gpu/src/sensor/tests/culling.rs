@@ -56,7 +56,6 @@ proptest! {
         assert_culls(&PATTERNS[which], &Cone { axis, half_angle_rad });
     }
 
-    /// The cone's edge, or its tip, lies exactly on a ray.
     #[test]
     fn a_ray_on_the_edge_is_never_lost(
         edge in any::<prop::sample::Index>(),

@@ -1,5 +1,3 @@
-//! Checks of the built-in sensors, and of the profiles that are refused.
-
 use std::path::Path;
 
 use super::*;

@@ -61,7 +61,6 @@ fn every_direction_is_of_unit_length_and_every_ray_once_in_the_order() {
     }
 }
 
-/// A higher ring never points lower.
 #[test]
 fn rings_are_ranked_from_below() {
     for name in builtin_names() {

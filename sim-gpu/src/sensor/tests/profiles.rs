@@ -44,7 +44,6 @@ fn a_file_too_long_or_not_text_is_refused() {
     assert!(matches!(SensorProfile::load(&file), Err(ConfigError::Read { .. })));
 }
 
-/// The profiles in SENSORS.md can be read.
 #[test]
 fn the_profiles_of_the_documentation_are_sound() {
     let page = include_str!("../../../SENSORS.md");
