@@ -76,71 +76,21 @@ pub mod errors {
 /// promise: any release may change it.
 #[doc(hidden)]
 pub mod internals {
-    pub mod bvh {
-        pub use crate::bvh::*;
+    macro_rules! modules {
+        ($($name:ident)*) => {
+            $(
+                pub mod $name {
+                    pub use crate::$name::*;
+                }
+            )*
+        };
     }
-    pub mod cast_error {
-        pub use crate::cast_error::*;
+
+    modules! {
+        bvh cast_error caster config corruption cpu job material mesh motion packets pose ray resolve
+        scan scene sensor simplify surface_points target weather
     }
-    pub mod caster {
-        pub use crate::caster::*;
-    }
-    pub mod config {
-        pub use crate::config::*;
-    }
-    pub mod corruption {
-        pub use crate::corruption::*;
-    }
-    pub mod cpu {
-        pub use crate::cpu::*;
-    }
+
     #[cfg(feature = "gpu")]
-    pub mod gpu {
-        pub use crate::gpu::*;
-    }
-    pub mod job {
-        pub use crate::job::*;
-    }
-    pub mod material {
-        pub use crate::material::*;
-    }
-    pub mod mesh {
-        pub use crate::mesh::*;
-    }
-    pub mod motion {
-        pub use crate::motion::*;
-    }
-    pub mod packets {
-        pub use crate::packets::*;
-    }
-    pub mod pose {
-        pub use crate::pose::*;
-    }
-    pub mod ray {
-        pub use crate::ray::*;
-    }
-    pub mod resolve {
-        pub use crate::resolve::*;
-    }
-    pub mod scan {
-        pub use crate::scan::*;
-    }
-    pub mod scene {
-        pub use crate::scene::*;
-    }
-    pub mod sensor {
-        pub use crate::sensor::*;
-    }
-    pub mod simplify {
-        pub use crate::simplify::*;
-    }
-    pub mod surface_points {
-        pub use crate::surface_points::*;
-    }
-    pub mod target {
-        pub use crate::target::*;
-    }
-    pub mod weather {
-        pub use crate::weather::*;
-    }
+    modules! { gpu }
 }
