@@ -2,18 +2,14 @@
 //!
 //! From a cloud to its class:
 //!
-//! ```
+//! ```no_run
 //! use std::path::Path;
 //!
 //! use infer_cpu::{Classifier, Options, read_cloud};
 //!
-//! # let model = concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/weights/edge-64.safetensors");
-//! # let folder = tempfile::tempdir().unwrap();
-//! # let cloud = folder.path().join("chair.xyz");
-//! # std::fs::write(&cloud, "0 0 0\n1 0 0\n0 2 0\n0 0 3\n").unwrap();
-//! // `model` and `cloud` are paths; the checkout has models in assets/weights.
-//! let mut classifier = Classifier::load(Path::new(model), &Options::default())?;
-//! let cloud = read_cloud(&cloud)?;
+//! let model = Path::new("assets/weights/edge-64.safetensors"); // of a checkout
+//! let mut classifier = Classifier::load(model, &Options::default())?;
+//! let cloud = read_cloud(Path::new("chair.ply"))?;
 //! let prediction = classifier.classify_f64(&cloud)?;
 //! println!("{} ({:.1} %)", prediction.answer(), 100.0 * prediction.confidence());
 //! # Ok::<(), infer_cpu::Error>(())
@@ -31,8 +27,9 @@
 //!
 //! # Features
 //! `npz`, `ply`, `pcd` and `las` read clouds of these formats. `evaluate` and `live` add what their
-//! names say, and `mcap` recordings. `cli` builds the program `infer-cpu`; a library's user can leave
-//! it out: `infer-cpu = { version = "0.1", default-features = false }`.
+//! names say, and `mcap` recordings. `cli` builds the program `infer-cpu`; a library's user leaves it
+//! out and names the formats: `infer-cpu = { version = "0.1", default-features = false, features =
+//! ["npz", "ply"] }`. Text, NPY and KITTI's `.bin` are always read.
 
 #![deny(unsafe_code)]
 
