@@ -6,7 +6,7 @@ mod cli;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use cli::{compare_points, eval, explain, serve, train};
+use cli::{compare_points, eval, explain, train};
 use formats::outcome::{Outcome, exit_code};
 
 /// Trains PointNets and evaluates them
@@ -27,9 +27,6 @@ enum Command {
     Explain(explain::ExplainArgs),
     /// Compute the Chamfer distance of two clouds
     ComparePoints(compare_points::ComparePointsArgs),
-    /// Time training steps, for `cargo xtask bench train`
-    #[command(hide = true)]
-    Serve(serve::ServeArgs),
 }
 
 fn main() -> ExitCode {
@@ -38,7 +35,6 @@ fn main() -> ExitCode {
         Command::Eval(args) => eval::run(&args),
         Command::Explain(args) => explain::run(&args),
         Command::ComparePoints(args) => compare_points::run(&args),
-        Command::Serve(args) => serve::run(&args),
     };
     exit_code(done.map(|()| Outcome::Success)).into()
 }

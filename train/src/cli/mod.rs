@@ -2,7 +2,6 @@ pub mod compare_points;
 pub mod eval;
 pub mod explain;
 mod progress;
-pub mod serve;
 pub mod train;
 
 use formats::outcome::Usage;

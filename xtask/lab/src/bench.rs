@@ -98,7 +98,6 @@ struct Report<T> {
     peak_memory_bytes: Option<u64>,
 }
 
-/// The measurements of `bench sim`.
 #[derive(Serialize)]
 struct Speeds {
     speed: speed::Speed,

@@ -74,7 +74,6 @@ pub fn of_adapter(adapter: &AdapterSummary) -> Result<Backend> {
     Ok(Backend { caster, rays, is_gpu })
 }
 
-/// An adapter's name, short enough for a table.
 pub fn short(name: &str) -> String {
     name.split(" (").next().unwrap_or(name).to_owned()
 }

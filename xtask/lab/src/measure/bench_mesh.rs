@@ -12,7 +12,6 @@ use std::path::Path;
 /// A mesh in the world, in metres.
 pub struct BenchMesh {
     pub name: String,
-    /// The mesh, about as large as the unit sphere.
     pub mesh: TriangleMesh,
 }
 

@@ -15,7 +15,6 @@ pub struct Cost {
     pub cpu_s: f64,
 }
 
-/// The costs of all repeats, in order.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Costs(pub Vec<Cost>);
 

@@ -14,7 +14,6 @@ pub struct Subprocess {
     output: BufReader<ChildStdout>,
 }
 
-/// A line of the program's output.
 #[derive(Deserialize)]
 #[serde(untagged)]
 enum Message<T> {

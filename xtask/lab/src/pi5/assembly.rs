@@ -61,7 +61,6 @@ fn branch_target(instruction: &str) -> Option<&str> {
     (branches || mnemonic.starts_with("b.")).then(|| operands.rsplit(',').next())?.map(str::trim)
 }
 
-/// A loop, from its label to the branch back.
 #[derive(Clone, Debug)]
 pub struct Loop<'a>(Vec<&'a str>);
 

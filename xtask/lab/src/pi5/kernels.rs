@@ -27,7 +27,6 @@ impl Kernel {
 
 #[derive(Clone, Debug)]
 pub struct Tile {
-    /// Its loop over inputs.
     pub kernel: Kernel,
     pub rows: usize,
     pub channels: usize,

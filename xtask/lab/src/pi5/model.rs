@@ -83,7 +83,6 @@ pub fn time(
     time
 }
 
-/// The load of a stage in its inner loops.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Load {
     /// Cycles of all threads together.

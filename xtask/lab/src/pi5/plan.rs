@@ -54,7 +54,6 @@ impl Setting {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Product {
     pub layer: Layer,
-    /// The format of its activations and weights.
     pub number: Number,
 }
 
@@ -145,7 +144,6 @@ pub fn stages(
     Some(stages)
 }
 
-/// The formats of a precision.
 struct Formats {
     /// Point-wise layers but for the first.
     points: Number,

@@ -60,7 +60,6 @@ struct Scale<'a> {
     drawn: Range<f64>,
 }
 
-/// A chart with one message.
 pub struct Chart<'a> {
     pub message: String,
     /// How to read the dots; may be empty.

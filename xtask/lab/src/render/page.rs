@@ -11,7 +11,6 @@ pub struct Chapter {
     /// Its anchor: letters and hyphens.
     pub id: String,
     pub tab: String,
-    /// Its heading, a question.
     pub title: String,
     pub body: Markup,
 }

@@ -21,9 +21,7 @@ pub struct Table {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Cell {
     Text(String),
-    /// A number and its decimals.
     Number(f64, usize),
-    /// A count and the count of all.
     Share(usize, usize),
     /// A mean of shares, and half the width of its 95 % interval.
     Mean(f64, f64),
@@ -84,7 +82,6 @@ impl Cell {
         self.numbers().1.map_or(String::new(), words)
     }
 
-    /// A cell shaded by its share, if it is one.
     fn html(&self) -> Markup {
         let share = self.numbers().0.filter(|_| !matches!(self, Self::Number(..)));
         let opacity = share.map(|share| 0.45 * share);
@@ -100,7 +97,6 @@ impl Table {
         Self { title: title.into(), heading, ..Self::default() }
     }
 
-    /// A table with a row for each of `items`.
     pub fn of<T>(title: impl Into<String>, items: &[T], columns: &[Column<'_, T>]) -> Self {
         let mut table =
             Self::new(title, &columns.iter().map(|column| column.0).collect::<Vec<_>>());

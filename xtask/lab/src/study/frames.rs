@@ -92,7 +92,6 @@ struct FalseAlarm {
     frame: String,
     source: &'static str,
     class: String,
-    /// Its label, if it has one.
     truth: String,
     object: String,
 }

@@ -80,7 +80,6 @@ struct Report {
     file: PathBuf,
 }
 
-/// An expectation, and whether it is met.
 #[derive(Clone, Serialize)]
 struct Check {
     what: String,

@@ -11,7 +11,6 @@ pub trait Plan: DeserializeOwned {
     fn check(&self) -> anyhow::Result<()>;
 }
 
-/// The plan at `path`, or a bundled one.
 pub fn read<P: Plan>(path: Option<&Path>, quick: bool) -> anyhow::Result<P> {
     let (name, text) = match path {
         Some(path) => {

@@ -52,7 +52,6 @@ pub fn run(args: &RobustnessArgs) -> Result<()> {
     publish(&tables, args.report.as_deref())
 }
 
-/// A set of changed clouds, or of negatives.
 struct Input {
     name: String,
     set: LabelledSet,

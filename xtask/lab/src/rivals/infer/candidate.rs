@@ -37,7 +37,6 @@ pub enum Arithmetic {
     I8,
 }
 
-/// An engine in tables and records.
 #[derive(Clone, Debug, Serialize)]
 pub struct Label {
     /// Its name in `--engines`.

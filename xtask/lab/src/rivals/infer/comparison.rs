@@ -17,7 +17,6 @@ const REPEATS: [usize; 2] = [3, 40];
 /// Threads of the pool that ran last may still spin; ncnn's do for 20 ms.
 const PAUSE: Duration = Duration::from_millis(30);
 
-/// The result of a candidate on one job.
 #[derive(Clone, Debug, Serialize)]
 pub struct Entry {
     #[serde(flatten)]
@@ -26,7 +25,6 @@ pub struct Entry {
     pub job: Job,
     /// The difference of its answer from the reference's.
     pub error: f64,
-    /// The costs of every repeat of every turn.
     #[serde(flatten, serialize_with = "in_ns")]
     pub costs: Costs,
 }

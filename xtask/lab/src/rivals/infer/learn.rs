@@ -1,19 +1,28 @@
 //! `cargo xtask bench train`: times one step of training the baseline with our program
 //! and with PyTorch, in turns.
 
-use super::candidate::{Arithmetic, Candidate, Job, Label};
+use super::candidate::{Arithmetic, Candidate, Engine, Job};
 use super::comparison::{Entry, compare};
 use super::model::{self, worst};
-use super::roster::{Material, TRAINERS, served, start};
+use super::ours::timed;
+use super::roster::{Material, TRAINERS, start};
 use super::speed_tables::show;
+use crate::measure::clock::Cost;
 use crate::measure::machine::Machine;
-use anyhow::Result;
+use anyhow::{Context, Result};
 use clap::Args;
 use formats::atomic;
+use formats::weights::WeightsFile;
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
+use train::adam::Adam;
+use train::batch::Batch;
+use train::layer::Module;
+use train::matrix::Matrix;
+use train::network::{PointNet, Rates};
+use train::shape::Shape;
 use xtask::venv::cache_dir;
-use xtask::workspace;
 
 #[derive(Args, Debug)]
 pub struct TrainArgs {
@@ -75,9 +84,77 @@ pub fn run(args: &TrainArgs) -> Result<()> {
     Ok(())
 }
 
+struct Learning {
+    values: BTreeMap<String, Vec<f32>>,
+    n_classes: usize,
+    coordinates: Vec<f32>,
+    network: PointNet,
+    batch: Batch,
+    step: u64,
+}
+
+const RATES: Rates = Rates { momentum: 0.1, orthogonality: 0.001, step: 0 };
+
 fn ours(material: &Material) -> Result<Candidate> {
-    let mut command = workspace::cargo(&["run", "--quiet", "--release", "--package", "train"]);
-    command.args(["--", "serve"]).args([&material.model, &material.folder]);
-    let label = Label { name: "ours".to_owned(), arithmetic: Arithmetic::F32, ours: true };
-    served(label, &mut command)
+    let mut file = WeightsFile::open(&material.model)?;
+    let mut values = BTreeMap::new();
+    for name in file.shapes().into_keys() {
+        let tensor = file.read(&name)?;
+        values.insert(name, tensor.values);
+    }
+    let n_classes = file.shape("fc3.weight").context("the model has no tensor fc3.weight")?[0];
+    let coordinates = WeightsFile::open(&material.cloud())?.read("points")?.values;
+    let network = PointNet::new(&Shape::default(), n_classes, 0);
+    let batch = Batch::default();
+    let engine = Learning { values, n_classes, coordinates, network, batch, step: 0 };
+    Ok(Candidate::ours("ours".to_owned(), Arithmetic::F32, engine))
+}
+
+impl Learning {
+    fn begin(&mut self) {
+        self.network = PointNet::new(&Shape::default(), self.n_classes, 0);
+        self.step = 0;
+        for parameter in self.network.parameters() {
+            if let Some(values) = self.values.get(&parameter.name) {
+                parameter.value.copy_from_slice(values);
+            }
+        }
+    }
+
+    fn learn(&mut self) -> f64 {
+        let loss = self.network.learn(&self.batch, None, RATES);
+        self.step += 1;
+        let adam = Adam::default();
+        adam.step(&mut self.network, self.step, adam.rate);
+        loss.total
+    }
+}
+
+impl Engine for Learning {
+    fn load(&mut self, Job { points, setting: clouds }: Job) -> Result<()> {
+        let coordinates = self.coordinates[..3 * points * clouds].as_chunks::<3>().0.to_vec();
+        let targets =
+            |(cloud, class): (usize, usize)| f32::from(u8::from(cloud % self.n_classes == class));
+        self.batch = Batch {
+            weights: vec![1.0; coordinates.len()],
+            coordinates,
+            starts: (0..=clouds).map(|cloud| cloud * points).collect(),
+            targets: Matrix::from_shape_fn((clouds, self.n_classes), targets),
+            ..Batch::default()
+        };
+        self.begin();
+        Ok(())
+    }
+
+    fn answer(&mut self) -> Result<Vec<f64>> {
+        self.begin();
+        Ok(vec![self.learn(), self.learn()])
+    }
+
+    fn time(&mut self, repeats: usize) -> Result<Vec<Cost>> {
+        timed(repeats, || {
+            self.learn();
+            Ok(())
+        })
+    }
 }

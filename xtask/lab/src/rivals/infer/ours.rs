@@ -55,8 +55,7 @@ pub fn classifiers(
     wanted.map(candidate).collect()
 }
 
-/// The cost of each of `repeats` runs of `once`.
-fn timed(repeats: usize, mut once: impl FnMut() -> Result<()>) -> Result<Vec<Cost>> {
+pub(super) fn timed(repeats: usize, mut once: impl FnMut() -> Result<()>) -> Result<Vec<Cost>> {
     for _ in 0..UNCOUNTED {
         once()?;
     }

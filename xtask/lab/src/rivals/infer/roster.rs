@@ -67,7 +67,6 @@ pub fn start(
     candidates
 }
 
-/// A candidate that `command` serves.
 pub fn served(label: Label, command: &mut Command) -> anyhow::Result<Candidate> {
     let (server, version) = Server::start(command)?;
     Ok(Candidate { label, version, engine: Box::new(server) })
@@ -85,7 +84,6 @@ const TORCH: Environment<'_> = Environment {
     size: "about 5 GB",
 };
 
-/// The program that runs a rival.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Host {
     /// `peers/infer/infer.py`.
@@ -98,7 +96,6 @@ pub enum Host {
     Sampling,
 }
 
-/// The input of all rivals.
 pub struct Material {
     pub model: PathBuf,
     /// The folder with the cloud, and the model in every form.

@@ -69,12 +69,10 @@ trait Study {
 
     fn rows(&self) -> Vec<&str>;
 
-    /// The row that `row` is compared with.
     fn beside(&self, _row: usize) -> usize {
         0
     }
 
-    /// The set that all networks are compared on.
     fn goal(&self) -> &str;
 
     /// The recipe and the training clouds of the network of `row`.
@@ -101,7 +99,6 @@ struct Network<'a> {
     classes: &'a [String],
 }
 
-/// The right answers to the objects of a class.
 struct Score {
     class: String,
     right: usize,
@@ -257,7 +254,6 @@ fn mean(shares: &[f64]) -> Option<f64> {
     (!shares.is_empty()).then(|| shares.iter().sum::<f64>() / shares.len() as f64)
 }
 
-/// The name of the files of the row `name`.
 fn folder_name(name: &str) -> String {
     let words = name.split(|c: char| !c.is_ascii_alphanumeric());
     words.filter(|word| !word.is_empty()).collect::<Vec<_>>().join("-").to_lowercase()

@@ -77,7 +77,6 @@ enum Source {
     EvenGrid,
     /// Samples of the surface of whole meshes.
     Surface,
-    /// The samples of the surface that a view sees.
     Seen,
 }
 

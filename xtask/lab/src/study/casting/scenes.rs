@@ -33,7 +33,6 @@ struct Measured {
     n_points: usize,
     /// Ground and objects, each with its own hierarchy.
     sweep_s: f64,
-    /// The same as one mesh, whose hierarchy exists.
     one_mesh_s: f64,
     /// To check that mesh and build its hierarchy.
     build_s: f64,

@@ -38,7 +38,6 @@ pub fn measure(path: &Path, n_clouds: u32) -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// The layers of one chain.
 fn measure_chain(
     network: &Network,
     name: &str,

@@ -73,7 +73,6 @@ pub struct Row {
 }
 
 impl Row {
-    /// The middle and the ends of the errors.
     fn spread(&self) -> Spread {
         Spread::of(self.errors.iter().copied())
     }

@@ -208,7 +208,6 @@ impl Plan {
         counts.copied().chain([self.mesh_points]).max().unwrap_or(1)
     }
 
-    /// The recipe at `points` points.
     pub fn at(&self, points: usize) -> Recipe {
         Recipe { points, ..self.recipe.clone() }
     }

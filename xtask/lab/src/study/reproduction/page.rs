@@ -14,7 +14,6 @@ const TITLE: &str = "The paper's experiments, repeated";
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Section {
     pub title: String,
-    /// The data, and remarks.
     pub about: Vec<String>,
     /// Tables and their names in the CSV file; the first cell of a row is its name.
     pub tables: Vec<(String, Table)>,
@@ -36,7 +35,6 @@ pub struct Cloud {
 const COLOURS: [&str; 4] = ["#a8a8a8", "#d33b12", "#1763c7", "#8a2fc0"];
 
 impl Section {
-    /// A section without drawings and clouds.
     pub fn new(title: &str, about: [String; 2], tables: Vec<(&str, Table)>) -> Self {
         let tables = tables.into_iter().map(|(name, table)| (name.to_owned(), table)).collect();
         Self { title: title.to_owned(), about: about.into(), tables, ..Self::default() }

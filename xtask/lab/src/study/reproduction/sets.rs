@@ -41,7 +41,6 @@ pub fn recipe(context: &ExperimentContext, clouds: usize) -> Recipe {
     of_steps(recipe, plan.mesh_steps, clouds)
 }
 
-/// The network trained on the set at `place`.
 pub fn network(context: &ExperimentContext, place: &str) -> anyhow::Result<PathBuf> {
     let clouds = context.scans(place, Split::Train)?;
     let name = format!("on-{}", place.replace('/', "-"));

@@ -72,7 +72,6 @@ fn reproduce(folder: &Path, plan: Plan) -> anyhow::Result<()> {
     })
 }
 
-/// The report's numbers but for times.
 fn numbers(folder: &Path) -> Vec<String> {
     let csv = std::fs::read_to_string(folder.join("out/report.csv")).unwrap();
     csv.lines().filter(|line| !line.contains("ms")).map(str::to_owned).collect()

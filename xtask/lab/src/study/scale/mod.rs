@@ -112,7 +112,6 @@ struct Task {
     bytes: u64,
 }
 
-/// The program, and the shapes that it scans.
 struct Program {
     path: PathBuf,
     shapes: TempDir,

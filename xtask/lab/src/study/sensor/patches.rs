@@ -25,7 +25,6 @@ const DIRECTION: usize = 25;
 /// A longer row of missing returns is a hole, such as a window or the sky.
 const LONGEST_GAP: usize = 3;
 
-/// A return by ring and firing sequence.
 struct Placed {
     ring: usize,
     slot: usize,

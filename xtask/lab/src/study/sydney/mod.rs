@@ -52,12 +52,10 @@ pub struct SydneyArgs {
     report: Option<PathBuf>,
 }
 
-/// The networks of one starting point.
 struct Start {
     name: &'static str,
     /// `[seed][fold]`, by votes.
     answers: Vec<Vec<Vec<Answer>>>,
-    /// The same without votes.
     single: Vec<Vec<Vec<Answer>>>,
 }
 
@@ -226,7 +224,6 @@ impl Folds {
     }
 }
 
-/// An object's class, and its answer.
 pub type Answer = (usize, usize);
 
 /// F1 of `class`, and how many objects it has.

@@ -31,7 +31,6 @@ enum Method<'a> {
 struct Aimed {
     culling: Culling,
     ray_sets: Vec<RaySet>,
-    /// The jobs of the ray sets.
     jobs: Vec<CastJob>,
 }
 

@@ -21,7 +21,6 @@ const AS_THE_BASELINE: usize = 1024;
 pub struct TestSet {
     pub name: String,
     pub clouds: Vec<Cloud>,
-    /// Each one's class, by name.
     pub labels: Vec<String>,
 }
 
@@ -42,7 +41,6 @@ fn labels(answers: &Answers) -> impl Iterator<Item = Option<&str>> {
     answers.iter().map(|answer| answer.as_ref().map(|prediction| &*prediction.label))
 }
 
-/// The share of clouds with the same answer.
 pub fn agreement(a: &Answers, b: &Answers) -> f64 {
     labels(a).zip(labels(b)).filter(|(a, b)| a == b).count() as f64 / a.len().max(1) as f64
 }

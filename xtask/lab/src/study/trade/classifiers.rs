@@ -79,7 +79,6 @@ pub fn rows(model: &Path, set: &TestSet, quick: bool, rounds: usize) -> Result<V
     Ok(rows.concat())
 }
 
-/// A setting with its answers and its row.
 struct Measured {
     setting: Classifying,
     answers: Answers,

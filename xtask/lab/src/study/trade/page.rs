@@ -91,7 +91,6 @@ fn chart(rows: &[Measurement], part: Part) -> Chart<'static> {
     }
 }
 
-/// The message of the chart of `part`.
 fn message(rows: &[Measurement], part: Part, device: Device) -> String {
     let optimal = || rows.iter().filter(|row| row.part == part && row.on_front(device));
     let by_accuracy = |a: &&Measurement, b: &&Measurement| a.accuracy.total_cmp(&b.accuracy);

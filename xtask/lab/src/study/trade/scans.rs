@@ -22,16 +22,13 @@ use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// A cloud as the classifier takes it.
 pub type Cloud = Vec<[f32; 3]>;
 
 /// The Chamfer distance is measured on every `CHAMFER_EACH`-th scan, of all four sides in turn.
 const CHAMFER_EACH: usize = 7;
 
-/// A scan and its ranges without any effect.
 struct Made {
     scan: Scan,
-    /// The exact range of each point of the scan.
     exact_m: Vec<f64>,
 }
 
@@ -186,7 +183,6 @@ fn mean_chamfer(truth: &[Made], clouds: &[Cloud]) -> Option<f64> {
 /// Keys all random numbers of the chain.
 pub const SEED: u64 = 0;
 
-/// A mesh in the unit sphere, and its class.
 pub struct Object {
     pub class: String,
     /// Class and name.

@@ -57,7 +57,6 @@ impl Scanning {
         }
     }
 
-    /// The sensor's beams, one above the other.
     pub fn beams(&self) -> usize {
         match &self.sensor.layout {
             Layout::Rotating(rotating) => rotating.beam.len(),
