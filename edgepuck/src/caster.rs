@@ -24,7 +24,10 @@ impl CasterArgs {
         let caster = Caster::named(&self.adapter).context("cannot open the adapter")?;
         match caster.why_no_gpu() {
             Some(why) if self.adapter == "auto" => eprintln!("Casting on the CPU: {why}."),
-            _ => eprintln!("Casting on {}.", caster.name()),
+            _ => {
+                caster.skipped().iter().for_each(|why| eprintln!("Skipped an adapter: {why}."));
+                eprintln!("Casting on {}.", caster.name());
+            }
         }
         Ok(caster)
     }

@@ -73,9 +73,9 @@ class Scene:
         self,
         sensor: Sensor,
         place: Sequence[float],
-        effects: str,
-        attributes: Sequence[str],
-        seed: int,
+        effects: str | None,
+        attributes: Sequence[str] | None,
+        seed: int | None,
     ) -> dict[str, Any]: ...
     def scan_all(self, adapter: str) -> list[tuple[str, dict[str, Any]]]: ...
 

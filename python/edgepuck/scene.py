@@ -109,8 +109,8 @@ class Scene:
         noise: float = 0.0,
         dropout: float = 0.0,
         effects: Mapping[str, Any] | None = None,
-        attributes: Iterable[str] = ("range", "beam", "ring", "time", "object"),
-        seed: int = 0,
+        attributes: Iterable[str] | None = None,
+        seed: int | None = None,
     ) -> Scan:
         """Scan the scene.
 
@@ -124,10 +124,12 @@ class Scene:
             noise: Standard deviation of the noise of the ranges, metres.
             dropout: Probability that a return is missing.
             effects: Further effects, with the keys of the table `[effects]` of a scene:
-                `{"footprint": {"samples": 7}, "returns": "last"}`.
+                `{"footprint": {"samples": 7}, "returns": "last"}`. Noise, dropout and these take the
+                place of the effects of a scene's file.
             attributes: The attributes of each point besides its position: range, beam, ring, time,
-                triangle, object, intensity, power, reflectivity, return, medium, normal.
-            seed: The seed of all random numbers.
+                triangle, object, intensity, power, reflectivity, return, medium, normal. By default
+                those of the scene's file, or range, beam, ring, time and object.
+            seed: The seed of all random numbers; by default that of the scene's file, or 0.
 
         Raises:
             Error: A value is out of its limits, or an attribute or effect is unknown.
@@ -143,9 +145,10 @@ class Scene:
         if dropout != 0:
             wanted["dropout"] = {"probability": dropout}
         at = [float(distance), float(elevation), float(azimuth)] if pose is None else _matrix(pose)
-        encoded = json.dumps(_plain(wanted, "effects"))
-        key = _arguments.seed(seed)
-        return scan_of(self._scene.scan(sensor._sensor, at, encoded, list(attributes), key))
+        encoded = json.dumps(_plain(wanted, "effects")) if wanted or effects is not None else None
+        names = None if attributes is None else list(attributes)
+        key = None if seed is None else _arguments.seed(seed)
+        return scan_of(self._scene.scan(sensor._sensor, at, encoded, names, key))
 
     def __repr__(self) -> str:
         return f"<Scene of {len(self)} instances>"

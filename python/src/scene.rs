@@ -9,7 +9,7 @@ use formats::scan::Attribute;
 use glam::{DMat3, DQuat, DVec3};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use sim_gpu::{Effects, Pose};
+use sim_gpu::Pose;
 use std::path::PathBuf;
 use std::sync::Mutex;
 
@@ -87,21 +87,23 @@ impl Scene {
         py: Python<'py>,
         sensor: &Sensor,
         place: Place,
-        effects: &str,
-        attributes: Vec<String>,
-        seed: u64,
+        effects: Option<&str>,
+        attributes: Option<Vec<String>>,
+        seed: Option<u64>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let pose = place.pose()?;
-        let effects: Effects =
-            serde_json::from_str(effects).map_err(|error| raised(format!("effects: {error}")))?;
-        let attributes = attributes.iter().map(|name| name.parse::<Attribute>());
-        let attributes: Vec<_> = attributes.collect::<Result<_, _>>().map_err(raised)?;
-        sensor.sensor.rays(&effects).map_err(raised)?;
-        let (caster, scene) = (sensor.caster.open()?, lock(&self.scene).clone());
-        let scan = process::run(py, || {
-            let scan = scene.scan(&sensor.sensor, pose).with(&caster).effects(effects);
-            scan.attributes(attributes).seed(seed).run()
-        })?;
+        let (caster, mut scene) = (sensor.caster.open()?, lock(&self.scene).clone());
+        if let Some(effects) = effects {
+            scene.effects = serde_json::from_str(effects)
+                .map_err(|error| raised(format!("effects: {error}")))?;
+        }
+        if let Some(names) = attributes {
+            let attributes = names.iter().map(|name| name.parse::<Attribute>());
+            scene.attributes = attributes.collect::<Result<_, _>>().map_err(raised)?;
+        }
+        scene.seed = seed.unwrap_or(scene.seed);
+        sensor.sensor.rays(&scene.effects).map_err(raised)?;
+        let scan = process::run(py, || scene.scan(&sensor.sensor, pose).with(&caster).run())?;
         let columns = arrays::scan(py, scan.map_err(raised)?.points)?;
         columns.set_item("pose", arrays::matrix(&pose))?;
         Ok(columns)

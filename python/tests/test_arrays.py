@@ -168,3 +168,20 @@ def test_a_scene_of_one_mesh_is_the_scan_of_that_mesh(cube):
     scene.add(mesh)
     alone = sensor.scan(mesh, noise=0.02, seed=3)
     np.testing.assert_array_equal(scene.scan(sensor, noise=0.02, seed=3).positions, alone.positions)
+
+
+def test_a_scene_that_was_read_keeps_its_effects_attributes_and_seed(tmp_path, cube):
+    lines = ["OFF", "8 12 0", *(" ".join(map(str, row)) for row in cube[0])]
+    lines += ["3 " + " ".join(map(str, face)) for face in cube[1]]
+    (tmp_path / "cube.off").write_text("\n".join(lines))
+    (tmp_path / "scene.toml").write_text(
+        'seed = 5\nattributes = ["range"]\neffects = { noise = { sigma_m = 0.1 } }\n'
+        'object = [{ mesh = "cube.off" }]\n'
+        'sensor = [{ profile = "vlp32c", position_m = [3, 0, 0], look_at_m = [0, 0, 0] }]\n'
+    )
+    scene, sensor = ep.Scene.read(tmp_path / "scene.toml"), ep.Sensor("vlp32c")
+    noisy = scene.scan(sensor)
+    assert noisy.ring is None
+    assert noisy.range.std() > scene.scan(sensor, effects={}).range.std()
+    other = scene.scan(sensor, seed=6)
+    assert not np.array_equal(noisy.range, other.range)

@@ -252,6 +252,10 @@ impl Materials {
         Ok(Named::Even(self.even.len() as u32 - 1))
     }
 
+    pub(crate) fn len(&self) -> usize {
+        self.of_triangle.len()
+    }
+
     /// The material of triangle `index` at a point; `barycentric` is called only if it matters.
     #[must_use]
     #[doc(hidden)]

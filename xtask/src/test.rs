@@ -72,7 +72,7 @@ fn run_all(args: &Args, summary: &mut Summary) {
     let mdbook = docs::build_meanwhile(install);
     check_source(summary);
     summary.step("tests", |summary| tests(summary, install));
-    summary.step("laboratory", |summary| laboratory(summary, install));
+    laboratory(summary, install);
     let programs = peers::programs();
     // A peer takes the binary for the Raspberry Pi.
     let _ = pi_binary.and_then(meanwhile::Meanwhile::end);
@@ -159,14 +159,18 @@ fn compile_lab(words: &[&str]) -> Command {
     command
 }
 
-/// The format, lints and tests of the laboratory.
-fn laboratory(summary: &mut Summary, required: bool) -> anyhow::Result<Counts> {
+/// Checks the format and the lints of the laboratory, and runs its tests.
+fn laboratory(summary: &mut Summary, required: bool) {
     let manifest = root().join("xtask/lab/Cargo.toml");
-    check("format", cargo(&["fmt", "--check", "--manifest-path"]).arg(manifest))?;
-    let lints = lints::check("lints", compile_lab(&["test"]).arg("--no-run"))?;
-    let mut tests = compile_lab(&["test", "--no-fail-fast"]);
-    require_adapter(&mut tests, required);
-    Ok(lints.and(test_programs::run(summary, &mut tests)?))
+    let mut format = cargo(&["fmt", "--check", "--manifest-path"]);
+    summary.command("format of the laboratory", format.arg(manifest));
+    let name = "lints of the laboratory";
+    summary.step(name, |_| lints::check(name, compile_lab(&["test"]).arg("--no-run")));
+    summary.step("laboratory", |summary| {
+        let mut tests = compile_lab(&["test", "--no-fail-fast"]);
+        require_adapter(&mut tests, required);
+        test_programs::run(summary, &mut tests)
+    });
 }
 
 fn tests(summary: &mut Summary, required: bool) -> anyhow::Result<Counts> {

@@ -188,11 +188,11 @@ impl<'a> Drive<'a> {
         let stream = StreamKey::new(stage.seed(), "drive/beams", number);
         let mut world = World::new();
         for (_, tile) in tiles.range(self.street.tiles_in_sight(pose.position_m.x)) {
-            stage.add_ground(&mut world, tile, 0, stream);
+            stage.add_ground(&mut world, tile, 0);
         }
         let n_tiles = world.instances().len();
         for object in &objects {
-            let id = stage.add_object(&mut world, &object.placed, self.glass_returned, stream);
+            let id = stage.add_object(&mut world, &object.placed, self.glass_returned);
             world[id].motion = trajectory(
                 [from_s, to_s].map(|time_s| (time_s, Pose::at(object.velocity_m_s * time_s))),
             );

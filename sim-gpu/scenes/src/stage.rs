@@ -113,10 +113,14 @@ impl Stage {
     }
 
     pub(crate) fn model(&self, entry: usize, variant: u32) -> &Model {
-        self.models[entry][variant as usize].get_or_init(|| {
+        let model = &self.models[entry][variant as usize];
+        model.get().unwrap_or_else(|| {
             let kind = self.recipe.object[entry].built_in();
             let kind = kind.expect("invariant: the models of users' meshes exist from the start");
-            Model::built_in(kind, self.seed, variant)
+            // Outside of `get_or_init`: building a tree may run another task of the pool, which may
+            // want the same model.
+            let built = Model::built_in(kind, self.seed, variant);
+            model.get_or_init(|| built)
         })
     }
 
@@ -125,29 +129,20 @@ impl Stage {
         self.model(object.entry, object.variant).size_m * object.scale
     }
 
-    /// Adds the ground of the scene or drive number `number`, or a tile of it, to `world`. `stream`
-    /// keys the random numbers of its returns.
-    pub(crate) fn add_ground(
-        &self,
-        world: &mut World,
-        mesh: &Mesh,
-        number: u32,
-        stream: StreamKey,
-    ) {
+    /// Adds the ground of the scene or drive number `number`, or a tile of it, to `world`.
+    pub(crate) fn add_ground(&self, world: &mut World, mesh: &Mesh, number: u32) {
         let id = world.add(mesh, Pose::IDENTITY);
         let drawn = StreamKey::new(self.seed, "reflectivity/ground", number).unit(0);
         world[id].reflectivity = self.recipe.ground.reflectivity.at(drawn);
-        world[id].stream = Some(stream);
     }
 
     /// Adds `object` to `world`, with its class, its reflectivity and its glass, which returns the
-    /// fraction `glass_returned` of the beams. `stream` keys the random numbers of its returns.
+    /// fraction `glass_returned` of the beams.
     pub(crate) fn add_object(
         &self,
         world: &mut World,
         object: &PlacedObject,
         glass_returned: f64,
-        stream: StreamKey,
     ) -> InstanceId {
         let (model, entry) =
             (self.model(object.entry, object.variant), &self.recipe.object[object.entry]);
@@ -160,7 +155,6 @@ impl Stage {
         instance.reflectivity = entry.reflectivity.at(drawn.unit(object.variant.into()));
         instance.glass = (!model.glass.is_empty())
             .then(|| Glass { triangles: model.glass.clone(), returned: glass_returned });
-        instance.stream = Some(stream);
         id
     }
 }

@@ -7,7 +7,7 @@ use formats::rng::StreamKey;
 use glam::DVec3;
 use sim_gpu::internals::bvh::Builder;
 use sim_gpu::internals::mesh::TriangleMesh;
-use sim_gpu::internals::scan::{ScanRequest, scan_objects};
+use sim_gpu::internals::scan::{PlacedTarget, ScanRequest, scan_objects};
 use sim_gpu::{Effects, Scene as World, Sensor};
 
 use crate::error::SceneError;
@@ -43,9 +43,9 @@ impl Stage {
         let mut world = World::new();
         (world.seed, world.effects) = (self.seed(), self.effects(scene).clone());
         let ground = shared(scene.ground.mesh(), Builder::Morton);
-        self.add_ground(&mut world, &ground, scene.number, self.stream(scene, 0));
-        for (object, number) in scene.objects.iter().zip(1..) {
-            self.add_object(&mut world, object, scene.glass_returned, self.stream(scene, number));
+        self.add_ground(&mut world, &ground, scene.number);
+        for object in &scene.objects {
+            self.add_object(&mut world, object, scene.glass_returned);
         }
         world
     }
@@ -55,7 +55,12 @@ impl Stage {
     /// # Errors
     /// The caster fails.
     pub fn sweep(&self, scene: &Scene) -> Result<Sweep, SceneError> {
-        self.sweep_in(&self.build(scene), scene)
+        let world = self.build(scene);
+        let mut placed = world.placed(|_| self.stream(scene, u32::MAX));
+        for (instance, number) in placed.iter_mut().zip(0..) {
+            instance.stream = Some(self.stream(scene, number));
+        }
+        self.scan_placed(&placed, scene)
     }
 
     /// Scans `world` with the sensor of `scene`.
@@ -64,15 +69,18 @@ impl Stage {
     /// The caster fails.
     #[doc(hidden)]
     pub fn sweep_in(&self, world: &World, scene: &Scene) -> Result<Sweep, SceneError> {
+        self.scan_placed(&world.placed(|_| self.stream(scene, u32::MAX)), scene)
+    }
+
+    fn scan_placed(&self, placed: &[PlacedTarget], scene: &Scene) -> Result<Sweep, SceneError> {
         let StageSensor { sensor, caster } = &self.sensors[scene.sensor];
         let pattern = sensor.rays(caster.effects())?;
         let mut request = ScanRequest::new(sensor.profile(), &pattern, scene.pose);
-        request.attributes.clone_from(&world.attributes);
+        request.attributes = World::new().attributes;
         request.culling = self.culling;
         request.motion = scene.motion(pattern.last_s()).map(Arc::new);
         request.stream = self.stream(scene, u32::MAX);
-        let placed = world.placed(|_| request.stream);
-        let scan = scan_objects(caster, &placed, &request)?.scan;
+        let scan = scan_objects(caster, placed, &request)?.scan;
         Ok(Sweep::new(scan, scene))
     }
 

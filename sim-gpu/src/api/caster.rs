@@ -24,6 +24,7 @@ const MOST_OPEN: usize = 4;
 pub struct Caster {
     name: String,
     why_no_gpu: Option<String>,
+    skipped: Vec<String>,
     opened: Mutex<Vec<Arc<OpenCaster>>>,
 }
 
@@ -39,13 +40,16 @@ impl Caster {
     #[must_use]
     pub fn auto() -> Self {
         let (best, errors) = OpenCaster::open_best(&Effects::default());
-        let why = if errors.is_empty() {
-            "no GPU was found; software Vulkan is taken by its name alone".to_owned()
+        let skipped: Vec<String> = errors.iter().map(ToString::to_string).collect();
+        let why = if !cfg!(feature = "gpu") {
+            "this program was built without GPU support".to_owned()
+        } else if skipped.is_empty() {
+            "no GPU was found; software Vulkan is used only if it is named".to_owned()
         } else {
-            errors.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
+            skipped.join("; ")
         };
         let why_no_gpu = matches!(best, OpenCaster::Cpu(_)).then_some(why);
-        Self { why_no_gpu, ..Self::of(best) }
+        Self { why_no_gpu, skipped, ..Self::of(best) }
     }
 
     /// The first adapter whose name contains this text, in upper or lower case; `auto` and `cpu` are
@@ -73,6 +77,12 @@ impl Caster {
         self.why_no_gpu.as_deref()
     }
 
+    /// Why better GPUs did not open.
+    #[doc(hidden)]
+    pub fn skipped(&self) -> &[String] {
+        &self.skipped
+    }
+
     /// The caster of this adapter that models `effects`, which it opens unless it is open.
     ///
     /// # Errors
@@ -95,6 +105,11 @@ impl Caster {
 
     fn of(caster: OpenCaster) -> Self {
         let name = caster.name().to_owned();
-        Self { name, why_no_gpu: None, opened: Mutex::new(vec![Arc::new(caster)]) }
+        Self {
+            name,
+            why_no_gpu: None,
+            skipped: Vec::new(),
+            opened: Mutex::new(vec![Arc::new(caster)]),
+        }
     }
 }

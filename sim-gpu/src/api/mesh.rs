@@ -33,8 +33,8 @@ use std::sync::{Arc, OnceLock};
 pub struct Mesh {
     /// This or `ready` is there from the start; the other is made of it.
     triangles: Arc<OnceLock<TriangleMesh>>,
-    /// Whether the middle of its bounding box is to become the origin of what is cast, so that a
-    /// mesh far from its origin keeps its digits in f32.
+    /// Whether casters see it around the middle of its bounding box, so that a mesh far from its
+    /// origin keeps its digits in f32.
     recentres: bool,
     ready: Arc<OnceLock<Ready>>,
     centre: DVec3,
@@ -172,7 +172,9 @@ impl Mesh {
     }
 
     fn ready(&self) -> &Ready {
-        self.ready.get_or_init(|| {
+        // Outside of `get_or_init`: building the BVH may run another task of the pool, which may
+        // want the same mesh.
+        self.ready.get().unwrap_or_else(|| {
             let mesh = self.triangle_mesh();
             let (mesh, centre) = if self.recentres {
                 let world = to_world(mesh, Up::Z, Normalize::None);
@@ -181,7 +183,8 @@ impl Mesh {
                 (mesh.clone(), DVec3::ZERO)
             };
             let target = Target::new(Surface::of_mesh(mesh), Builder::Sah);
-            Ready { target, mesh_from_target: DAffine3::from_translation(centre) }
+            let mesh_from_target = DAffine3::from_translation(centre);
+            self.ready.get_or_init(|| Ready { target, mesh_from_target })
         })
     }
 

@@ -6,9 +6,13 @@ use crate::effects::{Effects, Intensity};
 use crate::job::Culling;
 use crate::pose::{Pose, Trajectory};
 use crate::scan::{ScanRequest, Scanned, scan_objects};
+use crate::scene::check_motion;
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, AttributeSet};
 use std::sync::Arc;
+
+/// Times are within this, seconds: those of Unix are in the thousands of millions.
+const MOST_S: f64 = 1e12;
 
 /// A scan that [`ScanBuilder::run`] makes. Settings that are not given come from the [`Scene`].
 #[derive(Clone)]
@@ -105,7 +109,7 @@ impl<'a> ScanBuilder<'a> {
         Self { seed, ..self }
     }
 
-    /// Moves the sensor along these poses while it scans.
+    /// Moves the sensor along these poses while it scans, in place of its pose.
     pub fn along(self, motion: impl Into<Arc<Trajectory>>) -> Self {
         Self { motion: Some(motion.into()), ..self }
     }
@@ -130,8 +134,8 @@ impl<'a> ScanBuilder<'a> {
     /// Makes the scan.
     ///
     /// # Errors
-    /// An effect, an instance or a pose has a number that is out of its bounds; the sensor lacks what an
-    /// effect takes from its profile; the adapter failed.
+    /// An effect, an instance, a pose or a time is out of its bounds; the sensor's profile lacks a value
+    /// that an effect needs; a trajectory does not cover the scan; the adapter failed.
     pub fn run(self) -> Result<Scan, Error> {
         let mut effects = self.effects.clone();
         if self.attributes.contains(&Attribute::Intensity) {
@@ -144,6 +148,11 @@ impl<'a> ScanBuilder<'a> {
         let cpu = Caster::cpu();
         let caster = self.caster.unwrap_or(&cpu).for_effects(&effects)?;
         let rays = self.sensor.rays(&effects)?;
+        within("start_s", self.start_s, -MOST_S..=MOST_S)?;
+        if let Some(motion) = &self.motion {
+            let times_s = [self.start_s, self.start_s + rays.last_s()];
+            check_motion("trajectory", self.sensor.profile(), motion, times_s)?;
+        }
         let mut request = ScanRequest::new(self.sensor.profile(), &rays, self.pose);
         (request.motion, request.start_s) = (self.motion.clone(), self.start_s);
         request.deskew = self.deskew;
@@ -170,6 +179,14 @@ impl<'a> ScanBuilder<'a> {
             within(&key("retroreflection"), instance.retroreflection, 0.0..=1.0)?;
             for factor in instance.scale.to_array() {
                 positive(&key("scale"), factor)?;
+            }
+            within(&key("glass.returned"), instance.glass.as_ref().map(|g| g.returned), 0.0..=1.0)?;
+            let n_faces = instance.materials.as_ref().map(|materials| materials.len());
+            let n_triangles = instance.mesh.target().surface.triangles().len();
+            if let Some(found) = n_faces.filter(|found| *found != n_triangles) {
+                let cause =
+                    format!("expected those of {n_triangles} triangles, found those of {found}");
+                return Err(InvalidValue::new(key("materials"), cause).into());
             }
         }
         Ok(())

@@ -84,9 +84,6 @@ pub struct Instance {
     /// What simplification made of the mesh, where a scene's file asks for it.
     #[doc(hidden)]
     pub simplified: Option<Simplified>,
-    /// The key of its random numbers, in place of the one that its name and the scan give.
-    #[doc(hidden)]
-    pub stream: Option<StreamKey>,
 }
 
 /// A sensor at a place in a scene.
@@ -136,7 +133,7 @@ impl Scene {
         Self::try_from(&SceneFile::load(path.as_ref())?)
     }
 
-    /// Adds an instance of `mesh` at `pose`. What else is to be known of it is set by its handle:
+    /// Adds an instance of `mesh` at `pose`. Set its other properties through the handle:
     /// `scene[id].reflectivity = 0.3`.
     pub fn add(&mut self, mesh: impl Into<Mesh>, pose: Pose) -> InstanceId {
         let id = InstanceId(self.instances.len() as u32);
@@ -168,12 +165,12 @@ impl Scene {
     pub fn placed(&self, stream: impl Fn(&str) -> StreamKey) -> Vec<PlacedTarget<'_>> {
         let mut placed: Vec<_> = self.instances.iter().map(Instance::placed).collect();
         for ((placed, instance), number) in placed.iter_mut().zip(&self.instances).zip(0..) {
-            placed.stream = instance.stream.or_else(|| match (&instance.name, number) {
+            placed.stream = match (&instance.name, number) {
                 (Some(name), _) => Some(stream(name)),
                 // A scene of one mesh has the random numbers of the scan.
                 (None, 0) => None,
                 (None, _) => Some(stream(&format!("instance/{number}"))),
-            });
+            };
         }
         placed
     }
@@ -221,7 +218,6 @@ impl Instance {
             glass: None,
             materials: None,
             simplified: None,
-            stream: None,
         }
     }
 

@@ -16,6 +16,8 @@ use crate::simplify::Simplify;
 
 mod table;
 
+pub(crate) use table::check_motion;
+
 #[cfg(test)]
 mod tests;
 

@@ -125,12 +125,17 @@ fn trajectory(
     Ok(Some(Arc::new(found)))
 }
 
-/// Checks that the poses cover the scan; a single pose covers all times.
-fn check_known(
+/// Checks that `sensor` can move, and that its poses cover the scan; a single pose covers all times.
+pub(crate) fn check_motion(
     key: &str,
+    sensor: &SensorProfile,
     trajectory: &Trajectory,
     [from_s, to_s]: [f64; 2],
 ) -> Result<(), InvalidValue> {
+    if sensor.rings.is_some() {
+        // Rings are cones around a single point, in world axes.
+        return Err(InvalidValue::new(key, "cannot move a sensor whose profile has [rings]"));
+    }
     let [first_s, last_s] = trajectory.known_s();
     // A recording may end within its last revolution.
     if first_s == last_s || (first_s <= from_s && to_s <= last_s + PERIOD_S) {
@@ -276,13 +281,8 @@ impl SensorTable {
                 let cause = "cannot stand beside position_m: the trajectory has the poses";
                 return Err(InvalidValue::new(key("trajectory"), cause));
             }
-            if sensor.rings.is_some() {
-                // Rings are cones around a single point, in world axes.
-                let cause = "cannot move a sensor whose profile has [rings]";
-                return Err(InvalidValue::new(key("trajectory"), cause));
-            }
             let last_s = sensor.pattern().last_s();
-            check_known(&key("trajectory"), &motion, [start_s, start_s + last_s])?;
+            check_motion(&key("trajectory"), &sensor, &motion, [start_s, start_s + last_s])?;
             let pose = motion.at(start_s);
             return Ok(SceneSensor { sensor, name, pose, motion: Some(motion), start_s, deskew });
         }
