@@ -83,6 +83,9 @@ pub struct Unfinished<W: Write = File> {
 
 impl Unfinished {
     /// Begins the file at `path`. Missing folders are created.
+    ///
+    /// # Errors
+    /// Errors of the system; a folder of that name.
     pub fn create(path: &Path) -> Result<Self, FormatError> {
         if path.is_dir() {
             return Err(FormatError::io(path, io::ErrorKind::IsADirectory.into()));
@@ -91,6 +94,9 @@ impl Unfinished {
     }
 
     /// Gives the file its name, and replaces an existing file.
+    ///
+    /// # Errors
+    /// Errors of the system.
     pub fn finish(self) -> Result<(), FormatError> {
         self.close(drop)
     }
@@ -106,6 +112,9 @@ impl<W: Write> Unfinished<W> {
     }
 
     /// Appends the output of `fill`.
+    ///
+    /// # Errors
+    /// Errors of the system or of `fill`, with the name of the file.
     pub fn append(
         &mut self,
         fill: impl FnOnce(&mut BufWriter<W>) -> io::Result<()>,
@@ -124,6 +133,9 @@ impl<W: Write> Unfinished<W> {
 }
 
 /// As [`write()`], for bytes in memory.
+///
+/// # Errors
+/// As [`write()`].
 pub fn write_bytes(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), FormatError> {
     write(path, |writer| writer.write_all(bytes.as_ref()))
 }
@@ -168,6 +180,9 @@ fn named_temporary(folder: &Path) -> io::Result<NamedTempFile> {
 /// number. Links are not followed. The folder need not exist.
 ///
 /// Nothing else may write there meanwhile, since temporary files in use look the same.
+///
+/// # Errors
+/// A folder that cannot be listed, a file that cannot be removed.
 pub fn sweep_leftovers(folder: &Path) -> Result<usize, FormatError> {
     let entries = match fs::read_dir(folder) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(0),
@@ -234,6 +249,29 @@ mod tests {
         assert!(error.to_string().ends_with("scan.bin: the disk is full"), "{error}");
         assert_eq!(fs::read(&path).unwrap(), b"old");
         assert_eq!(names(folder.path()), ["scan.bin"]);
+    }
+
+    #[cfg(feature = "dataset")]
+    #[test]
+    fn a_file_is_hashed_as_it_is_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("scan.bin");
+        // More than one buffer, in pieces of many lengths.
+        let bytes: Vec<u8> = (0..100_000u32).map(|i| (i.wrapping_mul(i) >> 3) as u8).collect();
+        for hashing in Hashing::ALL {
+            let hash = write_hashed(&path, hashing, |writer| {
+                let mut rest = &bytes[..];
+                for length in (1..).take_while(|length| length * (length + 1) / 2 <= bytes.len()) {
+                    let (piece, others) = rest.split_at(length);
+                    writer.write_all(piece)?;
+                    rest = others;
+                }
+                writer.write_all(rest)
+            })
+            .unwrap();
+            assert_eq!(fs::read(&path).unwrap(), bytes);
+            assert_eq!(hash, hashing.of_file(&path).unwrap());
+        }
     }
 
     #[test]

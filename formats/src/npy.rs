@@ -221,6 +221,16 @@ mod tests {
     }
 
     #[test]
+    fn what_is_written_is_what_numpy_writes() {
+        let bytes = header_bytes("<f4", &[5, 3]);
+        assert_eq!(bytes.len(), 128);
+        let text = "{'descr': '<f4', 'fortran_order': False, 'shape': (5, 3), }";
+        assert_eq!(&bytes[..10], b"\x93NUMPY\x01\0\x76\0");
+        assert!(bytes[10..].starts_with(text.as_bytes()));
+        assert!(bytes.ends_with(b" \n"));
+    }
+
+    #[test]
     fn a_header_may_be_written_in_any_way_of_pythons() {
         for (dictionary, descr, is_fortran_order, shape) in [
             ("{'shape':(),'fortran_order':True,'descr':'|u1'}", "|u1", true, &[][..]),
@@ -303,6 +313,11 @@ mod tests {
             prop_assert_eq!(header.descr, "<U12");
             prop_assert_eq!(header.shape, shape);
             prop_assert_eq!(header.n_bytes, bytes.len());
+        }
+
+        #[test]
+        fn no_bytes_make_the_reader_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+            let _ = read_header(&mut &[MAGIC, &[1, 0], &bytes].concat()[..]);
         }
     }
 }

@@ -2,7 +2,7 @@ use std::fs;
 use std::path::Path;
 
 use formats::hash::{FileHash, Hashing};
-use formats::labelled::read_labelled;
+use formats::labelled::{LabelledSet, read_labelled};
 use formats::packed::{ClusterWriter, PackedWriter, Remarks};
 
 const REMARKS: Remarks<'_> = Remarks {
@@ -48,6 +48,21 @@ fn a_set_comes_back_from_its_file() {
     assert_eq!(some.names.unwrap(), ["mesh_3_v0", "mesh_1_v0"]);
 }
 
+#[test]
+fn a_set_may_be_empty() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("empty.npz");
+    write(&path, 0, 1024);
+    let set = read_labelled(&path).unwrap();
+    let none = LabelledSet {
+        names: Some(vec![]),
+        n_raw: Some(vec![]),
+        classes: Some(classes()),
+        ..LabelledSet::default()
+    };
+    assert_eq!(set, none);
+}
+
 /// 2000 clouds of 2048 points are 49 MB; 32 MiB wait in memory.
 #[test]
 fn a_set_beyond_memory_comes_back_with_the_hash_it_was_written_with() {
@@ -58,6 +73,16 @@ fn a_set_beyond_memory_comes_back_with_the_hash_it_was_written_with() {
     let set = read_labelled(&path).unwrap();
     assert_eq!((set.len(), set.cloud(1999)[2047]), (2000, [1999.0, 2047.0, 0.5]));
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing is left beside it");
+}
+
+#[test]
+fn an_unfinished_set_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("set.npz");
+    let mut writer = PackedWriter::create(&path, 1, classes()).unwrap();
+    writer.push(&[[0.0; 3]], 0, "a", 1).unwrap();
+    drop(writer);
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 
 #[test]

@@ -1,14 +1,15 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use formats::FormatError;
 use formats::hash::Hashing;
 use formats::velodyne::{Decoder, Header, Model, PacketError, count_returns, read_turn};
-use formats::vlp32c::{Returns, write};
+use formats::vlp32c::{Returns, Revolution, write};
+use formats::{FormatError, Scan};
 use proptest::prelude::*;
 use test_support::{need, shared_data};
 
-use crate::vlp32c::{REVOLUTION, every_beam};
+/// 600 revolutions a minute: 1808 whole sequences and 14 beams.
+const REVOLUTION: Revolution = Revolution { rpm: 600.0, n_beams: 57_870 };
 
 /// The headers of the file, of a frame, and of Ethernet, IPv4 and UDP in it.
 const FILE: usize = 24;
@@ -21,8 +22,15 @@ fn range_m(beam: u32) -> f32 {
 
 /// A capture of one turn in which every beam returns.
 fn capture(folder: &Path, returns: Returns) -> PathBuf {
+    let n = REVOLUTION.n_beams;
+    let scan = Scan {
+        positions: vec![[0.0; 3]; n as usize],
+        beam: Some((0..n).collect()),
+        range_m: Some((0..n).map(range_m).collect()),
+        ..Scan::default()
+    };
     let path = folder.join("turn.pcap");
-    write(&path, Hashing::None, &REVOLUTION, returns, &every_beam()).unwrap();
+    write(&path, Hashing::None, &REVOLUTION, returns, &scan).unwrap();
     path
 }
 

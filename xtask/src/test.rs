@@ -11,7 +11,7 @@ mod structure;
 mod targets;
 mod test_programs;
 
-use crate::summary::{Counts, Summary, check};
+use crate::summary::{Counts, Summary};
 use anyhow::{bail, ensure};
 use lints::by_clippy;
 use meanwhile::nice;

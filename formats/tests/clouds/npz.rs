@@ -1,3 +1,6 @@
+use std::path::Path;
+
+use formats::cloud_file::read_cloud_from;
 use zip::write::SimpleFileOptions;
 
 use super::{MANY, error, read};
@@ -41,6 +44,12 @@ fn positions_come_before_points_and_points_before_the_only_array() {
     assert_eq!(read("a.npz", npz(&[("labels", labels), ("x", one)])), [[1.0; 3]]);
     let wide = npy("|u1", "True", "(1, 5)", &[1, 2, 3, 4, 5]);
     assert_eq!(read("a.npz", npz(&[("arr_0", wide)])), [[1.0, 2.0, 3.0]]);
+}
+
+#[test]
+fn standard_input_tells_an_archive_by_its_first_bytes() {
+    let archive = npz(&[("points", bytes_of("(1, 3)", &[7; 3]))]);
+    assert_eq!(read_cloud_from(&archive[..], None, Path::new("-")).unwrap(), [[7.0; 3]]);
 }
 
 #[test]

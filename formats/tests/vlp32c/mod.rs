@@ -10,7 +10,7 @@ use formats::{FormatError, Scan};
 use proptest::prelude::*;
 
 /// 600 revolutions a minute: 1808 whole sequences and 14 beams.
-pub const REVOLUTION: Revolution = Revolution { rpm: 600.0, n_beams: 57_870 };
+const REVOLUTION: Revolution = Revolution { rpm: 600.0, n_beams: 57_870 };
 
 fn scan(returned: &[(u32, f32)]) -> Scan {
     Scan {
@@ -21,7 +21,7 @@ fn scan(returned: &[(u32, f32)]) -> Scan {
     }
 }
 
-pub fn every_beam() -> Scan {
+fn every_beam() -> Scan {
     scan(&(0..REVOLUTION.n_beams).map(|beam| (beam, 1.0 + beam as f32 * 1e-3)).collect::<Vec<_>>())
 }
 
@@ -53,7 +53,7 @@ fn a_revolution_without_a_return_is_sent_all_the_same() {
 }
 
 #[test]
-pub fn every_beam_has_its_place_and_the_last_packet_is_filled_up() {
+fn every_beam_has_its_place_and_the_last_packet_is_filled_up() {
     let (packets, count) = written(&REVOLUTION, Returns::Strongest, &every_beam());
     assert_eq!(count, u64::from(REVOLUTION.n_beams));
     let sequences = sequences(&packets, Returns::Strongest);
@@ -93,6 +93,24 @@ fn of_two_returns_the_farther_is_in_the_even_blocks() {
     let [last, other] = [2, 3].map(|block: usize| &packets[0].blocks[block].measured);
     assert_eq!([last[1].0, last[2].0, last[3].0], [1750, 1500, 0]);
     assert_eq!([other[1].0, other[2].0, other[3].0], [1250, 1500, 0]);
+}
+
+#[test]
+fn azimuths_run_clockwise_and_past_360_degrees() {
+    let (packets, _) = written(&REVOLUTION, Returns::Strongest, &scan(&[]));
+    let azimuths: Vec<f64> = sequences(&packets, Returns::Strongest)
+        .iter()
+        .map(|block| f64::from(block.azimuth))
+        .collect();
+    assert_eq!(azimuths[0], 0.0);
+    assert!(azimuths.iter().all(|&azimuth| azimuth < 36_000.0));
+    for (sequence, azimuth) in azimuths.iter().enumerate() {
+        // 55.296 us of 0.1 s, in 0.01 degree.
+        let turned: f64 = sequence as f64 * 19.90656;
+        let off = (azimuth - turned).rem_euclid(36_000.0);
+        assert!(off.min(36_000.0 - off) <= 0.5 + 1e-9, "sequence {sequence} at {azimuth}");
+    }
+    assert_eq!(azimuths.windows(2).filter(|pair| pair[1] < pair[0]).count(), 1, "one wrap");
 }
 
 #[test]
@@ -176,6 +194,17 @@ fn a_scan_that_says_too_little_or_too_much_is_refused() {
         assert!(error.to_string().contains(part), "{error}");
         assert!(!path.exists());
     }
+}
+
+#[test]
+fn the_same_scan_gives_the_same_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let [first, second] = ["first", "second"].map(|name| {
+        let path = folder.path().join(name);
+        write(&path, Hashing::None, &REVOLUTION, Returns::Dual, &every_beam()).unwrap();
+        fs::read(&path).unwrap()
+    });
+    assert_eq!(first, second);
 }
 
 proptest! {
