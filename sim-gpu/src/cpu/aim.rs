@@ -64,4 +64,5 @@ fn rounded(x: i64, shift: u32) -> i64 {
 }
 
 #[cfg(test)]
+/// Direction cases, which the tests of the GPU cast as well.
 pub mod tests;

@@ -280,6 +280,15 @@ mod tests {
     }
 
     #[test]
+    fn to_add_a_mesh_moves_no_other() {
+        let (_folder, root) = tree(&["a/1.off", "a/2.off", "a/3.obj", "b/1.off"]);
+        let before = listed(&root);
+        fs::write(root.join("a/4.off"), "").unwrap();
+        let after = listed(&root);
+        assert!(before.iter().all(|entry| after.contains(entry)));
+    }
+
+    #[test]
     fn equal_names_are_told_apart_by_their_paths() {
         let (_folder, root) = tree(&["x/a/m.off", "x/a/m.obj", "y/a/M.off", "y/a/n.off"]);
         let entries = discover(&root, 1).unwrap();
