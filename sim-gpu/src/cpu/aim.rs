@@ -63,6 +63,6 @@ fn rounded(x: i64, shift: u32) -> i64 {
     (x + (1 << (shift - 1))) >> shift
 }
 
-#[cfg(test)]
 /// Direction cases, which the tests of the GPU cast as well.
+#[cfg(test)]
 pub mod tests;
