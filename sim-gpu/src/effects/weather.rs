@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::config::{InvalidValue, within};
 
-/// Rain, snow, fog, haze, dust and spray: see [`crate::weather`]. The default is clear air.
+/// Rain, snow, fog, haze, dust and spray: EFFECTS.md has the models. The default is clear air.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Weather {

@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 /// The frame of a sensor and an object, and the places of its rays and beams in their buffers.
 /// `shaders/aim.wgsl` declares the same record; a test compares sizes and offsets. The fields of a
-/// [`FixedFrame`] are 0 if the rays are sent.
+/// `FixedFrame` are 0 if the rays are sent.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct View {
