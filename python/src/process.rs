@@ -13,8 +13,8 @@ use std::ffi::OsString;
 use std::mem;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Something and the process that made it. It is dropped by that process alone: what a parent made,
-/// its threads and its device, are not in its children.
+/// A value and the process that made it. Only that process drops it: the threads and the device of a
+/// parent are not in its children.
 struct Own<T> {
     process: u32,
     of: Option<T>,
@@ -39,8 +39,8 @@ impl<T> Drop for Own<T> {
     }
 }
 
-/// The pool of this process. Whoever locks it holds Python's lock and runs nothing of Python's until it
-/// is unlocked: so no thread waits for the other lock, and no fork finds this one locked.
+/// The pool of this process. A thread that locks it holds Python's lock, and runs no Python code until it
+/// unlocks it: so no thread waits for the other lock, and no fork finds this one locked.
 static POOL: Mutex<Option<Own<Arc<ThreadPool>>>> = Mutex::new(None);
 
 /// How many threads the user of this process asked for; 0 if they did not.

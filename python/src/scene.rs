@@ -156,7 +156,7 @@ fn view([distance_m, elevation_deg, azimuth_deg]: [f64; 3]) -> PyResult<Pose> {
     Ok(Pose::looking_at_origin_deg(distance_m, elevation_deg, azimuth_deg))
 }
 
-/// The pose that a matrix of four rows tells.
+/// The pose of a matrix, row by row.
 fn pose_of(rows: &[f64; 16]) -> PyResult<Pose> {
     let [a, b, c, x, d, e, f, y, g, h, i, z, 0.0, 0.0, 0.0, 1.0] = *rows else {
         let cause = "pose: expected a matrix of shape [4, 4] whose last row is 0, 0, 0, 1";

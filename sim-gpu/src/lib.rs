@@ -72,8 +72,8 @@ pub mod errors {
     pub use crate::simplify::NotBuilt;
 }
 
-/// What Edgepuck's own crates, tests and measurements use beyond the types at the root. It is no
-/// promise: any release may change it.
+/// What Edgepuck's own crates, tests and measurements use beyond the types at the root. It is not
+/// stable: any release may change it.
 #[doc(hidden)]
 pub mod internals {
     macro_rules! modules {

@@ -15,8 +15,9 @@ use xtask::workspace::LAB;
 /// Runs the developer commands of Edgepuck's repository.
 ///
 /// All other commands are passed to the program `edgepuck` (gen-dataset, gen-scenes, gen-drive, gen-shapes,
-/// sample-surfaces, scan, segment, detect, preview, adapters, merge-dataset, import-weights, advise,
-/// export-onnx, train, eval, explain, compare-points), which is built first if necessary.
+/// sample-surfaces, scan, segment, detect, weather, corrupt, preview, profile, adapters, merge-dataset, card,
+/// cluster, import-weights, advise, export-onnx, train, eval, explain, compare-points), which is built first
+/// if necessary.
 /// `cargo xtask edgepuck --help` describes them.
 #[derive(Parser)]
 #[command(name = "cargo xtask", version, max_term_width = 100)]

@@ -57,9 +57,8 @@ impl Sensor {
         Ok(Self::from(SensorProfile::load(path.as_ref())?))
     }
 
-    /// The same VLP-32C with each beam where its packets say that it is: it starts beside the
-    /// sensor's axis, at azimuths in hundredths of a degree. Scans of such a sensor can be saved
-    /// as `.pcap`.
+    /// The same VLP-32C with the beams that its packets encode: they start beside the sensor's axis,
+    /// at azimuths in hundredths of a degree. Scans of such a sensor can be saved as `.pcap`.
     ///
     /// # Errors
     /// The sensor is not a VLP-32C.
