@@ -83,8 +83,10 @@ macro_rules! sums {
 }
 
 sums!(float32x4_t, vmaxnmq_f32, vcgtq_f32, std::convert::identity);
-// SAFETY: NEON is on every aarch64.
-sums!(int32x4_t, vmaxq_s32, vcgtq_s32, |sums| unsafe { vcvtq_f32_s32(sums) });
+sums!(int32x4_t, vmaxq_s32, vcgtq_s32, |sums| {
+    // SAFETY: NEON is on every aarch64.
+    unsafe { vcvtq_f32_s32(sums) }
+});
 
 /// The first `V` vectors of a slice.
 #[inline(always)]
