@@ -93,6 +93,13 @@ class Mesh(Remade):
         return np.array(self._mesh.centre)
 
 
+def native(mesh: Mesh) -> _edgepuck.Mesh:
+    """The mesh of the module in Rust, if `mesh` is an `edgepuck.Mesh`."""
+    if not isinstance(mesh, Mesh):
+        raise _edgepuck.Error(f"expected an edgepuck.Mesh, found {type(mesh).__name__}")
+    return mesh._mesh
+
+
 def _indices(faces: ArrayLike) -> NDArray[np.int64]:
     found = np.asarray(faces)
     if found.size and not np.issubdtype(found.dtype, np.integer):

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import json
-import math
 import os
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import _arguments, _edgepuck
-from .mesh import Mesh
+from . import _edgepuck, _scanning
+from .mesh import Mesh, native
 from .scan import Scan, scan_of
-
-if TYPE_CHECKING:
-    from .sensor import Sensor
+from .sensor import Sensor
 
 
 class Scene:
@@ -80,12 +76,10 @@ class Scene:
         Raises:
             Error: A value is out of its limits.
         """
-        if not isinstance(mesh, Mesh):
-            raise _edgepuck.Error(f"expected an edgepuck.Mesh, found {type(mesh).__name__}")
         factors = np.broadcast_to(np.asarray(scale, dtype=np.float64), (3,)).tolist()
         at = _pose(pose, position)
         return self._scene.add(
-            mesh._mesh, at, factors, name, label, float(reflectivity), float(retroreflection)
+            native(mesh), at, factors, name, label, float(reflectivity), float(retroreflection)
         )
 
     def move(
@@ -134,21 +128,19 @@ class Scene:
         Raises:
             Error: A value is out of its limits, or an attribute or effect is unknown.
         """
-        if isinstance(attributes, str):
-            raise _edgepuck.Error(f"attributes: expected a list of names, found {attributes!r}")
-        wanted: dict[str, Any] = dict(effects or {})
-        for name, given in [("noise", noise != 0), ("dropout", dropout != 0)]:
-            if given and name in wanted:
-                raise _edgepuck.Error(f"{name}: expected it once, found it in effects as well")
-        if noise != 0:
-            wanted["noise"] = {"sigma_m": noise, "mean_m": 0.0, "model": "range"}
-        if dropout != 0:
-            wanted["dropout"] = {"probability": dropout}
-        at = [float(distance), float(elevation), float(azimuth)] if pose is None else _matrix(pose)
-        encoded = json.dumps(_plain(wanted, "effects")) if wanted or effects is not None else None
-        names = None if attributes is None else list(attributes)
-        key = None if seed is None else _arguments.seed(seed)
-        return scan_of(self._scene.scan(sensor._sensor, at, encoded, names, key))
+        return _scanning.scan(
+            self._scene,
+            sensor._sensor,
+            distance=distance,
+            elevation=elevation,
+            azimuth=azimuth,
+            pose=pose,
+            noise=noise,
+            dropout=dropout,
+            effects=effects,
+            attributes=attributes,
+            seed=seed,
+        )
 
     def __repr__(self) -> str:
         return f"<Scene of {len(self)} instances>"
@@ -165,7 +157,7 @@ def _pose(pose: ArrayLike | None, position: ArrayLike | None) -> list[float]:
     if pose is not None and position is not None:
         raise _edgepuck.Error("expected a pose or a position, found both")
     if pose is not None:
-        return _matrix(pose)
+        return _scanning.matrix(pose)
     matrix = np.eye(4)
     if position is not None:
         at = np.asarray(position, dtype=np.float64)
@@ -173,25 +165,3 @@ def _pose(pose: ArrayLike | None, position: ArrayLike | None) -> list[float]:
             raise _edgepuck.Error(f"position: expected shape [3], found {list(at.shape)}")
         matrix[:3, 3] = at
     return matrix.ravel().tolist()
-
-
-def _matrix(pose: ArrayLike) -> list[float]:
-    """The rows of a matrix of shape [4, 4]."""
-    matrix = np.asarray(pose, dtype=np.float64)
-    if matrix.shape != (4, 4):
-        raise _edgepuck.Error(
-            f"pose: expected a matrix of shape [4, 4], found {list(matrix.shape)}"
-        )
-    return matrix.ravel().tolist()
-
-
-def _plain(value: Any, key: str) -> Any:
-    """`value`, found at `key`, as types of JSON."""
-    if isinstance(value, Mapping):
-        return {str(name): _plain(of, f"{key}.{name}") for name, of in value.items()}
-    if isinstance(value, (list, tuple, np.ndarray)):
-        return [_plain(of, f"{key}[{i}]") for i, of in enumerate(value)]
-    plain = value.item() if isinstance(value, np.generic) else value
-    if isinstance(plain, float) and not math.isfinite(plain):
-        raise _edgepuck.Error(f"{key}: expected a finite number, found {plain}")
-    return plain

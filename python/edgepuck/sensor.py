@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _edgepuck
+from . import _edgepuck, _scanning
 from ._arguments import Remade, place
-from .mesh import Mesh
+from .mesh import Mesh, native
 from .scan import Scan
-from .scene import Scene
 
 
 class Sensor(Remade):
@@ -73,28 +72,16 @@ class Sensor(Remade):
     ) -> Scan:
         """Scan one mesh from a position around the origin, like `Scene.scan` of a scene with only it.
 
-        Args:
-            mesh: The mesh.
-            distance: The distance of the sensor from the origin, metres.
-            elevation: The elevation of the sensor above the horizon, degrees.
-            azimuth: The azimuth of the sensor, counterclockwise from x, degrees.
-            pose: The pose of the sensor, instead of these three: a matrix of shape [4, 4] from the
-                frame of the sensor (x forward, z up) to the world.
-            noise: Standard deviation of the noise of the ranges, metres.
-            dropout: Probability that a return is missing.
-            effects: Further effects, with the keys of the table `[effects]` of a scene:
-                `{"footprint": {"samples": 7}, "returns": "last"}`.
-            attributes: The attributes of each point besides its position: range, beam, ring, time,
-                triangle, object, intensity, power, reflectivity, return, medium, normal.
-            seed: The seed of all random numbers.
+        The arguments besides `mesh` are those of `Scene.scan`.
 
         Raises:
             Error: A value is out of its limits, or an attribute or effect is unknown.
         """
-        scene = Scene()
-        scene.add(mesh)
-        return scene.scan(
-            self,
+        scene = _edgepuck.Scene()
+        scene.add(native(mesh), np.eye(4).ravel().tolist(), [1.0] * 3, None, None, 1.0, 0.0)
+        return _scanning.scan(
+            scene,
+            self._sensor,
             distance=distance,
             elevation=elevation,
             azimuth=azimuth,

@@ -1,0 +1,68 @@
+"""Scans of scenes, with the checks of their arguments that `Scene.scan` and `Sensor.scan` share."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import _arguments, _edgepuck
+from .scan import Scan, scan_of
+
+
+def scan(
+    scene: _edgepuck.Scene,
+    sensor: _edgepuck.Sensor,
+    *,
+    distance: float,
+    elevation: float,
+    azimuth: float,
+    pose: ArrayLike | None,
+    noise: float,
+    dropout: float,
+    effects: Mapping[str, Any] | None,
+    attributes: Iterable[str] | None,
+    seed: int | None,
+) -> Scan:
+    """Scan `scene` by `sensor`. `Scene.scan` describes the arguments."""
+    if isinstance(attributes, str):
+        raise _edgepuck.Error(f"attributes: expected a list of names, found {attributes!r}")
+    wanted: dict[str, Any] = dict(effects or {})
+    for name, given in [("noise", noise != 0), ("dropout", dropout != 0)]:
+        if given and name in wanted:
+            raise _edgepuck.Error(f"{name}: expected it once, found it in effects as well")
+    if noise != 0:
+        wanted["noise"] = {"sigma_m": noise, "mean_m": 0.0, "model": "range"}
+    if dropout != 0:
+        wanted["dropout"] = {"probability": dropout}
+    at = [float(distance), float(elevation), float(azimuth)] if pose is None else matrix(pose)
+    encoded = json.dumps(_plain(wanted, "effects")) if wanted or effects is not None else None
+    names = None if attributes is None else list(attributes)
+    key = None if seed is None else _arguments.seed(seed)
+    return scan_of(scene.scan(sensor, at, encoded, names, key))
+
+
+def matrix(pose: ArrayLike) -> list[float]:
+    """The rows of a matrix of shape [4, 4]."""
+    matrix = np.asarray(pose, dtype=np.float64)
+    if matrix.shape != (4, 4):
+        raise _edgepuck.Error(
+            f"pose: expected a matrix of shape [4, 4], found {list(matrix.shape)}"
+        )
+    return matrix.ravel().tolist()
+
+
+def _plain(value: Any, key: str) -> Any:
+    """`value`, found at `key`, as types of JSON."""
+    if isinstance(value, Mapping):
+        return {str(name): _plain(of, f"{key}.{name}") for name, of in value.items()}
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return [_plain(of, f"{key}[{i}]") for i, of in enumerate(value)]
+    plain = value.item() if isinstance(value, np.generic) else value
+    if isinstance(plain, float) and not math.isfinite(plain):
+        raise _edgepuck.Error(f"{key}: expected a finite number, found {plain}")
+    return plain
