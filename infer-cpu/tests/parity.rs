@@ -20,7 +20,7 @@ fn channels_first(tensor: &Tensor) -> Vec<[f32; 3]> {
 const SIZES: [usize; 4] = [16, 64, 128, 1024];
 
 /// The largest errors of log-probabilities against PyTorch's, for golden clouds of up to `largest`
-/// points; an error where there are none.
+/// points; an error if the shared data are missing.
 fn errors(options: Options, largest: usize) -> Result<Vec<(usize, f64)>, String> {
     let folder = shared_data("parity")?;
     let mut golden = WeightsFile::open(&folder.join("golden.safetensors")).unwrap();

@@ -103,7 +103,7 @@ impl Folder {
     }
 }
 
-/// Sends SIGTERM through the shell, which has `kill` even if there is no program of that name.
+/// Sends SIGTERM through the shell's own `kill`, since not every system has a program `kill`.
 #[cfg(unix)]
 fn terminate(child: &std::process::Child) -> bool {
     let kill = format!("kill {}", child.id());

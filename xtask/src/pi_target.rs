@@ -17,7 +17,7 @@ const EMULATOR: &str = "qemu-aarch64";
 /// extension, so that a kernel that uses one traps.
 const CORE: &str = "cortex-a76";
 
-/// The emulator of the Pi on this machine; `None` if there is none.
+/// The emulator of the Pi, if this machine has it.
 pub fn emulator() -> Option<Command> {
     let mut emulator = Command::new(EMULATOR);
     emulator.args(["-cpu", CORE]);

@@ -89,7 +89,7 @@ pub fn run(args: &ExportOnnxArgs) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-/// The file `model` or, if there is none, the bundled model of this name in the checkout.
+/// The file `model` if it exists; otherwise the checkout's bundled model of this name.
 fn find(model: &Path) -> PathBuf {
     let bundled = |root: PathBuf| {
         let file = root.join("assets/weights").join(model).with_extension("safetensors");

@@ -177,8 +177,8 @@ fn a_relaxed_selection_trains_the_point_encoder() {
     assert!(learnt(true) && !learnt(false));
 }
 
-/// An EdgeConv network of 8 of 32 points, compared with its reference: neighbors are all 32,
-/// whoever chose the 8, however many threads there are.
+/// An EdgeConv network of 8 of 32 points, compared with its reference: neighbors are searched
+/// among all 32 points, for every sampler and number of threads.
 #[test]
 fn neighbors_are_searched_among_all_points_whatever_the_sampler_kept() {
     let clouds = crate::clouds(30);

@@ -51,8 +51,8 @@ pub fn build_meanwhile(install: bool) -> Build {
     })
 }
 
-/// Tests the wheel, with PyTorch of PyPI if `with_pytorch` is set. Returns it, or the reason why
-/// there is none.
+/// Tests the wheel, with PyTorch of PyPI if `with_pytorch` is set. Returns it, or the reason for
+/// its absence.
 pub fn run(summary: &mut Summary, building: Build, with_pytorch: bool) -> Result<Wheel, String> {
     let mut wheel = Err("its wheel was not built".to_owned());
     summary.step("python", |summary| {
