@@ -73,8 +73,9 @@ pub(crate) fn prepare<'a>(run: &Run<'a>, entry: &MeshEntry) -> Result<Prepared<'
     let builder = Builder::for_rays(surface.len(), views.iter().map(rays_of).sum());
     let target = progress.time(Stage::Build, || Target::new(surface, builder));
     let scene = view::scene(config, target, materials);
+    let placed = view::placed(&scene);
     let jobs: Vec<CastJob> =
-        progress.time(Stage::Aim, || views.iter().map(|view| view.aim(&scene)).collect());
+        progress.time(Stage::Aim, || views.iter().map(|view| view.aim(&placed)).collect());
     let cast: usize = jobs.iter().map(|job| job.beams.len()).sum();
     let beams: usize = views.iter().map(|view| view.pattern().len()).sum();
     progress.rays_cast.fetch_add(cast as u64, Relaxed);
@@ -141,10 +142,11 @@ pub(crate) fn write(
     casts: &[Cast],
 ) -> Result<MeshRecord, DatasetError> {
     let Prepared { mut record, views, jobs, scene } = prepared;
+    let placed = view::placed(&scene);
     for ((view, job), cast) in views.iter().zip(&jobs).zip(casts) {
         let hits = run.progress.time(Stage::Resolve, || view.resolve(job, cast));
         run.progress.rays_decided_in_f64.fetch_add(hits.decided_in_f64 as u64, Relaxed);
-        let scan = write_view(run, &record, view, &view.hits(&scene, job, &hits))?;
+        let scan = write_view(run, &record, view, &ObjectHits::new(0, &placed, job, &hits))?;
         record.scans.push(scan);
     }
     Ok(record)

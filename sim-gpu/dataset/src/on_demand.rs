@@ -15,6 +15,7 @@ use sim_gpu::internals::caster::OpenCaster;
 use sim_gpu::internals::config::InvalidValue;
 use sim_gpu::internals::job::{CastJob, Culling};
 use sim_gpu::internals::mesh::tree::MeshEntry;
+use sim_gpu::internals::scan::ObjectHits;
 use sim_gpu::internals::sensor::BeamPattern;
 use sim_gpu::internals::target::{Surface, Target};
 use std::collections::HashMap;
@@ -253,7 +254,8 @@ impl Clouds {
         let made = cast.into_par_iter().zip(indices).map(|(cast, &index)| {
             let (Aimed { mesh, view, job }, cast) = cast?;
             let hits = view.resolve(&job, &cast);
-            let hits = view.hits(&mesh.scene, &job, &hits);
+            let placed = view::placed(&mesh.scene);
+            let hits = ObjectHits::new(0, &placed, &job, &hits);
             let (scan, tally) = view.scan(self.variant, &hits)?;
             let (set, variant, entry) = (view.set, self.variant, &mesh.entry);
             let source = Source { set, variant, entry, view: view.number };
@@ -272,7 +274,7 @@ impl Clouds {
         let (id, number) = (mesh.entry.id(), self.view(index));
         let pose = rig.config.sets[0].pose(rig.config.seed, &id, number);
         let view = rig.view(0, number, pose, &id);
-        let job = view.aim(&mesh.scene);
+        let job = view.aim(&view::placed(&mesh.scene));
         Ok(Aimed { mesh, view, job })
     }
 

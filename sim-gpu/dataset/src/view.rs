@@ -45,6 +45,12 @@ pub(crate) fn scene(config: &DatasetConfig, target: Target, materials: Option<Ma
     scene
 }
 
+/// The only instance of `scene`, whose random numbers are those of each view.
+pub(crate) fn placed(scene: &Scene) -> PlacedTarget<'_> {
+    let placed = scene.placed(|_, _| None).pop();
+    placed.expect("invariant: a dataset's scene has one instance")
+}
+
 /// The beams of each set's sensor, widened to the footprint that the effects ask for.
 pub(crate) fn patterns(config: &DatasetConfig) -> Result<Vec<BeamPattern>, InvalidValue> {
     let widened = |set: &SetConfig| config.effects.widen(set.sensor.pattern(), &set.sensor);
@@ -86,20 +92,8 @@ impl View<'_> {
     }
 
     /// The rays to cast at the mesh.
-    pub fn aim(&self, scene: &Scene) -> CastJob {
-        self.request.aim(&self.placed(scene))
-    }
-
-    /// The mesh of `scene`, whose random numbers are those of the view.
-    fn placed<'s>(&self, scene: &'s Scene) -> PlacedTarget<'s> {
-        let mut placed = scene.placed(|_| self.request.stream);
-        placed.pop().expect("invariant: a dataset's scene has one instance")
-    }
-
-    /// The hits of `job`, with the instance of `scene` that they lie on.
-    pub fn hits<'s>(&self, scene: &'s Scene, job: &'s CastJob, hits: &'s Hits) -> ObjectHits<'s> {
-        let materials = scene.instances().first().and_then(|mesh| mesh.materials.as_deref());
-        ObjectHits::alone(job, hits, materials)
+    pub fn aim(&self, placed: &PlacedTarget) -> CastJob {
+        self.request.aim(placed)
     }
 
     /// Where the rays of `job` meet the mesh, from the answers of the caster.

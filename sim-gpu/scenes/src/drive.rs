@@ -185,7 +185,6 @@ impl<'a> Drive<'a> {
                 && sector.meets(sensor_from_world * from_sensor, object.radius_m() + moves_m)
         });
         let (numbers, objects): (Vec<u32>, Vec<&StreetObject>) = in_sight.copied().unzip();
-        let stream = StreamKey::new(stage.seed(), "drive/beams", number);
         let mut world = World::new();
         for (_, tile) in tiles.range(self.street.tiles_in_sight(pose.position_m.x)) {
             stage.add_ground(&mut world, tile, 0);
@@ -202,8 +201,8 @@ impl<'a> Drive<'a> {
         request.motion = trajectory([from_s, to_s].map(|time_s| (time_s, self.pose(time_s))));
         request.deskew = true;
         request.attributes = [Attribute::Beam, Attribute::Range, Attribute::Object].into();
-        request.stream = stream;
-        let placed = world.placed(|_| stream);
+        request.stream = StreamKey::new(stage.seed(), "drive/beams", number);
+        let placed = world.placed(|_, _| None);
         let mut scan = scan_objects(caster, &placed, &request)?.scan;
         for object in scan.object.iter_mut().flatten() {
             // Points in the air belong to no target; like those on the ground, they get 0.

@@ -56,11 +56,8 @@ impl Stage {
     /// The caster fails.
     pub fn sweep(&self, scene: &Scene) -> Result<Sweep, SceneError> {
         let world = self.build(scene);
-        let mut placed = world.placed(|_| self.stream(scene, u32::MAX));
-        for (instance, number) in placed.iter_mut().zip(0..) {
-            instance.stream = Some(self.stream(scene, number));
-        }
-        self.scan_placed(&placed, scene)
+        let placed = world.placed(|_, number| Some(self.stream(scene, number)));
+        self.scan_placed(&world, &placed, scene)
     }
 
     /// Scans `world` with the sensor of `scene`.
@@ -69,14 +66,20 @@ impl Stage {
     /// The caster fails.
     #[doc(hidden)]
     pub fn sweep_in(&self, world: &World, scene: &Scene) -> Result<Sweep, SceneError> {
-        self.scan_placed(&world.placed(|_| self.stream(scene, u32::MAX)), scene)
+        self.scan_placed(world, &world.placed(|_, _| None), scene)
     }
 
-    fn scan_placed(&self, placed: &[PlacedTarget], scene: &Scene) -> Result<Sweep, SceneError> {
+    /// Scans the instances of `world`, as they are `placed`.
+    fn scan_placed(
+        &self,
+        world: &World,
+        placed: &[PlacedTarget],
+        scene: &Scene,
+    ) -> Result<Sweep, SceneError> {
         let StageSensor { sensor, caster } = &self.sensors[scene.sensor];
         let pattern = sensor.rays(caster.effects())?;
         let mut request = ScanRequest::new(sensor.profile(), &pattern, scene.pose);
-        request.attributes = World::new().attributes;
+        request.attributes.clone_from(&world.attributes);
         request.culling = self.culling;
         request.motion = scene.motion(pattern.last_s()).map(Arc::new);
         request.stream = self.stream(scene, u32::MAX);

@@ -93,7 +93,7 @@ impl Caster {
         if let Some(caster) = opened.iter().find(|caster| caster.effects() == effects) {
             return Ok(Arc::clone(caster));
         }
-        if self.name == "cpu" {
+        if opened.iter().any(|caster| matches!(**caster, OpenCaster::Cpu(_))) {
             return Ok(Arc::new(OpenCaster::Cpu(effects.clone())));
         }
         let request = AdapterRequest::Named(self.name.clone());

@@ -62,7 +62,7 @@ impl Mesh {
     #[doc(hidden)]
     pub fn read_turned(path: &Path, up: Option<Up>) -> Result<Self, Error> {
         let LoadedMesh { mesh, format, .. } = load(path)?;
-        Ok(Self::upright(&mesh, up.unwrap_or(format.default_up())))
+        Ok(Self::upright(mesh, up.unwrap_or(format.default_up())))
     }
 
     /// A mesh of these vertices, `[n][3]` in metres, z up, and these triangles, `[m][3]` indices of
@@ -81,7 +81,7 @@ impl Mesh {
     /// The same mesh of a file whose y axis points up: (x, y, z) becomes (x, -z, y).
     #[must_use]
     pub fn y_up(&self) -> Self {
-        Self::upright(self.triangle_mesh(), Up::Y)
+        Self::upright(self.triangle_mesh().clone(), Up::Y)
     }
 
     /// The same mesh, scaled about its origin: 0.001 for a file in millimetres.
@@ -209,9 +209,9 @@ impl Mesh {
         Self::with(OnceLock::from(triangles), OnceLock::new())
     }
 
-    pub(super) fn upright(mesh: &TriangleMesh, up: Up) -> Self {
-        let vertices = mesh.vertices.iter().map(|vertex| z_up(*vertex, up)).collect();
-        Self::of(TriangleMesh { vertices, triangles: mesh.triangles.clone() })
+    pub(super) fn upright(mut mesh: TriangleMesh, up: Up) -> Self {
+        mesh.vertices.iter_mut().for_each(|vertex| *vertex = z_up(*vertex, up));
+        Self::of(mesh)
     }
 }
 

@@ -1,18 +1,15 @@
 //! What is wanted of a scan.
 
-use super::{Caster, Error, Scan, Scene, Sensor};
-use crate::config::{InvalidValue, positive, within};
+use super::{Caster, Error, Instance, Scan, Scene, Sensor};
+use crate::config::{InvalidValue, within};
 use crate::effects::{Effects, Intensity};
 use crate::job::Culling;
 use crate::pose::{Pose, Trajectory};
 use crate::scan::{ScanRequest, Scanned, scan_objects};
-use crate::scene::check_motion;
+use crate::scene::{check_motion, check_object, check_start};
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, AttributeSet};
 use std::sync::Arc;
-
-/// Times are within this, seconds: those of Unix are in the thousands of millions.
-const MOST_S: f64 = 1e12;
 
 /// A scan that [`ScanBuilder::run`] makes. Settings that are not given come from the [`Scene`].
 #[derive(Clone)]
@@ -148,7 +145,7 @@ impl<'a> ScanBuilder<'a> {
         let cpu = Caster::cpu();
         let caster = self.caster.unwrap_or(&cpu).for_effects(&effects)?;
         let rays = self.sensor.rays(&effects)?;
-        within("start_s", self.start_s, -MOST_S..=MOST_S)?;
+        check_start("start_s", self.start_s)?;
         if let Some(motion) = &self.motion {
             let times_s = [self.start_s, self.start_s + rays.last_s()];
             check_motion("trajectory", self.sensor.profile(), motion, times_s)?;
@@ -159,7 +156,12 @@ impl<'a> ScanBuilder<'a> {
         request.attributes.clone_from(&self.attributes);
         request.stream = self.stream(self.key.name);
         request.culling = self.culling;
-        let placed = self.scene.placed(|name| self.stream(name));
+        let placed = self.scene.placed(|name, number| match (name, number) {
+            (Some(name), _) => Some(self.stream(name)),
+            // A scene of one mesh has the random numbers of the scan.
+            (None, 0) => None,
+            (None, _) => Some(self.stream(&format!("instance/{number}"))),
+        });
         let Scanned { scan, tally, cast_on_cpu, .. } = scan_objects(&caster, &placed, &request)?;
         Ok(Scan::new(scan, tally, cast_on_cpu, self.sensor.clone(), effects))
     }
@@ -175,11 +177,8 @@ impl<'a> ScanBuilder<'a> {
         for (i, instance) in self.scene.instances().iter().enumerate() {
             let key = |field: &str| format!("instance[{i}].{field}");
             check_pose(&key("pose"), instance.pose)?;
-            within(&key("reflectivity"), instance.reflectivity, 0.0..=1.0)?;
-            within(&key("retroreflection"), instance.retroreflection, 0.0..=1.0)?;
-            for factor in instance.scale.to_array() {
-                positive(&key("scale"), factor)?;
-            }
+            let Instance { scale, reflectivity, retroreflection, .. } = *instance;
+            check_object(key, scale.to_array(), reflectivity, retroreflection)?;
             within(&key("glass.returned"), instance.glass.as_ref().map(|g| g.returned), 0.0..=1.0)?;
             let n_faces = instance.materials.as_ref().map(|materials| materials.len());
             let n_triangles = instance.mesh.target().surface.triangles().len();

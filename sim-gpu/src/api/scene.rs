@@ -160,19 +160,21 @@ impl Scene {
         (0..self.instances.len() as u32).map(InstanceId)
     }
 
-    /// All instances as a caster takes them. `stream` keys the random numbers of a name.
+    /// All instances as a caster takes them. `stream` gives the key of an instance's random numbers by
+    /// its name and number; `None` is that of the scan.
     #[doc(hidden)]
-    pub fn placed(&self, stream: impl Fn(&str) -> StreamKey) -> Vec<PlacedTarget<'_>> {
-        let mut placed: Vec<_> = self.instances.iter().map(Instance::placed).collect();
-        for ((placed, instance), number) in placed.iter_mut().zip(&self.instances).zip(0..) {
-            placed.stream = match (&instance.name, number) {
-                (Some(name), _) => Some(stream(name)),
-                // A scene of one mesh has the random numbers of the scan.
-                (None, 0) => None,
-                (None, _) => Some(stream(&format!("instance/{number}"))),
-            };
-        }
-        placed
+    pub fn placed(
+        &self,
+        stream: impl Fn(Option<&str>, u32) -> Option<StreamKey>,
+    ) -> Vec<PlacedTarget<'_>> {
+        let numbered = self.instances.iter().zip(0..);
+        numbered
+            .map(|(instance, number)| {
+                let mut placed = instance.placed();
+                placed.stream = stream(instance.name.as_deref(), number);
+                placed
+            })
+            .collect()
     }
 }
 

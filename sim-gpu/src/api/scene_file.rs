@@ -62,7 +62,7 @@ fn mesh(file: &SceneFile, object: &SceneObject) -> Result<(Mesh, Option<Simplifi
     let up = object.up.unwrap_or(format.default_up());
     let normalize = object.normalize.unwrap_or(Normalize::None);
     match file.simplify_of(object) {
-        None => Ok((Mesh::upright(&mesh, up).normalized(normalize), None)),
+        None => Ok((Mesh::upright(mesh, up).normalized(normalize), None)),
         Some(simplify) => {
             let world = to_world(&mesh, up, normalize);
             // A mesh that is not scaled keeps its own origin.

@@ -124,12 +124,7 @@ fn finish(
     let found: Vec<ObjectHits> = (0..)
         .zip(objects)
         .zip(jobs.iter().zip(&hits))
-        .map(|((object, placed), (job, hits))| {
-            let PlacedTarget { world_from_object, ref glass, .. } = *placed;
-            let glass = glass.as_ref();
-            let PlacedTarget { retroreflection, materials, .. } = *placed;
-            ObjectHits { object, world_from_object, glass, retroreflection, materials, job, hits }
-        })
+        .map(|((object, placed), (job, hits))| ObjectHits::new(object, placed, job, hits))
         .collect();
     let (scan, tally) = assemble(request, caster.effects(), &found)?;
     Ok(Scanned { scan, tally, hits, cast_on_cpu })

@@ -1,6 +1,6 @@
 //! The hits of one object, and the counts of a scan's returns.
 
-use super::request::Glass;
+use super::request::{Glass, PlacedTarget};
 use crate::job::CastJob;
 use crate::material::{Material, Materials};
 use crate::motion::Motion;
@@ -37,11 +37,17 @@ pub struct ObjectHits<'a> {
 }
 
 impl<'a> ObjectHits<'a> {
-    /// The hits of the only object of a scan, whose mesh has world coordinates.
+    /// The `hits` of `job` on `placed`, which is object number `object` of its scene.
     #[must_use]
-    pub fn alone(job: &'a CastJob, hits: &'a Hits, materials: Option<&'a Materials>) -> Self {
-        let world_from_object = DAffine3::IDENTITY;
-        let (object, retroreflection, glass) = (0, 0.0, None);
+    pub fn new(
+        object: u32,
+        placed: &'a PlacedTarget<'a>,
+        job: &'a CastJob,
+        hits: &'a Hits,
+    ) -> Self {
+        let PlacedTarget { world_from_object, ref glass, .. } = *placed;
+        let glass = glass.as_ref();
+        let PlacedTarget { retroreflection, materials, .. } = *placed;
         Self { object, world_from_object, glass, retroreflection, materials, job, hits }
     }
 

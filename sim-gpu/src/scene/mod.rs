@@ -16,7 +16,7 @@ use crate::simplify::Simplify;
 
 mod table;
 
-pub(crate) use table::check_motion;
+pub(crate) use table::{check_motion, check_object, check_start};
 
 #[cfg(test)]
 mod tests;
@@ -65,8 +65,8 @@ pub struct SceneObject {
     pub retroreflection: f64,
     /// The materials of its faces, for OBJ only; by default a single one.
     pub materials: MaterialChoice,
-    /// The simplification of the mesh; `Some(None)`, `false` in TOML, is none. `None`, the default,
-    /// is the scene's.
+    /// The simplification of the mesh. `None`, the default, takes the scene's; `Some(None)`, `false`
+    /// in TOML, switches it off.
     pub simplify: Option<Option<Simplify>>,
 }
 

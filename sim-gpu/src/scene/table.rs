@@ -125,6 +125,24 @@ fn trajectory(
     Ok(Some(Arc::new(found)))
 }
 
+/// Checks the numbers of an object, whose fields stand at `key`.
+pub(crate) fn check_object(
+    key: impl Fn(&str) -> String,
+    scale: [f64; 3],
+    reflectivity: f64,
+    retroreflection: f64,
+) -> Result<(), InvalidValue> {
+    scale.into_iter().try_for_each(|factor| positive(&key("scale"), factor))?;
+    within(&key("reflectivity"), reflectivity, 0.0..=1.0)?;
+    within(&key("retroreflection"), retroreflection, 0.0..=1.0)
+}
+
+/// Checks the time at which a scan begins, seconds.
+pub(crate) fn check_start(key: &str, start_s: f64) -> Result<(), InvalidValue> {
+    // Unix times are above 1e9.
+    within(key, start_s, -1e12..=1e12)
+}
+
 /// Checks that `sensor` can move, and that its poses cover the scan; a single pose covers all times.
 pub(crate) fn check_motion(
     key: &str,
@@ -209,10 +227,8 @@ impl ObjectTable {
             Scale::Uniform(factor) => [factor; 3],
             Scale::PerAxis(factors) => factors,
         };
-        scale.into_iter().try_for_each(|factor| positive(&key("scale"), factor))?;
         let reflectivity = self.reflectivity.unwrap_or(1.0);
-        within(&key("reflectivity"), reflectivity, 0.0..=1.0)?;
-        within(&key("retroreflection"), self.retroreflection, 0.0..=1.0)?;
+        check_object(key, scale, reflectivity, self.retroreflection)?;
         let keys = PoseKeys {
             position_m: self.position_m,
             look_at_m: None,
@@ -274,8 +290,7 @@ impl SensorTable {
         };
         let motion = trajectory(key("trajectory"), folder, self.trajectory)?;
         let (start_s, deskew) = (self.start_s, self.deskew);
-        // Unix times are above 1e9.
-        within(&key("start_s"), start_s, -1e12..=1e12)?;
+        check_start(&key("start_s"), start_s)?;
         if let Some(motion) = motion {
             if self.position_m.is_some() {
                 let cause = "cannot stand beside position_m: the trajectory has the poses";
