@@ -8,7 +8,8 @@ use edgepuck_dataset::{
 use formats::Split::{Test, Train};
 use formats::hash::Hashing;
 use formats::labelled::read_labelled;
-use sim_gpu::internals::sensor::{SensorProfile, builtin_names};
+use glam::DVec3;
+use sim_gpu::Sensor;
 use std::fs;
 use std::path::Path;
 use tests::tree::files;
@@ -72,12 +73,12 @@ fn a_finished_dataset_is_what_its_manifest_says() {
     // places are jittered.
     let config = config();
     let Poses::EveryMesh(poses) = &manifest.poses[0].poses else { panic!("not jittered") };
-    assert_eq!(*poses, config.sets[0].poses(config.seed, "any"));
+    assert_eq!(*poses, config.sets[0].poses(config.seed, "any", DVec3::ZERO));
     let Poses::EachMesh(meshes) = &manifest.poses[1].poses else { panic!("jittered") };
     // Eleven meshes, of which cup/cup_1 is in both splits.
     assert_eq!(meshes.len(), 10);
     for mesh in meshes {
-        assert_eq!(mesh.poses, config.sets[1].poses(config.seed, &mesh.id));
+        assert_eq!(mesh.poses, config.sets[1].poses(config.seed, &mesh.id, DVec3::ZERO));
     }
 }
 
@@ -265,9 +266,9 @@ fn manifests_that_are_missing_or_invalid_are_refused() {
 #[test]
 fn every_builtin_sensor_comes_back_from_a_manifest() {
     let folder = tempfile::tempdir().unwrap();
-    for name in builtin_names() {
+    for name in Sensor::names() {
         let mut config = config();
-        config.sets[0].sensor = SensorProfile::builtin(name).unwrap();
+        config.sets[0].sensor = Sensor::named(name).unwrap();
         let terms = terms(config, None);
         let manifest = finish(folder.path(), &terms, Vec::new(), Vec::new()).unwrap();
         let read = Manifest::read(&layout::manifest(folder.path())).unwrap();

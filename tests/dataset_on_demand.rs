@@ -1,15 +1,15 @@
 //! Clouds cast on demand equal the packed clouds of a dataset with the same settings.
 
 use edgepuck_dataset::{
-    Clouds, DatasetConfig, DatasetError, Plan, Progress, SetConfig, Variant, Viewpoints, make,
-    seed_of_epoch,
+    Clouds, DatasetConfig, DatasetError, MeshEntry, Normalize, Plan, Poses, Progress, SetConfig,
+    Variant, Viewpoints, Views, discover, make, seed_of_epoch, verify,
 };
 use formats::Split;
 use formats::labelled::read_labelled;
+use formats::scan_file::read_scan;
+use glam::DVec3;
 use sim_gpu::effects::{Effects, Noise, NoiseModel};
-use sim_gpu::internals::caster::OpenCaster;
-use sim_gpu::internals::mesh::tree::{MeshEntry, discover};
-use sim_gpu::internals::sensor::{SensorProfile, Views};
+use sim_gpu::{Caster, Sensor};
 use std::path::Path;
 
 const CACHE_BYTES: usize = 1 << 20;
@@ -26,7 +26,7 @@ fn settings(seed: u64) -> DatasetConfig {
     };
     let set = SetConfig {
         name: "rotational".to_owned(),
-        sensor: SensorProfile::builtin("vlp32c").expect("a built-in sensor"),
+        sensor: Sensor::named("vlp32c").expect("a built-in sensor"),
         viewpoints: Viewpoints::Views(views),
     };
     DatasetConfig {
@@ -48,24 +48,19 @@ fn clouds(meshes: &[MeshEntry], config: DatasetConfig, cache_bytes: usize) -> Cl
     Clouds::new(config, meshes, Some(Split::Train), cache_bytes).expect("a dataset")
 }
 
-fn cpu(clouds: &Clouds) -> OpenCaster {
-    OpenCaster::Cpu(clouds.cast_effects())
-}
-
 #[test]
 fn clouds_on_demand_are_those_of_the_packed_set() {
     let folder = tempfile::tempdir().unwrap();
     let (out, meshes) = (folder.path().join("out"), meshes(&folder.path().join("meshes")));
     let config = settings(seed_of_epoch(7, 2));
-    let caster = OpenCaster::Cpu(config.cast_effects());
     let plan = Plan::new(&out, &config, &meshes);
-    make(&plan, &caster, &Progress::default()).unwrap();
+    make(&plan, &Caster::cpu(), &Progress::default()).unwrap();
     let expected = read_labelled(&out.join("packed/rotational-noisy-train.npz")).unwrap();
 
     let clouds = clouds(&meshes, settings(7), CACHE_BYTES);
     assert_eq!(clouds.len(), expected.len(), "no view of this seed has too few points");
     let all: Vec<usize> = (0..clouds.len()).collect();
-    let drawn = clouds.draw(&cpu(&clouds), seed_of_epoch(7, 2), &all).unwrap();
+    let drawn = clouds.draw(&Caster::cpu(), seed_of_epoch(7, 2), &all).unwrap();
     for (i, found) in drawn.iter().enumerate() {
         assert_eq!(found.label, expected.labels[i] as usize, "{i}");
         assert_eq!(found.points, expected.cloud(i), "{i}");
@@ -79,13 +74,13 @@ fn a_cloud_depends_on_its_number_and_the_seed_alone() {
     let whole = clouds(&meshes, settings(7), usize::MAX);
     let uncached = clouds(&meshes, settings(7), 0);
     let numbers = [5, 0, 11, 5, 38];
-    let together = whole.draw(&cpu(&whole), 7, &numbers).unwrap();
+    let together = whole.draw(&Caster::cpu(), 7, &numbers).unwrap();
     for (number, together) in numbers.into_iter().zip(together) {
-        let [alone] = &uncached.draw(&cpu(&uncached), 7, &[number]).unwrap()[..] else {
+        let [alone] = &uncached.draw(&Caster::cpu(), 7, &[number]).unwrap()[..] else {
             panic!("one cloud was asked for");
         };
         assert_eq!(alone.points, together.points, "{number}");
-        let others = whole.draw(&cpu(&whole), 8, &[number]).unwrap();
+        let others = whole.draw(&Caster::cpu(), 8, &[number]).unwrap();
         assert_ne!(others[0].points, together.points, "{number}");
     }
 }
@@ -96,7 +91,7 @@ fn a_mesh_whose_views_all_have_too_few_points_is_named() {
     let meshes = meshes(folder.path());
     let config = DatasetConfig { min_points: 1 << 20, ..settings(7) };
     let clouds = clouds(&meshes, config, CACHE_BYTES);
-    match clouds.draw(&cpu(&clouds), 7, &[3]) {
+    match clouds.draw(&Caster::cpu(), 7, &[3]) {
         Err(error @ DatasetError::Sparse { .. }) => {
             let text = error.to_string();
             assert!(text.starts_with("airplane/train/airplane_"), "{text}");
@@ -104,4 +99,51 @@ fn a_mesh_whose_views_all_have_too_few_points_is_named() {
         }
         other => panic!("{:?}", other.map(|clouds| clouds.len())),
     }
+}
+
+#[test]
+fn a_mesh_that_is_not_normalized_stays_where_its_file_has_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let class = folder.path().join("meshes/box/train");
+    std::fs::create_dir_all(&class).unwrap();
+    // Corners at 9 and 11, -1 and 1, 20 and 22: the sensor stands around (10, 0, 21).
+    let centre = DVec3::new(10.0, 0.0, 21.0);
+    std::fs::write(class.join("box_1.off"), unit_cube_at(centre)).unwrap();
+    let meshes = discover(&folder.path().join("meshes"), 0).unwrap();
+    let mut config = settings(0);
+    config.normalize = Normalize::None;
+    config.effects = Effects::default();
+    config.variants = vec![Variant::Clean];
+    let out = folder.path().join("out");
+    let manifest =
+        make(&Plan::new(&out, &config, &meshes), &Caster::cpu(), &Progress::default()).unwrap();
+    assert!(verify(&out).unwrap().is_sound());
+    assert_eq!((manifest.meshes[0].centre, manifest.meshes[0].scale), ([0.0; 3], 1.0));
+    let Poses::EachMesh(poses) = &manifest.poses[0].poses else { panic!("one list for all") };
+    let drawn = clouds(&meshes, config, CACHE_BYTES);
+    for (pose, view) in poses[0].poses.iter().zip(0..) {
+        let distance_m = pose.position_m.distance(centre);
+        assert!((Views::ROTATING.distance_m..=6.0).contains(&distance_m), "{distance_m}");
+        let file = out.join(format!("rotational/clean/box/train/box_1_v{view}.npz"));
+        let scan = read_scan(&file).unwrap();
+        assert!(!scan.is_empty());
+        for point in &scan.positions {
+            let point = DVec3::from_array(scan.origin) + DVec3::from(point.map(f64::from)) - centre;
+            // f32 resolves 2e-6 m at 30 m.
+            assert!((point.abs().max_element() - 1.0).abs() < 1e-5, "{point}");
+        }
+        let on_demand = drawn.scan_each(&Caster::cpu(), 0, &[view]).unwrap().remove(0).unwrap();
+        assert_eq!(on_demand.positions, scan.positions);
+    }
+}
+
+/// An OFF file of a cube with sides of 2 m.
+fn unit_cube_at(centre: DVec3) -> String {
+    let mut off = "OFF\n8 6 0\n".to_owned();
+    for i in 0..8 {
+        let corner = DVec3::new((i & 1).into(), (i >> 1 & 1).into(), (i >> 2).into());
+        let [x, y, z] = (centre + 2.0 * corner - 1.0).to_array();
+        off += &format!("{x} {y} {z}\n");
+    }
+    off + "4 0 2 3 1\n4 4 5 7 6\n4 0 1 5 4\n4 2 6 7 3\n4 0 4 6 2\n4 1 3 7 5\n"
 }

@@ -14,7 +14,7 @@ use sim_gpu::effects::{Effects, Noise, NoiseModel, ReturnMode};
 use sim_gpu::internals::caster::OpenCaster;
 use sim_gpu::internals::job::Culling;
 use sim_gpu::internals::mesh::TriangleMesh;
-use sim_gpu::internals::packets::{as_packets_tell, returns, revolution};
+use sim_gpu::internals::packets::{returns, revolution, with_packet_geometry};
 use sim_gpu::internals::pose::Pose;
 use sim_gpu::internals::scan::ScanRequest;
 use sim_gpu::internals::sensor::{Layout, Rotating, SensorProfile};
@@ -34,7 +34,7 @@ fn head_of(sensor: &mut SensorProfile) -> &mut Rotating {
 fn turning(rpm: f64) -> SensorProfile {
     let mut sensor = vlp32c();
     head_of(&mut sensor).rpm = rpm;
-    as_packets_tell(&sensor).unwrap()
+    with_packet_geometry(&sensor).unwrap()
 }
 
 /// A sensor that sees the world's origin some 16 degrees below its plane, where
@@ -199,7 +199,7 @@ fn the_oracle_agrees_on_beams_that_start_beside_the_sensor() {
 fn a_sensor_that_packets_cannot_tell_is_refused() {
     for name in ["kinect-v2", "generic-static", "blainder-ultrapuck", "vlp16", "hdl64e"] {
         let error =
-            as_packets_tell(&SensorProfile::builtin(name).unwrap()).unwrap_err().to_string();
+            with_packet_geometry(&SensorProfile::builtin(name).unwrap()).unwrap_err().to_string();
         assert!(error.contains("VLP-32C only"), "{name}: {error}");
     }
     type Change = fn(&mut SensorProfile);
@@ -219,7 +219,7 @@ fn a_sensor_that_packets_cannot_tell_is_refused() {
     for (change, key) in changes {
         let mut sensor = vlp32c();
         change(&mut sensor);
-        let error = as_packets_tell(&sensor).unwrap_err().to_string();
+        let error = with_packet_geometry(&sensor).unwrap_err().to_string();
         assert!(error.contains(key), "{key}: {error}");
     }
     let error = revolution(&vlp32c()).unwrap_err().to_string();
@@ -239,7 +239,7 @@ fn a_sensor_that_packets_cannot_tell_is_refused() {
 fn beams_may_stand_in_any_order_that_fires_alike() {
     let mut sensor = vlp32c();
     head_of(&mut sensor).beam.rotate_left(8);
-    let sensor = as_packets_tell(&sensor).unwrap();
+    let sensor = with_packet_geometry(&sensor).unwrap();
     let expected = Revolution { rpm: 600.0, n_beams: 57_870 };
     assert_eq!(revolution(&sensor).unwrap(), expected);
     assert_eq!(sensor.pattern(), turning(600.0).pattern());

@@ -48,7 +48,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     flags::need_simplification(file.simplifies())?;
     let mut returns = Returns::default();
     if format == ScanFormat::Pcap {
-        returns = cast_as_packets_tell(&mut file, args.returns)
+        returns = cast_packet_geometry(&mut file, args.returns)
             .with_context(|| format!("{}", scene_file.display()))?;
     } else if args.returns.is_some() {
         let cause = "--returns applies to packets only: expected --out with the extension .pcap; \
@@ -131,10 +131,10 @@ fn write_default_scene() -> anyhow::Result<PathBuf> {
 /// Gives the sensors the beam geometry that their packets describe, and the scans
 /// the attributes that packets are made of. Says which returns they hold, where `wanted` does
 /// not say otherwise.
-fn cast_as_packets_tell(scene: &mut SceneFile, wanted: Option<Returns>) -> anyhow::Result<Returns> {
+fn cast_packet_geometry(scene: &mut SceneFile, wanted: Option<Returns>) -> anyhow::Result<Returns> {
     let returns = packets::settle_returns(&mut scene.effects, wanted)?;
     for (i, sensor) in scene.sensors.iter_mut().enumerate() {
-        sensor.sensor = packets::as_packets_tell(&sensor.sensor)
+        sensor.sensor = packets::with_packet_geometry(&sensor.sensor)
             .with_context(|| format!("sensor[{i}]: no packets of \"{}\"", sensor.sensor.name))?;
     }
     scene.attributes = packets::attributes(&scene.effects, &scene.attributes);

@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _edgepuck, _scanning
+from ._arguments import whole
 from .mesh import Mesh, native
 from .scan import Scan, scan_of
 from .sensor import Sensor
+from .sensor import native as sensor_of
 
 
 class Scene:
@@ -32,6 +34,9 @@ class Scene:
 
     def __init__(self) -> None:
         self._scene = _edgepuck.Scene()
+        self._file: str | None = None
+        self._added: list[tuple[Mesh, tuple[Any, ...]]] = []
+        self._poses: dict[int, list[float]] = {}
 
     @classmethod
     def read(cls, file: str | os.PathLike[str]) -> Scene:
@@ -40,7 +45,8 @@ class Scene:
         Raises:
             Error: The file, or a mesh or sensor that it names, cannot be read.
         """
-        scene = cls.__new__(cls)
+        scene = cls()
+        scene._file = os.path.abspath(file)
         scene._scene = _edgepuck.Scene.read(os.fspath(file))
         return scene
 
@@ -76,11 +82,15 @@ class Scene:
         Raises:
             Error: A value is out of its limits.
         """
-        factors = np.broadcast_to(np.asarray(scale, dtype=np.float64), (3,)).tolist()
-        at = _pose(pose, position)
-        return self._scene.add(
-            native(mesh), at, factors, name, label, float(reflectivity), float(retroreflection)
-        )
+        factors = np.asarray(scale, dtype=np.float64)
+        if factors.shape not in [(), (3,)]:
+            raise _edgepuck.Error(f"scale: expected one number or three, found {scale!r}")
+        rows, factors = _pose(pose, position), np.broadcast_to(factors, (3,))
+        settings = (factors.tolist(), name, label, float(reflectivity), float(retroreflection))
+        number = self._scene.add(native(mesh), rows, *settings)
+        self._added.append((mesh, settings))
+        self._poses[number] = rows
+        return number
 
     def move(
         self, instance: int, pose: ArrayLike | None = None, *, position: ArrayLike | None = None
@@ -90,7 +100,10 @@ class Scene:
         Raises:
             Error: There is no such instance; the pose has a wrong shape or is not a rotation.
         """
-        self._scene.move(instance, _pose(pose, position))
+        rows = _pose(pose, position)
+        number = whole("instance", instance, 0, 2**32 - 1)
+        self._scene.move(number, rows)
+        self._poses[number] = rows
 
     def scan(
         self,
@@ -130,7 +143,7 @@ class Scene:
         """
         return _scanning.scan(
             self._scene,
-            sensor._sensor,
+            sensor_of(sensor),
             distance=distance,
             elevation=elevation,
             azimuth=azimuth,
@@ -142,6 +155,9 @@ class Scene:
             seed=seed,
         )
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _remade, (self._file, self._added, self._poses)
+
     def __repr__(self) -> str:
         return f"<Scene of {len(self)} instances>"
 
@@ -150,6 +166,19 @@ def scan_scene(file: str | os.PathLike[str], *, adapter: str = "cpu") -> dict[st
     """Scan the scene in a TOML file, like `edgepuck scan`. Return the scans by the names of sensors."""
     scans = Scene.read(file)._scene.scan_all(adapter)
     return {name: scan_of(columns) for name, columns in scans}
+
+
+def _remade(
+    file: str | None, added: list[tuple[Mesh, tuple[Any, ...]]], poses: dict[int, list[float]]
+) -> Scene:
+    """The scene that was pickled."""
+    scene = Scene() if file is None else Scene.read(file)
+    scene._added, scene._poses = added, poses
+    for mesh, settings in added:
+        scene._scene.add(native(mesh), np.eye(4).ravel().tolist(), *settings)
+    for number, rows in poses.items():
+        scene._scene.move(number, rows)
+    return scene
 
 
 def _pose(pose: ArrayLike | None, position: ArrayLike | None) -> list[float]:

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _edgepuck, _scanning
 from ._arguments import Remade, place
-from .mesh import Mesh, native
+from .mesh import Mesh
+from .mesh import native as mesh_of
 from .scan import Scan
 
 
@@ -78,7 +79,7 @@ class Sensor(Remade):
             Error: A value is out of its limits, or an attribute or effect is unknown.
         """
         scene = _edgepuck.Scene()
-        scene.add(native(mesh), np.eye(4).ravel().tolist(), [1.0] * 3, None, None, 1.0, 0.0)
+        scene.add(mesh_of(mesh), np.eye(4).ravel().tolist(), [1.0] * 3, None, None, 1.0, 0.0)
         return _scanning.scan(
             scene,
             self._sensor,
@@ -95,3 +96,10 @@ class Sensor(Remade):
 
     def __repr__(self) -> str:
         return f"Sensor({self.name!r})"
+
+
+def native(sensor: Sensor) -> _edgepuck.Sensor:
+    """The sensor of the module in Rust, if `sensor` is an `edgepuck.Sensor`."""
+    if not isinstance(sensor, Sensor):
+        raise _edgepuck.Error(f"expected an edgepuck.Sensor, found {type(sensor).__name__}")
+    return sensor._sensor

@@ -5,7 +5,6 @@ use formats::Split;
 use numpy::ndarray::Array3;
 use numpy::{IntoPyArray, PyArray1, PyArray3};
 use pyo3::prelude::*;
-use sim_gpu::internals::mesh::tree::discover;
 use std::path::PathBuf;
 
 /// Clouds, `[n, points, 3]`, and their classes, `[n]`.
@@ -37,7 +36,7 @@ impl Clouds {
         let config = config.map_err(|error| raised(argument_error(&error)))?;
         let n_points = config.packed_points as usize;
         let clouds = process::run(py, || {
-            let meshes = discover(&meshes, config.seed)?;
+            let meshes = dataset::discover(&meshes, config.seed)?;
             Ok(dataset::Clouds::new(config, &meshes, split, cache_bytes)?)
         })?;
         let clouds = clouds.map_err(raised_with_causes)?;
@@ -70,8 +69,7 @@ impl Clouds {
     /// The clouds at `indices`, `[n, points, 3]`, and their classes, `[n]`.
     fn draw<'py>(&self, py: Python<'py>, seed: u64, indices: Vec<usize>) -> PyResult<Batch<'py>> {
         indices.iter().try_for_each(|&index| self.check(index))?;
-        let caster =
-            self.caster.open()?.for_effects(&self.clouds.cast_effects()).map_err(raised)?;
+        let caster = self.caster.open()?;
         let drawn = process::run(py, || self.clouds.draw(&caster, seed, &indices))?;
         let drawn = drawn.map_err(raised)?;
         let labels: Vec<i64> = drawn.iter().map(|cloud| cloud.label as i64).collect();

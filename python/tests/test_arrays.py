@@ -185,3 +185,14 @@ def test_a_scene_that_was_read_keeps_its_effects_attributes_and_seed(tmp_path, c
     assert noisy.range.std() > scene.scan(sensor, effects={}).range.std()
     other = scene.scan(sensor, seed=6)
     assert not np.array_equal(noisy.range, other.range)
+
+
+def test_a_pickled_scene_has_the_same_scan(cube: tuple) -> None:
+    scene, mesh = ep.Scene(), ep.Mesh(*cube)
+    near = scene.add(mesh, position=(4, 0, 0))
+    scene.add(mesh, position=(8, 2, 0), scale=2.0, reflectivity=0.3, name="far")
+    scene.move(near, position=(4, -1, 0))
+    again = pickle.loads(pickle.dumps(scene))
+    scans = [of.scan(ep.Sensor("vlp32c"), pose=np.eye(4), noise=0.01) for of in (scene, again)]
+    assert len(again) == 2 and len(scans[0]) > 0
+    np.testing.assert_array_equal(scans[0].positions, scans[1].positions)

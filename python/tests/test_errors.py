@@ -37,6 +37,11 @@ SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0]]
         (lambda: ep.Scenes("moon"), "moon"),
         (lambda: ep.scan_scene("missing.toml"), "missing.toml"),
         (lambda: ep.Dataset("missing"), "missing: cannot be read"),
+        (lambda: ep.Scene().add("chair.off"), "expected an edgepuck.Mesh"),
+        (lambda: ep.Scene().add(ep.Mesh(*ep.box((1, 1, 1))), scale=[1, 2]), "expected one number or three"),
+        (lambda: ep.Scene().move(0), "expected the number of one of 0 instances, found 0"),
+        (lambda: ep.Scene().move(-1), "instance: expected a whole number"),
+        (lambda: ep.Scene().scan("vlp32c"), "expected an edgepuck.Sensor, found str"),
     ],
 )
 def test_what_cannot_be_used_is_named(make, message: str) -> None:

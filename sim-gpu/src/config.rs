@@ -13,6 +13,7 @@ const MAX_FILE_BYTES: u64 = 16 << 20;
 
 /// A TOML file could not be used.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ConfigError {
     /// The file cannot be opened or read.
     #[error("{}: {source}", file.display())]

@@ -124,6 +124,7 @@ impl MaterialTable {
 
 /// The materials of a mesh could not be loaded.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum MaterialError {
     /// The mesh cannot be read.
     #[error(transparent)]

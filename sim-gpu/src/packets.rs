@@ -24,7 +24,7 @@ pub fn attributes(effects: &Effects, wanted: &AttributeSet) -> AttributeSet {
 
 /// `sensor` with its beams as packets encode them: they start on the axis, and azimuths are
 /// whole units at the start of a sequence.
-pub fn as_packets_tell(sensor: &SensorProfile) -> Result<SensorProfile, InvalidValue> {
+pub fn with_packet_geometry(sensor: &SensorProfile) -> Result<SensorProfile, InvalidValue> {
     let mut sensor = sensor.clone();
     if let Layout::Rotating(rotating) = &mut sensor.layout {
         rotating.beam_crossing_m.get_or_insert(BEAM_CROSSING_M);

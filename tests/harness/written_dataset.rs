@@ -10,10 +10,11 @@ use formats::Split;
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, Scan};
 use formats::scan_file::{ScanFormat, write_scan};
+use sim_gpu::Sensor;
 use sim_gpu::internals::mesh::frame::Up;
 use sim_gpu::internals::mesh::validate::MeshDefects;
 use sim_gpu::internals::scan::Tally;
-use sim_gpu::internals::sensor::{SensorProfile, Views};
+use sim_gpu::internals::sensor::Views;
 use std::path::Path;
 
 /// Points of each packed cloud.
@@ -26,7 +27,7 @@ pub const MIN_POINTS: u32 = 16;
 pub fn config() -> DatasetConfig {
     let set = |name: &str, sensor: &str, views: Views| SetConfig {
         name: name.to_owned(),
-        sensor: SensorProfile::builtin(sensor).expect("a built-in sensor"),
+        sensor: Sensor::named(sensor).expect("a built-in sensor"),
         viewpoints: Viewpoints::Views(views),
     };
     DatasetConfig {
@@ -74,7 +75,7 @@ pub fn write(out: &Path, terms: &Terms, entries: &[Entry]) -> Vec<MeshRecord> {
 fn write_mesh(out: &Path, config: &DatasetConfig, entry: &Entry) -> MeshRecord {
     let mut scans = Vec::new();
     for set in &config.sets {
-        for view in 0..set.poses(config.seed, &entry.id()).len() as u32 {
+        for view in 0..set.viewpoints.count() as u32 {
             let variants = config.variants.iter();
             let write = |&variant: &Variant| write_variant(out, config, set, entry, view, variant);
             let variants = variants.map(write).collect();
@@ -87,6 +88,7 @@ fn write_mesh(out: &Path, config: &DatasetConfig, entry: &Entry) -> MeshRecord {
         hash: config.hash.of_bytes(entry.name.as_bytes()),
         up: Up::Z,
         centre: [0.1, -0.2, 1e-7],
+        views_around: [0.0; 3],
         scale: 1.0 / 3.0,
         triangles: 12,
         dropped_faces: 0,

@@ -9,7 +9,7 @@ use crate::brightness::BrightnessArgs;
 use crate::segment::SweepArgs;
 use crate::{Outcome, Usage};
 use plan::{Entry, Plan};
-use sim_gpu::internals::sensor::SensorProfile;
+use sim_gpu::Sensor;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -65,11 +65,11 @@ pub fn run(args: &CorruptArgs) -> anyhow::Result<Outcome> {
         return Ok(Outcome::Success);
     }
     let input = args.input.as_ref().expect("invariant: required without --list");
-    let sensor = SensorProfile::resolve(&args.profile)?;
+    let sensor = Sensor::resolve(&args.profile)?;
     if input.sweep.is_dir() {
         return objects::run(args, &input.sweep, &plan, &sensor);
     }
-    sweep::run(args, input, &plan, &sensor)
+    sweep::run(args, input, &plan, sensor.profile())
 }
 
 fn listed(plan: &Plan) -> String {

@@ -3,12 +3,10 @@ use super::{CorruptArgs, Written, usage, write_list};
 use crate::Outcome;
 use crate::gen_dataset::report_failures;
 use anyhow::Context;
-use edgepuck_dataset::{Corrupted, CorruptedSet, ObjectCorruption};
+use edgepuck_dataset::{Corrupted, CorruptedSet, ObjectCorruption, Up, Views, discover};
 use formats::Split;
 use indicatif::{ProgressBar, ProgressStyle};
-use sim_gpu::internals::mesh::frame::Up;
-use sim_gpu::internals::mesh::tree::discover;
-use sim_gpu::internals::sensor::{SensorProfile, Views};
+use sim_gpu::Sensor;
 use std::path::Path;
 
 /// Flags for meshes.
@@ -38,7 +36,7 @@ pub(super) fn run(
     args: &CorruptArgs,
     folder: &Path,
     plan: &Plan,
-    sensor: &SensorProfile,
+    sensor: &Sensor,
 ) -> anyhow::Result<Outcome> {
     let chosen = chosen(&plan.object, &args.only, &args.severity)?;
     let ObjectArgs { views: count, distance: distance_m, points, up } = args.objects;

@@ -6,7 +6,7 @@ use edgepuck_dataset::{Manifest, MeshRecord, Variant};
 use formats::Scan;
 use formats::scan_file::{ScanFormat, read_scan};
 use glam::DVec3;
-use sim_gpu::internals::pose::Pose;
+use sim_gpu::Pose;
 use std::path::{Path, PathBuf};
 
 /// Draws a mesh from the middle of the list that fills a packed cloud, or else the mesh with the
@@ -22,19 +22,20 @@ pub fn draw(out: &Path, manifest: &Manifest) -> anyhow::Result<Option<PathBuf>> 
     let full = after.iter().chain(before).find(|record| points(record) >= enough);
     let most = full.or_else(|| manifest.meshes.iter().max_by_key(points));
     let Some(record) = most.filter(|record| points(record) > 0) else { return Ok(None) };
-    let poses = set.poses(manifest.config.seed, &record.entry.id());
+    let centre = DVec3::from_array(record.views_around);
+    let poses = set.poses(manifest.config.seed, &record.entry.id(), centre);
     let all_views = |variant| all_views(out, record, &set.name, variant, &poses);
     let clean = all_views(Variant::Clean)?;
     let has_noisy = manifest.config.variants.contains(&Variant::Noisy);
     let noisy = has_noisy.then(|| all_views(Variant::Noisy)).transpose()?;
-    let (name, sensor, n_views) = (&record.entry.name, &set.sensor.name, poses.len());
+    let (name, sensor, n_views) = (&record.entry.name, set.sensor.name(), poses.len());
     let title = format!("{name} as {sensor} sees it, {n_views} views together");
     let picture = layout::example(out);
     preview::draw(&clean, noisy.as_ref(), &title, &picture)?;
     Ok(Some(picture))
 }
 
-/// The scans of all views as one cloud with ranges.
+/// The scans of all views as one cloud with ranges, around the centre of the mesh.
 fn all_views(
     out: &Path,
     record: &MeshRecord,
@@ -44,15 +45,16 @@ fn all_views(
 ) -> anyhow::Result<Scan> {
     let mut positions = Vec::new();
     let mut ranges_m = Vec::new();
+    let centre = DVec3::from_array(record.views_around);
     for (pose, view) in poses.iter().zip(0..) {
         let file = layout::scan(out, set, variant, &record.entry, view, ScanFormat::Npz);
         let scan = read_scan(&file)?;
         let origin = DVec3::from_array(scan.origin);
-        ranges_m.extend(scan.positions.iter().map(|&position| {
+        for position in scan.positions {
             let point = origin + DVec3::from_array(position.map(f64::from));
-            point.distance(pose.position_m) as f32
-        }));
-        positions.extend(scan.positions);
+            ranges_m.push(point.distance(pose.position_m) as f32);
+            positions.push((point - centre).as_vec3().to_array());
+        }
     }
     Ok(Scan { positions, range_m: Some(ranges_m), ..Scan::default() })
 }

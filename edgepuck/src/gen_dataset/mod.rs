@@ -14,15 +14,14 @@ use clap::Parser;
 use clap::error::ErrorKind;
 use edgepuck_dataset::{
     Begin, DatasetConfig, DatasetError, Layout, Manifest, MeshFailure, Plan, Progress,
-    check_layouts, make, verify,
+    check_layouts, discover, make, verify,
 };
 use edgepuck_shapes as shapes;
 use formats::hash::Hashing;
 use settings::Settings;
 use shard::Shard;
 use signal_hook::consts::SIGTERM;
-use sim_gpu::internals::caster::OpenCaster;
-use sim_gpu::internals::mesh::tree::discover;
+use sim_gpu::Caster;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -122,7 +121,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     };
     let out = args.out.clone().unwrap_or(default_out);
     let meshes = discover(&meshes_folder, config.seed)?;
-    let caster = args.caster.caster()?.for_effects(&config.cast_effects())?;
+    let caster = args.caster.caster()?;
     let plan = Plan {
         part: args.shard.map(|shard| (shard.number, shard.of)),
         begin: match (args.resume, args.overwrite) {
@@ -147,7 +146,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     })
 }
 
-fn make_files(plan: &Plan, caster: &OpenCaster) -> anyhow::Result<Outcome> {
+fn make_files(plan: &Plan, caster: &Caster) -> anyhow::Result<Outcome> {
     let started = Instant::now();
     let progress = Progress::default();
     // Once all meshes are scanned, SIGTERM ends the program immediately.

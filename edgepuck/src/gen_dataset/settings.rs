@@ -1,18 +1,15 @@
 use super::usage;
-use anyhow::Context;
-use edgepuck_dataset::{DatasetConfig, Layout, SetConfig, Variant, Viewpoints};
-use formats::hash::Hashing;
+use edgepuck_dataset::{
+    ColourSource, DatasetConfig, Hashing, Layout, Normalize, Returns, ScanFormat, SetConfig,
+    Simplify, Up, Variant, Viewpoints, Views,
+};
 use formats::scan::Attribute;
-use formats::scan_file::ScanFormat;
-use formats::vlp32c::Returns;
+use sim_gpu::Sensor;
 use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel, Quantum};
 use sim_gpu::internals::config::{self, within};
-use sim_gpu::internals::material::ColourSource;
-use sim_gpu::internals::mesh::frame::{Normalize, Up};
 use sim_gpu::internals::packets;
 use sim_gpu::internals::pose::load_poses;
-use sim_gpu::internals::sensor::{Layout as BeamLayout, SensorProfile, Views};
-use sim_gpu::internals::simplify::Simplify;
+use sim_gpu::internals::sensor::{Layout as BeamLayout, SensorProfile};
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -170,12 +167,12 @@ impl Settings {
         within("--reflectivity", self.reflectivity, 0.0..=1.0).map_err(usage)?;
         let mut returns = Returns::default();
         if formats.contains(&ScanFormat::Pcap) {
-            returns = cast_as_packets_tell(&mut sets, &mut effects, self.returns)?;
+            returns = cast_packet_geometry(&mut sets, &mut effects, self.returns)?;
         } else if self.returns.is_some() {
             return Err(usage("--returns applies to packets only: add --format pcap"));
         }
         for set in &sets {
-            effects.for_sensor(&set.sensor).map_err(usage)?;
+            effects.for_sensor(set.sensor.profile()).map_err(usage)?;
         }
         let mut variants = vec![Variant::Clean];
         variants.extend((effects != effects.clean()).then_some(Variant::Noisy));
@@ -232,8 +229,8 @@ impl Settings {
     fn sets(&self) -> anyhow::Result<Vec<SetConfig>> {
         match &self.sensor {
             Some(name) => {
-                let sensor = SensorProfile::resolve(name)?.trimmed();
-                let set = match sensor.layout {
+                let sensor = Sensor::from(SensorProfile::resolve(name)?.trimmed());
+                let set = match &sensor.profile().layout {
                     BeamLayout::Rotating(_) | BeamLayout::Uniform(_) => "rotational",
                     BeamLayout::Grid(_) => "static",
                     BeamLayout::Risley(_) => "rosette",
@@ -242,22 +239,17 @@ impl Settings {
                 Ok(vec![self.set(set, sensor, self.views)?])
             }
             None => Ok(vec![
-                self.set("rotational", builtin("vlp32c")?, self.views)?,
-                self.set("static", builtin("generic-static")?, None)?,
+                self.set("rotational", Sensor::named("vlp32c")?, self.views)?,
+                self.set("static", Sensor::named("generic-static")?, None)?,
             ]),
         }
     }
 
-    fn set(
-        &self,
-        name: &str,
-        sensor: SensorProfile,
-        views: Option<u32>,
-    ) -> anyhow::Result<SetConfig> {
+    fn set(&self, name: &str, sensor: Sensor, views: Option<u32>) -> anyhow::Result<SetConfig> {
         let viewpoints = match &self.poses {
             Some(file) => Viewpoints::Poses(load_poses(file)?),
             None => {
-                let defaults = sensor.default_views();
+                let defaults = sensor.profile().default_views();
                 let mut views = Views { count: views.unwrap_or(defaults.count), ..defaults };
                 if let Some(FromTo { from, to }) = self.distance {
                     (views.distance_m, views.distance_to_m) = (from, to);
@@ -307,7 +299,7 @@ struct EffectsFile {
 
 /// Gives the sensors the beam geometry of their packets, and the effects the returns that packets
 /// hold: `wanted`, or those of the effects.
-fn cast_as_packets_tell(
+fn cast_packet_geometry(
     sets: &mut [SetConfig],
     effects: &mut Effects,
     wanted: Option<Returns>,
@@ -315,13 +307,9 @@ fn cast_as_packets_tell(
     let refuse = |error| usage(format!("--format pcap: {error}"));
     let returns = packets::settle_returns(effects, wanted).map_err(refuse)?;
     for set in sets {
-        let name = &set.sensor.name;
+        let name = set.sensor.name();
         let refuse = |error| usage(format!("--format pcap: sensor \"{name}\": {error}"));
-        set.sensor = packets::as_packets_tell(&set.sensor).map_err(refuse)?;
+        set.sensor = packets::with_packet_geometry(set.sensor.profile()).map_err(refuse)?.into();
     }
     Ok(returns)
-}
-
-fn builtin(name: &str) -> anyhow::Result<SensorProfile> {
-    SensorProfile::builtin(name).with_context(|| format!("no built-in sensor {name}"))
 }

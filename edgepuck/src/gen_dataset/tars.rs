@@ -4,7 +4,7 @@ use super::report_failures;
 use crate::{Outcome, shell};
 use edgepuck_dataset::{Cut, HandOver, Plan, Progress, Sample, TarRecord, Tars, make_tars};
 use signal_hook::consts::{SIGINT, SIGTERM};
-use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::Caster;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::SeqCst};
@@ -33,7 +33,7 @@ pub struct TarArgs {
     on_shard: Option<String>,
 }
 
-pub fn run(args: &TarArgs, plan: &Plan, caster: &OpenCaster) -> anyhow::Result<Outcome> {
+pub fn run(args: &TarArgs, plan: &Plan, caster: &Caster) -> anyhow::Result<Outcome> {
     let progress = Progress::default();
     // A second Ctrl-C ends the program immediately; schedulers may repeat SIGTERM.
     signal_hook::flag::register_conditional_default(SIGINT, Arc::clone(&progress.stop))?;

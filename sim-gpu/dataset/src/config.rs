@@ -11,9 +11,9 @@ use sim_gpu::effects::Effects;
 use sim_gpu::internals::config::InvalidValue;
 use sim_gpu::internals::material::ColourSource;
 use sim_gpu::internals::mesh::frame::{Normalize, Up};
-use sim_gpu::internals::pose::Pose;
-use sim_gpu::internals::sensor::{SensorProfile, Views};
+use sim_gpu::internals::sensor::Views;
 use sim_gpu::internals::simplify::Simplify;
+use sim_gpu::{Pose, Sensor};
 
 /// The settings of a dataset. With the meshes and the adapter, they decide every byte of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -76,7 +76,7 @@ pub struct SetConfig {
     /// The name of the set and of its folder, such as `rotational`.
     pub name: String,
     /// The sensor, in full.
-    pub sensor: SensorProfile,
+    pub sensor: Sensor,
     /// Its viewpoints.
     pub viewpoints: Viewpoints,
 }
@@ -149,7 +149,7 @@ impl DatasetConfig {
     pub fn effects_of(&self, set: &SetConfig, variant: Variant) -> Result<Effects, InvalidValue> {
         match variant {
             Variant::Clean => Ok(self.effects.clean()),
-            Variant::Noisy => self.effects.for_sensor(&set.sensor),
+            Variant::Noisy => self.effects.for_sensor(set.sensor.profile()),
         }
     }
 
@@ -175,21 +175,29 @@ impl Viewpoints {
 }
 
 impl SetConfig {
-    /// The poses around the mesh `id`. Jitter, if there is any, differs by mesh.
+    /// The set `name` of `sensor`, at the viewpoints that its profile recommends.
     #[must_use]
-    pub fn poses(&self, seed: u64, id: &str) -> Vec<Pose> {
+    pub fn new(name: &str, sensor: Sensor) -> Self {
+        let viewpoints = Viewpoints::Views(sensor.profile().default_views());
+        Self { name: name.to_owned(), sensor, viewpoints }
+    }
+
+    /// The poses for the mesh `id`: as given, or around `centre`. Jitter, if there is any, differs by
+    /// mesh.
+    #[must_use]
+    pub fn poses(&self, seed: u64, id: &str, centre: DVec3) -> Vec<Pose> {
         match &self.viewpoints {
             Viewpoints::Poses(poses) => poses.clone(),
-            Viewpoints::Views(views) => views.poses(DVec3::ZERO, self.views_key(seed, id)),
+            Viewpoints::Views(views) => views.poses(centre, self.views_key(seed, id)),
         }
     }
 
     /// Pose `view` of [`SetConfig::poses`].
     #[must_use]
-    pub fn pose(&self, seed: u64, id: &str, view: u32) -> Pose {
+    pub fn pose(&self, seed: u64, id: &str, centre: DVec3, view: u32) -> Pose {
         match &self.viewpoints {
             Viewpoints::Poses(poses) => poses[view as usize],
-            Viewpoints::Views(views) => views.pose(view, DVec3::ZERO, self.views_key(seed, id)),
+            Viewpoints::Views(views) => views.pose(view, centre, self.views_key(seed, id)),
         }
     }
 

@@ -17,11 +17,12 @@ use sim_gpu::internals::caster::OpenCaster;
 use sim_gpu::internals::config::{InvalidValue, within};
 use sim_gpu::internals::mesh::frame::{Normalize, Up};
 use sim_gpu::internals::mesh::tree::MeshEntry;
-use sim_gpu::internals::pose::Pose;
 use sim_gpu::internals::scan::{ScanError, ScanRequest, scan};
-use sim_gpu::internals::sensor::{BeamPattern, SensorProfile, Views};
+use sim_gpu::internals::sensor::{BeamPattern, Views};
 use sim_gpu::internals::target::{Surface, Target};
+use sim_gpu::{Pose, Sensor};
 use std::path::Path;
+use std::sync::Arc;
 
 /// A corruption of the clean scan of an object. The default changes nothing.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -43,7 +44,7 @@ pub struct CorruptedSet {
     pub corruption: ObjectCorruption,
     /// Casts its rays, on the CPU, since test sets are small and differ in their effects.
     caster: OpenCaster,
-    pattern: BeamPattern,
+    pattern: Arc<BeamPattern>,
 }
 
 /// The result of [`Corrupted::write`].
@@ -61,7 +62,7 @@ pub struct Corrupted<'a> {
     /// The folder to write to.
     pub out: &'a Path,
     /// The sensor.
-    pub sensor: &'a SensorProfile,
+    pub sensor: &'a Sensor,
     /// Its viewpoints around each mesh.
     pub views: Views,
     /// The meshes' upward axis; `None` is each format's default.
@@ -103,10 +104,10 @@ impl CorruptedSet {
     pub fn new(
         name: String,
         corruption: ObjectCorruption,
-        sensor: &SensorProfile,
+        sensor: &Sensor,
     ) -> Result<Self, InvalidValue> {
-        corruption.effects.for_sensor(sensor)?;
-        let pattern = corruption.effects.widen(sensor.pattern(), sensor)?;
+        corruption.effects.for_sensor(sensor.profile())?;
+        let pattern = sensor.rays(&corruption.effects)?;
         let caster = OpenCaster::Cpu(corruption.effects.clone());
         Ok(Self { name, corruption, caster, pattern })
     }
@@ -174,7 +175,7 @@ impl Corrupted<'_> {
         pose: Pose,
         stream: StreamKey,
     ) -> Result<Vec<[f32; 3]>, ScanError> {
-        let mut request = ScanRequest::new(self.sensor, &set.pattern, pose);
+        let mut request = ScanRequest::new(self.sensor.profile(), &set.pattern, pose);
         request.stream = stream;
         let scan = scan(&set.caster, target, &request)?;
         let origin = DVec3::from_array(scan.origin);

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 /// Why a dataset cannot be made, merged or verified. A mesh that cannot be scanned does not stop a
 /// run: it is a [`MeshFailure`].
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum DatasetError {
     /// The folder holds files already.
     #[error(

@@ -8,7 +8,7 @@ use crate::record::{Entry, MeshRecord};
 use formats::atomic;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::Caster;
 use sim_gpu::internals::mesh::tree::MeshEntry;
 use std::path::{Path, PathBuf};
 
@@ -31,7 +31,7 @@ impl Terms {
     /// The terms of a run over `meshes`, or over part `shard` of them.
     pub(crate) fn new(
         config: DatasetConfig,
-        caster: &OpenCaster,
+        caster: &Caster,
         meshes: &[MeshEntry],
         shard: Option<(u32, u32)>,
     ) -> Self {

@@ -6,24 +6,21 @@
 //! card and metadata for it. [`Clouds`] casts the same clouds on demand, without files.
 //!
 //! ```
-//! use edgepuck_dataset::{DatasetConfig, Plan, Progress, SetConfig, Viewpoints, make, verify};
-//! use sim_gpu::internals::{caster::OpenCaster, mesh::tree::discover, sensor::SensorProfile};
+//! use edgepuck_dataset::{DatasetConfig, Plan, Progress, SetConfig, discover, make, verify};
+//! use sim_gpu::{Caster, Sensor};
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let folder = std::env::temp_dir().join(format!("edgepuck-dataset-{}", std::process::id()));
 //! # std::fs::create_dir_all(folder.join("meshes/cup/train"))?;
 //! # let cup = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 1\n3 0 1 2\n";
 //! # std::fs::write(folder.join("meshes/cup/train/cup_1.off"), cup)?;
 //!
-//! let sensor = SensorProfile::builtin("generic-static").ok_or("no such sensor")?;
-//! let viewpoints = Viewpoints::Views(sensor.default_views());
-//! let set = SetConfig { name: "static".to_owned(), sensor, viewpoints };
-//! let config = DatasetConfig::new(vec![set]);
+//! let sensor = Sensor::named("generic-static")?;
+//! let config = DatasetConfig::new(vec![SetConfig::new("static", sensor)]);
 //!
 //! let meshes = discover(&folder.join("meshes"), config.seed)?;
-//! let caster = OpenCaster::Cpu(config.cast_effects());
 //! let out = folder.join("dataset");
 //! let plan = Plan::new(&out, &config, &meshes);
-//! let manifest = make(&plan, &caster, &Progress::default())?;
+//! let manifest = make(&plan, &Caster::auto(), &Progress::default())?;
 //! assert_eq!(manifest.packed[0].file, "packed/static-clean-train.npz");
 //! assert!(verify(&out)?.is_sound());
 //! # std::fs::remove_dir_all(folder)?;
@@ -73,6 +70,17 @@ pub use record::{Cloud, Entry, FileRecord, MeshFailure, MeshRecord, ScanRecord, 
 pub use surfaces::{SurfaceConfig, write_surfaces};
 pub use tars::{Cut, HandOver, PartManifest, PartRecord, Sample, TarRecord, Tars, make_tars};
 pub use verify::{Problem, Report, verify};
+
+// The types of the settings that are not of this crate.
+pub use formats::hash::Hashing;
+pub use formats::scan_file::ScanFormat;
+pub use formats::vlp32c::Returns;
+pub use sim_gpu::internals::job::Culling;
+pub use sim_gpu::internals::material::ColourSource;
+pub use sim_gpu::internals::mesh::frame::{Normalize, Up};
+pub use sim_gpu::internals::mesh::tree::{MeshEntry, discover};
+pub use sim_gpu::internals::sensor::Views;
+pub use sim_gpu::internals::simplify::Simplify;
 
 /// Parts of the library for Edgepuck's programs and tests, which may change in any version.
 #[doc(hidden)]

@@ -11,15 +11,14 @@ use crate::plan::{Begin, Plan};
 use crate::progress::{Progress, Stage};
 use crate::retract::retract;
 use formats::atomic;
-use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::Caster;
 use sim_gpu::internals::mesh::tree::MeshEntry;
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::atomic::Ordering::SeqCst;
 
 /// Makes the dataset of `plan` and returns its manifest. A part has every N-th mesh of the plan;
-/// [`merge()`](crate::merge()) makes one dataset of all parts. `caster` models
-/// [`DatasetConfig::cast_effects`](crate::DatasetConfig::cast_effects).
+/// [`merge()`](crate::merge()) makes one dataset of all parts.
 ///
 /// The same settings, meshes and adapter give the same bytes, however often the run was
 /// interrupted. A mesh that cannot be scanned is no error, but a failure that the manifest lists.
@@ -30,11 +29,7 @@ use std::sync::atomic::Ordering::SeqCst;
 /// - settings that the layouts cannot hold, or effects that do not fit a sensor;
 /// - [`DatasetError::Interrupted`] if [`Progress::stop`] was set before all meshes were scanned;
 /// - a file that cannot be written, or an adapter that fails.
-pub fn make(
-    plan: &Plan,
-    caster: &OpenCaster,
-    progress: &Progress,
-) -> Result<Manifest, DatasetError> {
+pub fn make(plan: &Plan, caster: &Caster, progress: &Progress) -> Result<Manifest, DatasetError> {
     if plan.config.layouts.contains(&Layout::Webdataset) {
         let cause = "expected a layout of files: `make_tars` makes tars";
         return Err(DatasetError::Layout { layout: Layout::Webdataset.name(), cause });

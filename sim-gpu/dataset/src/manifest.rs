@@ -8,8 +8,10 @@ use crate::journal::{Terms, digest, read_json, write_json};
 use crate::layout;
 use crate::record::{Entry, FileRecord, MeshFailure, MeshRecord, VariantRecord};
 use formats::hash::{FileHash, Hashing};
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
-use sim_gpu::internals::pose::Pose;
+use sim_gpu::Pose;
+use sim_gpu::internals::mesh::frame::Normalize;
 use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
 
@@ -58,14 +60,15 @@ pub struct SetPoses {
 pub enum Poses {
     /// The same poses around every mesh.
     EveryMesh(Vec<Pose>),
-    /// Each mesh has its own poses, since views are drawn at random; sorted.
+    /// Each mesh has its own poses, since views are drawn at random or meshes stay where they are;
+    /// sorted.
     EachMesh(Vec<MeshPoses>),
 }
 
 /// The poses around one mesh.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MeshPoses {
-    /// [`Entry::id`]; meshes of one id in both splits share their poses.
+    /// [`Entry::id`]; meshes of one id in both splits share poses that are around the origin.
     pub id: String,
     /// By view.
     pub poses: Vec<Pose>,
@@ -227,10 +230,18 @@ pub(crate) fn poses(config: &DatasetConfig, records: &[MeshRecord]) -> Vec<SetPo
 
 fn set_poses(config: &DatasetConfig, set: &SetConfig, records: &[MeshRecord]) -> Poses {
     let drawn = matches!(&set.viewpoints, Viewpoints::Views(views) if !views.is_regular());
-    if !drawn {
-        return Poses::EveryMesh(set.poses(config.seed, ""));
+    let moved =
+        matches!(set.viewpoints, Viewpoints::Views(_)) && config.normalize == Normalize::None;
+    if !drawn && !moved {
+        return Poses::EveryMesh(set.poses(config.seed, "", DVec3::ZERO));
     }
-    let ids: BTreeSet<String> = records.iter().map(|record| record.entry.id()).collect();
-    let poses = |id: String| MeshPoses { poses: set.poses(config.seed, &id), id };
-    Poses::EachMesh(ids.into_iter().map(poses).collect())
+    let poses = |record: &MeshRecord| {
+        let id = record.entry.id();
+        let around = DVec3::from_array(record.views_around);
+        MeshPoses { poses: set.poses(config.seed, &id, around), id }
+    };
+    let mut each: Vec<MeshPoses> = records.iter().map(poses).collect();
+    each.sort_by(|p, q| p.id.cmp(&q.id));
+    each.dedup();
+    Poses::EachMesh(each)
 }

@@ -12,7 +12,7 @@ use crate::view::{self, Rig, View};
 use formats::hash::Hashing;
 use formats::scan_file::{ScanFormat, write_scan};
 use formats::vlp32c;
-use glam::DAffine3;
+use glam::{DAffine3, DVec3};
 use sim_gpu::Scene;
 use sim_gpu::internals::bvh::Builder;
 use sim_gpu::internals::job::{Cast, CastJob};
@@ -54,11 +54,13 @@ pub(crate) fn prepare<'a>(run: &Run<'a>, entry: &MeshEntry) -> Result<Prepared<'
         progress.time(Stage::Read, || read(entry, config.up, config.normalize, config.hash))?;
     let materials = materials(entry, config)?;
     let id = record.entry.id();
-    let views = run.rig.views(&id);
+    let centre = DVec3::from_array(record.views_around);
+    let views = run.rig.views(&id, centre);
     let surface = match config.simplify {
         None => Surface::new(mesh, kept),
         Some(simplify) => {
-            let bound_m = simplify.bound_m(|| resolved_m(&mesh, 1.0, &viewpoints(config, &id)));
+            let bound_m =
+                simplify.bound_m(|| resolved_m(&mesh, 1.0, &viewpoints(config, &id, centre)));
             let surface = progress
                 .time(Stage::Build, || simplified_surface(mesh, kept, bound_m))
                 .map_err(|error| MeshFailure::new(entry, error))?;
@@ -67,12 +69,12 @@ pub(crate) fn prepare<'a>(run: &Run<'a>, entry: &MeshEntry) -> Result<Prepared<'
         }
     };
     let rays_of = |view: &View| {
-        let frame = RayFrame::new(&surface, &DAffine3::IDENTITY, view.pose());
+        let frame = RayFrame::new(&surface, &DAffine3::from_translation(centre), view.pose());
         view.pattern().within(&frame.cone(view.pattern())).len()
     };
     let builder = Builder::for_rays(surface.len(), views.iter().map(rays_of).sum());
     let target = progress.time(Stage::Build, || Target::new(surface, builder));
-    let scene = view::scene(config, target, materials);
+    let scene = view::scene(config, target, centre, materials);
     let placed = view::placed(&scene);
     let jobs: Vec<CastJob> =
         progress.time(Stage::Aim, || views.iter().map(|view| view.aim(&placed)).collect());
@@ -96,18 +98,18 @@ pub(crate) fn materials(
     })
 }
 
-/// Where the sensor of each set stands around the mesh `id`.
-fn viewpoints<'a>(config: &'a DatasetConfig, id: &str) -> Vec<Viewpoint<'a>> {
+/// Where the sensor of each set stands, from the `centre` of the mesh `id`.
+fn viewpoints<'a>(config: &'a DatasetConfig, id: &str, centre: DVec3) -> Vec<Viewpoint<'a>> {
     let viewpoint = |set: &'a SetConfig| {
-        let poses = set.poses(config.seed, id);
-        let positions = poses.iter().map(|pose| pose.position_m).collect();
-        Viewpoint { sensor: &set.sensor, positions }
+        let poses = set.poses(config.seed, id, centre);
+        let positions = poses.iter().map(|pose| pose.position_m - centre).collect();
+        Viewpoint { sensor: set.sensor.profile(), positions }
     };
     config.sets.iter().map(viewpoint).collect()
 }
 
-/// Reads the mesh of `entry`; returns its record without scans, the mesh in the world frame and
-/// the triangles that a ray can meet.
+/// Reads the mesh of `entry`; returns its record without scans, the mesh around the origin and the
+/// triangles that a ray can meet. The mesh stands where the record's `views_around` says.
 pub(crate) fn read(
     entry: &MeshEntry,
     up: Option<Up>,
@@ -119,13 +121,19 @@ pub(crate) fn read(
     let up = up.unwrap_or(format.default_up());
     let world = to_world(&mesh, up, normalize);
     let stats = triangle_stats(&world.mesh);
+    let (centre, views_around) = if normalize == Normalize::None {
+        (DVec3::ZERO, world.centre)
+    } else {
+        (world.centre, DVec3::ZERO)
+    };
     let record = MeshRecord {
         entry: entry.into(),
         source: entry.relative.clone(),
         hash,
         up,
-        centre: world.centre.to_array(),
+        centre: centre.to_array(),
         scale: world.scale,
+        views_around: views_around.to_array(),
         triangles: mesh.triangles.len() as u64,
         dropped_faces: dropped_faces as u64,
         defects: stats.defects,

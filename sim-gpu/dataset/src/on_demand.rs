@@ -7,17 +7,16 @@ use crate::view::{self, Rig, View, patterns};
 use formats::hash::Hashing;
 use formats::rng::StreamKey;
 use formats::{Scan, Split};
+use glam::DVec3;
 use rayon::prelude::*;
-use sim_gpu::Scene;
-use sim_gpu::effects::Effects;
 use sim_gpu::internals::bvh::Builder;
-use sim_gpu::internals::caster::OpenCaster;
 use sim_gpu::internals::config::InvalidValue;
 use sim_gpu::internals::job::{CastJob, Culling};
 use sim_gpu::internals::mesh::tree::MeshEntry;
 use sim_gpu::internals::scan::ObjectHits;
 use sim_gpu::internals::sensor::BeamPattern;
 use sim_gpu::internals::target::{Surface, Target};
+use sim_gpu::{Caster, Scene};
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -33,13 +32,15 @@ pub struct Clouds {
     variant: Variant,
     meshes: Vec<MeshEntry>,
     classes: Vec<String>,
-    patterns: Vec<BeamPattern>,
+    patterns: Vec<Arc<BeamPattern>>,
     cache: Mutex<Cache>,
 }
 
 /// A mesh in memory.
 struct Ready {
     entry: Entry,
+    /// What the viewpoints stand around, metres.
+    centre: DVec3,
     scene: Scene,
 }
 
@@ -83,7 +84,7 @@ impl Clouds {
         if let Viewpoints::Views(views) = &set.viewpoints {
             views.validate()?;
         }
-        config.effects.for_sensor(&set.sensor)?;
+        config.effects.for_sensor(set.sensor.profile())?;
         let patterns = patterns(&config)?;
         let variant =
             if config.variants.contains(&Variant::Noisy) { Variant::Noisy } else { Variant::Clean };
@@ -139,12 +140,6 @@ impl Clouds {
         (index % self.views()) as u32
     }
 
-    /// The effects that a caster of these clouds must model.
-    #[must_use]
-    pub fn cast_effects(&self) -> Effects {
-        self.config.cast_effects()
-    }
-
     /// The clouds at `indices`, with the random numbers of `seed`. A view that has too few points
     /// for a cloud is replaced by a view of another seed.
     ///
@@ -152,7 +147,7 @@ impl Clouds {
     /// A mesh that cannot be read, or none of whose views has enough points; an adapter that fails.
     pub fn draw(
         &self,
-        caster: &OpenCaster,
+        caster: &Caster,
         seed: u64,
         indices: &[usize],
     ) -> Result<Vec<Labelled>, DatasetError> {
@@ -165,7 +160,7 @@ impl Clouds {
     /// An adapter that fails.
     pub fn draw_each(
         &self,
-        caster: &OpenCaster,
+        caster: &Caster,
         seed: u64,
         indices: &[usize],
     ) -> Result<Vec<Result<Labelled, DatasetError>>, DatasetError> {
@@ -184,7 +179,7 @@ impl Clouds {
     /// An adapter that fails.
     pub fn scan_each(
         &self,
-        caster: &OpenCaster,
+        caster: &Caster,
         seed: u64,
         indices: &[usize],
     ) -> Result<Vec<Result<Scan, DatasetError>>, DatasetError> {
@@ -197,7 +192,7 @@ impl Clouds {
     /// the place of that one.
     fn make_each<T: Send>(
         &self,
-        caster: &OpenCaster,
+        caster: &Caster,
         seed: u64,
         indices: &[usize],
         make: impl Fn(&DatasetConfig, Source, Scan) -> Option<T> + Sync,
@@ -233,12 +228,13 @@ impl Clouds {
     /// result is [`DatasetError::Sparse`].
     fn cast<T: Send>(
         &self,
-        caster: &OpenCaster,
+        caster: &Caster,
         seed: u64,
         indices: &[usize],
         make: &(impl Fn(&DatasetConfig, Source, Scan) -> Option<T> + Sync),
     ) -> Result<Vec<Result<T, DatasetError>>, DatasetError> {
         let config = &DatasetConfig { seed, ..self.config.clone() };
+        let caster = caster.for_effects(&self.config.cast_effects())?;
         let (patterns, cast_effects) = (&self.patterns, caster.effects());
         let rig = Rig { config, patterns, cast_effects, culling: Culling::On };
         let aimed: Vec<Result<Aimed, DatasetError>> =
@@ -272,7 +268,7 @@ impl Clouds {
     fn aim<'a>(&self, rig: Rig<'a>, index: usize) -> Result<Aimed<'a>, DatasetError> {
         let mesh = self.ready(index / self.views())?;
         let (id, number) = (mesh.entry.id(), self.view(index));
-        let pose = rig.config.sets[0].pose(rig.config.seed, &id, number);
+        let pose = rig.config.sets[0].pose(rig.config.seed, &id, mesh.centre, number);
         let view = rig.view(0, number, pose, &id);
         let job = view.aim(&view::placed(&mesh.scene));
         Ok(Aimed { mesh, view, job })
@@ -289,8 +285,9 @@ impl Clouds {
         let materials = materials(entry, config)?;
         // Rays are cast at it in every epoch, which pays for the better tree.
         let target = Target::new(Surface::new(mesh, kept), Builder::Sah);
-        let ready =
-            Arc::new(Ready { entry: record.entry, scene: view::scene(config, target, materials) });
+        let centre = DVec3::from_array(record.views_around);
+        let scene = view::scene(config, target, centre, materials);
+        let ready = Arc::new(Ready { entry: record.entry, centre, scene });
         lock().put(number, &ready);
         Ok(ready)
     }

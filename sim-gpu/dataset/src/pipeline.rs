@@ -12,6 +12,7 @@ use crate::record::{Entry, MeshFailure, MeshRecord};
 use crate::view::{Rig, patterns};
 use crossbeam_channel::{Receiver, Sender, bounded};
 use formats::hash::Hashing;
+use sim_gpu::Caster;
 use sim_gpu::internals::cast_error::CastError;
 use sim_gpu::internals::caster::{Casting, OpenCaster};
 use sim_gpu::internals::job::{Cast, CastJob};
@@ -54,9 +55,10 @@ struct Shared<'a> {
 /// and the failures.
 pub(crate) fn scan_all(
     plan: &Plan,
-    caster: &OpenCaster,
+    caster: &Caster,
     progress: &Progress,
 ) -> Result<Scanned, DatasetError> {
+    let caster = caster.for_effects(&plan.config.cast_effects())?;
     let (patterns, cast_effects) = (&patterns(plan.config)?, caster.effects());
     let rig = Rig { config: plan.config, patterns, cast_effects, culling: plan.culling };
     let shared = Shared {
@@ -81,7 +83,7 @@ pub(crate) fn scan_all(
         }
         drop(to_caster);
         drop(cast);
-        if let Err(error) = shared.cast_all(caster, &prepared, &to_writers) {
+        if let Err(error) = shared.cast_all(&caster, &prepared, &to_writers) {
             shared.stop(error.into());
         }
         // Threads that wait for the caster end when its queues are gone.

@@ -35,10 +35,14 @@ pub struct MeshRecord {
     pub hash: Option<FileHash>,
     /// The axis that points upwards.
     pub up: Up,
-    /// The offset that was subtracted from the upright vertices.
+    /// The offset that was subtracted from the upright vertices; 0 if the mesh stays where it is.
     pub centre: [f64; 3],
     /// The factor by which they were then multiplied.
     pub scale: f64,
+    /// What viewpoints stand around, metres: the origin, or the centre of the bounding box of a mesh
+    /// that stays where it is.
+    #[serde(default, skip_serializing_if = "is_origin")]
+    pub views_around: [f64; 3],
     /// Triangles in the file, where polygons count as the triangles that they are cut into.
     pub triangles: u64,
     /// Faces of fewer than three corners.
@@ -51,6 +55,10 @@ pub struct MeshRecord {
     pub simplified: Option<Simplified>,
     /// Its scans: by set in the order of the configuration, then by view.
     pub scans: Vec<ScanRecord>,
+}
+
+fn is_origin(position: &[f64; 3]) -> bool {
+    *position == [0.0; 3]
 }
 
 /// One view of one mesh.

@@ -21,7 +21,7 @@ use formats::webdataset::{append_file, end, npz_of_clouds, npz_of_scan};
 use formats::{Scan, Split, atomic};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::Caster;
 use sim_gpu::internals::config::InvalidValue;
 use sim_gpu::internals::mesh::tree::MeshEntry;
 use std::collections::BTreeMap;
@@ -87,7 +87,7 @@ pub struct Tars<'a> {
 pub type HandOver<'a> = &'a (dyn Fn(&Path) -> Result<(), String> + Sync);
 
 /// Makes the tars of `plan` that do not exist yet. A part has every N-th tar, of all meshes of the
-/// plan. `caster` models [`DatasetConfig::cast_effects`](crate::DatasetConfig::cast_effects).
+/// plan.
 ///
 /// # Errors
 /// - [`DatasetError::Occupied`] or [`DatasetError::Different`] if the folder holds files that
@@ -99,7 +99,7 @@ pub type HandOver<'a> = &'a (dyn Fn(&Path) -> Result<(), String> + Sync);
 pub fn make_tars(
     plan: &Plan,
     tars: &Tars,
-    caster: &OpenCaster,
+    caster: &Caster,
     progress: &Progress,
 ) -> Result<PartManifest, DatasetError> {
     check_layouts(plan.config, &[])?;
@@ -172,7 +172,7 @@ fn begin(plan: &Plan, part: (u32, u32)) -> Result<(), DatasetError> {
 struct Maker<'a> {
     plan: &'a Plan<'a>,
     tars: &'a Tars<'a>,
-    caster: &'a OpenCaster,
+    caster: &'a Caster,
     progress: &'a Progress,
     split: Split,
     order: Order,
@@ -382,7 +382,7 @@ impl Maker<'_> {
 
 /// A digest of everything that decides the bytes of the tars. It has the names and the sizes of
 /// mesh files; hashing their contents would take as long as reading them all.
-fn made_by(plan: &Plan, cut: Cut, caster: &OpenCaster) -> String {
+fn made_by(plan: &Plan, cut: Cut, caster: &Caster) -> String {
     let size = |mesh: &MeshEntry| std::fs::metadata(&mesh.path).map_or(0, |file| file.len());
     let meshes: Vec<(&str, u64)> =
         plan.meshes.iter().map(|mesh| (mesh.relative.as_str(), size(mesh))).collect();

@@ -23,7 +23,7 @@ use std::sync::Arc;
 #[derive(Clone, Copy)]
 pub(crate) struct Rig<'a> {
     pub config: &'a DatasetConfig,
-    pub patterns: &'a [BeamPattern],
+    pub patterns: &'a [Arc<BeamPattern>],
     pub cast_effects: &'a Effects,
     /// Whether beams that cannot hit the mesh are cast.
     pub culling: Culling,
@@ -37,10 +37,15 @@ pub(crate) struct View<'a> {
     request: ScanRequest<'a>,
 }
 
-/// The scene of a mesh: one instance, at the origin.
-pub(crate) fn scene(config: &DatasetConfig, target: Target, materials: Option<Materials>) -> Scene {
+/// The scene of a mesh: one instance, whose `target` is moved to `centre`.
+pub(crate) fn scene(
+    config: &DatasetConfig,
+    target: Target,
+    centre: DVec3,
+    materials: Option<Materials>,
+) -> Scene {
     let mut scene = Scene::new();
-    let id = scene.add(Mesh::from_target(target, DVec3::ZERO), Pose::IDENTITY);
+    let id = scene.add(Mesh::from_target(target, centre), Pose::IDENTITY);
     (scene[id].reflectivity, scene[id].materials) = (config.reflectivity, materials.map(Arc::new));
     scene
 }
@@ -52,16 +57,15 @@ pub(crate) fn placed(scene: &Scene) -> PlacedTarget<'_> {
 }
 
 /// The beams of each set's sensor, widened to the footprint that the effects ask for.
-pub(crate) fn patterns(config: &DatasetConfig) -> Result<Vec<BeamPattern>, InvalidValue> {
-    let widened = |set: &SetConfig| config.effects.widen(set.sensor.pattern(), &set.sensor);
-    config.sets.iter().map(widened).collect()
+pub(crate) fn patterns(config: &DatasetConfig) -> Result<Vec<Arc<BeamPattern>>, InvalidValue> {
+    config.sets.iter().map(|set| set.sensor.rays(&config.effects)).collect()
 }
 
 impl<'a> Rig<'a> {
-    /// All views of the mesh `id`: by set, then by number.
-    pub fn views(self, id: &str) -> Vec<View<'a>> {
+    /// All views of the mesh `id`, which stands around `centre`: by set, then by number.
+    pub fn views(self, id: &str, centre: DVec3) -> Vec<View<'a>> {
         let views_of_set = |set: usize| {
-            let poses = self.config.sets[set].poses(self.config.seed, id);
+            let poses = self.config.sets[set].poses(self.config.seed, id, centre);
             poses.into_iter().zip(0..).map(move |(pose, number)| self.view(set, number, pose, id))
         };
         (0..self.config.sets.len()).flat_map(views_of_set).collect()
@@ -71,7 +75,7 @@ impl<'a> Rig<'a> {
     pub fn view(self, set: usize, number: u32, pose: Pose, id: &str) -> View<'a> {
         let Self { config, patterns, culling, .. } = self;
         let (set, pattern) = (&config.sets[set], &patterns[set]);
-        let mut request = ScanRequest::new(&set.sensor, pattern, pose);
+        let mut request = ScanRequest::new(set.sensor.profile(), pattern, pose);
         let trajectory = config.effects.motion.as_deref();
         let trajectory = trajectory.map(|motion| motion.trajectory(pose, [0.0, pattern.last_s()]));
         request.motion = trajectory.map(Arc::new);
@@ -111,7 +115,7 @@ impl View<'_> {
         variant: Variant,
         hits: &ObjectHits,
     ) -> Result<(Scan, Revolution), InvalidValue> {
-        let revolution = packets::revolution(&self.set.sensor)?;
+        let revolution = packets::revolution(self.set.sensor.profile())?;
         let mut request = self.request_of(variant)?;
         let effects = request.applied_effects(self.rig.cast_effects)?;
         request.attributes = packets::attributes(&effects, &request.attributes);

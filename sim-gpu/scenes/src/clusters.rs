@@ -1,7 +1,7 @@
 use edgepuck_segment::Segmentation;
 
 use crate::recipe::OTHER;
-use crate::scene::Scene;
+use crate::scene::DrawnScene;
 use crate::stage::Stage;
 use crate::sweep::Sweep;
 
@@ -37,7 +37,7 @@ pub struct LabelledCluster {
 #[must_use]
 pub fn label_clusters(
     stage: &Stage,
-    scene: &Scene,
+    scene: &DrawnScene,
     sweep: &Sweep,
     found: &Segmentation,
 ) -> Vec<LabelledCluster> {

@@ -18,7 +18,7 @@ use sim_gpu::internals::config::InvalidValue;
 use sim_gpu::internals::packets;
 use sim_gpu::internals::scan::{ScanRequest, scan_objects};
 use sim_gpu::internals::sensor::{BeamPattern, Layout, Rotating, SensorProfile};
-use sim_gpu::{Pose, Scene as World, Trajectory};
+use sim_gpu::{Pose, Scene, Trajectory};
 
 use crate::error::SceneError;
 use crate::ground::{Ground, OWN_RADIUS_M};
@@ -79,7 +79,7 @@ impl<'a> Drive<'a> {
     /// # Errors
     /// The sensor is not a VLP-32C, or it has effects that its packets cannot represent.
     pub fn new(stage: &'a Stage, speed_m_s: f64) -> Result<Self, SceneError> {
-        let sensor = packets::as_packets_tell(stage.sensors[0].sensor.profile())?;
+        let sensor = packets::with_packet_geometry(stage.sensors[0].sensor.profile())?;
         let effects = stage.sensors[0].caster.effects();
         packets::returns(effects, None)?;
         if effects.motion.is_some() {
@@ -185,7 +185,7 @@ impl<'a> Drive<'a> {
                 && sector.meets(sensor_from_world * from_sensor, object.radius_m() + moves_m)
         });
         let (numbers, objects): (Vec<u32>, Vec<&StreetObject>) = in_sight.copied().unzip();
-        let mut world = World::new();
+        let mut world = Scene::new();
         for (_, tile) in tiles.range(self.street.tiles_in_sight(pose.position_m.x)) {
             stage.add_ground(&mut world, tile, 0);
         }

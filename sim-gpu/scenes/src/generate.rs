@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use crate::clusters::{LabelledCluster, label_clusters};
 use crate::error::SceneError;
-use crate::scene::Scene;
+use crate::scene::DrawnScene;
 use crate::stage::Stage;
 use crate::sweep::Sweep;
 
@@ -21,7 +21,7 @@ const TEST_EACH: u32 = 10;
 /// A scene with its sweep, segmented and labelled.
 pub struct LabelledScene {
     /// The scene.
-    pub scene: Scene,
+    pub scene: DrawnScene,
     /// The sweep of its sensor.
     pub sweep: Sweep,
     /// The segmentation's label of each point.
@@ -85,7 +85,7 @@ impl LabelledScene {
     /// # Errors
     /// The scene cannot be scanned or segmented.
     pub fn new(stage: &Stage, number: u32, settings: &Settings) -> Result<Self, SceneError> {
-        let scene = Scene::draw(stage, number);
+        let scene = DrawnScene::draw(stage, number);
         let mut settings = settings.clone();
         if let Some(clearance_m) = scene.ground_clearance_m {
             settings.ground_clearance_m = clearance_m as f32;

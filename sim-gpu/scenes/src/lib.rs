@@ -1,6 +1,6 @@
 //! Streets, yards and rooms as the LiDAR of a robot sees them.
 //!
-//! A [`Recipe`] is a distribution of scenes, read from TOML. [`Scene::draw`] draws one scene by
+//! A [`Recipe`] is a distribution of scenes, read from TOML. [`DrawnScene::draw`] draws one scene by
 //! its number. [`Stage::sweep`] scans the whole scene, ground and objects together;
 //! [`Stage::build`] returns it as a [`sim_gpu::Scene`] for other scans.
 //! [`label_clusters`] takes the clusters that the robot's segmentation found in the sweep, and
@@ -44,7 +44,7 @@ pub use error::SceneError;
 pub use generate::{ClusterCounts, LabelledScene, generate};
 pub use placed_object::PlacedObject;
 pub use recipe::{Ground, Mount, OTHER, Objects, Place, Recipe, SensorChoice, Span};
-pub use scene::Scene;
+pub use scene::DrawnScene;
 pub use sightings::{Sighting, Sightings};
 pub use stage::Stage;
 pub use street::StreetObject;

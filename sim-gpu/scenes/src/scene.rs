@@ -13,7 +13,7 @@ use crate::stage::Stage;
 
 /// A scene, drawn from a recipe.
 #[derive(Clone, Debug)]
-pub struct Scene {
+pub struct DrawnScene {
     /// The number of the scene under the stage's seed.
     pub number: u32,
     /// The objects.
@@ -32,7 +32,7 @@ pub struct Scene {
     pub(crate) ground: Ground,
 }
 
-impl Scene {
+impl DrawnScene {
     /// Draws scene number `number` of `stage`.
     #[must_use]
     pub fn draw(stage: &Stage, number: u32) -> Self {

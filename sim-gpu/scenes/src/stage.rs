@@ -9,7 +9,7 @@ use sim_gpu::effects::{Dropout, Effects, Noise, NoiseModel};
 use sim_gpu::internals::caster::OpenCaster;
 use sim_gpu::internals::config::InvalidValue;
 use sim_gpu::internals::job::Culling;
-use sim_gpu::{Caster, Glass, InstanceId, Mesh, Pose, Scene as World, Sensor};
+use sim_gpu::{Caster, Glass, InstanceId, Mesh, Pose, Scene, Sensor};
 
 use crate::error::SceneError;
 use crate::model::{Model, user_models};
@@ -130,7 +130,7 @@ impl Stage {
     }
 
     /// Adds the ground of the scene or drive number `number`, or a tile of it, to `world`.
-    pub(crate) fn add_ground(&self, world: &mut World, mesh: &Mesh, number: u32) {
+    pub(crate) fn add_ground(&self, world: &mut Scene, mesh: &Mesh, number: u32) {
         let id = world.add(mesh, Pose::IDENTITY);
         let drawn = StreamKey::new(self.seed, "reflectivity/ground", number).unit(0);
         world[id].reflectivity = self.recipe.ground.reflectivity.at(drawn);
@@ -140,7 +140,7 @@ impl Stage {
     /// fraction `glass_returned` of the beams.
     pub(crate) fn add_object(
         &self,
-        world: &mut World,
+        world: &mut Scene,
         object: &PlacedObject,
         glass_returned: f64,
     ) -> InstanceId {

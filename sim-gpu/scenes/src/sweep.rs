@@ -8,39 +8,39 @@ use glam::DVec3;
 use sim_gpu::internals::bvh::Builder;
 use sim_gpu::internals::mesh::TriangleMesh;
 use sim_gpu::internals::scan::{PlacedTarget, ScanRequest, scan_objects};
-use sim_gpu::{Effects, Scene as World, Sensor};
+use sim_gpu::{Effects, Scene, Sensor};
 
 use crate::error::SceneError;
 use crate::model::shared;
-use crate::scene::Scene;
+use crate::scene::DrawnScene;
 use crate::stage::{Stage, StageSensor};
 
 /// One revolution of a sensor in a scene.
 #[derive(Clone, Debug)]
 pub struct Sweep {
     /// The points in the order of firing, in the sensor's frame, metres, with range, beam, ring,
-    /// time and object. Object 0 is the ground, and object `i` is `i - 1` of [`Scene::objects`].
+    /// time and object. Object 0 is the ground, and object `i` is `i - 1` of [`DrawnScene::objects`].
     pub scan: Scan,
 }
 
 impl Stage {
     /// The sensor of `scene`.
     #[must_use]
-    pub fn sensor(&self, scene: &Scene) -> &Sensor {
+    pub fn sensor(&self, scene: &DrawnScene) -> &Sensor {
         &self.sensors[scene.sensor].sensor
     }
 
     /// The length, width and height of object `i` of `scene`, metres.
     #[must_use]
-    pub fn size_m(&self, scene: &Scene, i: usize) -> DVec3 {
+    pub fn size_m(&self, scene: &DrawnScene, i: usize) -> DVec3 {
         self.size_of(&scene.objects[i])
     }
 
     /// The ground and the objects of `scene` as instances: instance 0 is the ground, and instance
     /// `i` is object `i - 1` of `scene`, labelled with its class.
     #[must_use]
-    pub fn build(&self, scene: &Scene) -> World {
-        let mut world = World::new();
+    pub fn build(&self, scene: &DrawnScene) -> Scene {
+        let mut world = Scene::new();
         (world.seed, world.effects) = (self.seed(), self.effects(scene).clone());
         let ground = shared(scene.ground.mesh(), Builder::Morton);
         self.add_ground(&mut world, &ground, scene.number);
@@ -54,7 +54,7 @@ impl Stage {
     ///
     /// # Errors
     /// The caster fails.
-    pub fn sweep(&self, scene: &Scene) -> Result<Sweep, SceneError> {
+    pub fn sweep(&self, scene: &DrawnScene) -> Result<Sweep, SceneError> {
         let world = self.build(scene);
         let placed = world.placed(|_, number| Some(self.stream(scene, number)));
         self.scan_placed(&world, &placed, scene)
@@ -65,16 +65,16 @@ impl Stage {
     /// # Errors
     /// The caster fails.
     #[doc(hidden)]
-    pub fn sweep_in(&self, world: &World, scene: &Scene) -> Result<Sweep, SceneError> {
+    pub fn sweep_in(&self, world: &Scene, scene: &DrawnScene) -> Result<Sweep, SceneError> {
         self.scan_placed(world, &world.placed(|_, _| None), scene)
     }
 
     /// Scans the instances of `world`, as they are `placed`.
     fn scan_placed(
         &self,
-        world: &World,
+        world: &Scene,
         placed: &[PlacedTarget],
-        scene: &Scene,
+        scene: &DrawnScene,
     ) -> Result<Sweep, SceneError> {
         let StageSensor { sensor, caster } = &self.sensors[scene.sensor];
         let pattern = sensor.rays(caster.effects())?;
@@ -87,12 +87,12 @@ impl Stage {
         Ok(Sweep::new(scan, scene))
     }
 
-    fn effects(&self, scene: &Scene) -> &Effects {
+    fn effects(&self, scene: &DrawnScene) -> &Effects {
         self.sensors[scene.sensor].caster.effects()
     }
 
     /// The key of the random numbers of instance number `part` in scans of `scene`.
-    fn stream(&self, scene: &Scene, part: u32) -> StreamKey {
+    fn stream(&self, scene: &DrawnScene, part: u32) -> StreamKey {
         StreamKey::new(self.seed(), &format!("scene/{}/beams", scene.number), part)
     }
 
@@ -100,7 +100,7 @@ impl Stage {
     /// and materials.
     #[doc(hidden)]
     #[must_use]
-    pub fn mesh(&self, scene: &Scene) -> TriangleMesh {
+    pub fn mesh(&self, scene: &DrawnScene) -> TriangleMesh {
         let mut whole = scene.ground.mesh();
         for object in &scene.objects {
             let world_from_object = object.world_from_object();
@@ -118,7 +118,7 @@ impl Stage {
 
 impl Sweep {
     /// Moves the points of `scan` from the scene's frame to the sensor's.
-    fn new(mut scan: Scan, scene: &Scene) -> Self {
+    fn new(mut scan: Scan, scene: &DrawnScene) -> Self {
         let sensor_from_world = scene.pose.rotation.inverse();
         let origin = DVec3::from_array(std::mem::take(&mut scan.origin)) - scene.pose.position_m;
         for point in &mut scan.positions {
@@ -149,7 +149,7 @@ impl Sweep {
     /// The number of points on the ground, on each object of `scene`, and, last, in the air.
     /// `scene` must be the scene of this sweep.
     #[must_use]
-    pub fn points_by_surface(&self, scene: &Scene) -> Vec<u32> {
+    pub fn points_by_surface(&self, scene: &DrawnScene) -> Vec<u32> {
         let air = scene.objects.len() + 1;
         let mut counts = vec![0; air + 1];
         self.surfaces().iter().for_each(|&surface| counts[air.min(surface as usize)] += 1);

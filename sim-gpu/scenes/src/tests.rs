@@ -4,9 +4,9 @@ use std::path::Path;
 use edgepuck_segment::{Segmenter, Settings, Sweep as Points};
 use formats::Scan;
 use glam::{DVec2, DVec3};
-use sim_gpu::{Mesh, Pose, Scene as World};
+use sim_gpu::{Mesh, Pose, Scene};
 
-use crate::{Drive, OTHER, Packet, Recipe, Scene, Sightings, Stage, label_clusters};
+use crate::{DrawnScene, Drive, OTHER, Packet, Recipe, Sightings, Stage, label_clusters};
 
 const RECIPE: &str = r#"
 variants = 3
@@ -36,8 +36,8 @@ fn stage(recipe: &str) -> Stage {
 fn a_scene_is_a_function_of_recipe_seed_and_number() {
     let (one, other) = (stage(RECIPE), stage(RECIPE));
     // Another order of drawing builds the objects in another order.
-    let later = Scene::draw(&other, 8);
-    let scenes = [Scene::draw(&one, 7), Scene::draw(&other, 7)];
+    let later = DrawnScene::draw(&other, 8);
+    let scenes = [DrawnScene::draw(&one, 7), DrawnScene::draw(&other, 7)];
     assert_eq!(scenes[0].objects, scenes[1].objects);
     assert_eq!(one.sweep(&scenes[0]).unwrap().scan, other.sweep(&scenes[1]).unwrap().scan);
     assert_ne!(scenes[0].objects, later.objects);
@@ -47,7 +47,7 @@ fn a_scene_is_a_function_of_recipe_seed_and_number() {
 fn every_point_lies_on_its_surface() {
     let moving = RECIPE.replace("off_road_m = [0, 3]", "off_road_m = [0, 3], speed_m_s = [20, 20]");
     for (stage, number) in [(stage(RECIPE), 0), (stage(RECIPE), 1), (stage(&moving), 1)] {
-        let scene = Scene::draw(&stage, number);
+        let scene = DrawnScene::draw(&stage, number);
         let sweep = stage.sweep(&scene).unwrap();
         assert!(sweep.points().len() > 5_000, "{}", sweep.points().len());
         let times_s = sweep.scan.time_s.as_ref().unwrap();
@@ -80,8 +80,8 @@ fn a_sweep_of_the_objects_equals_a_sweep_of_one_mesh_of_all() {
     let opaque = RECIPE.replace("glass_returned = [0, 0]", "glass_returned = [1, 1]");
     let stage = stage(&opaque);
     for number in 0..3 {
-        let scene = Scene::draw(&stage, number);
-        let mut whole = World::new();
+        let scene = DrawnScene::draw(&stage, number);
+        let mut whole = Scene::new();
         whole.add(Mesh::try_from(stage.mesh(&scene)).unwrap(), Pose::IDENTITY);
         let of_mesh = stage.sweep_in(&whole, &scene).unwrap().scan;
         let of_parts = stage.sweep(&scene).unwrap().scan;
@@ -102,7 +102,7 @@ fn a_sweep_of_the_objects_equals_a_sweep_of_one_mesh_of_all() {
 #[test]
 fn objects_keep_apart_and_stay_within_their_distances() {
     let stage = stage(RECIPE);
-    let footprints = |scene: &Scene| -> Vec<crate::footprint::Footprint> {
+    let footprints = |scene: &DrawnScene| -> Vec<crate::footprint::Footprint> {
         let of = |(i, object): (usize, &crate::PlacedObject)| crate::footprint::Footprint {
             centre: object.position.truncate(),
             half: stage.size_m(scene, i).truncate() / 2.0,
@@ -111,7 +111,7 @@ fn objects_keep_apart_and_stay_within_their_distances() {
         scene.objects.iter().enumerate().map(of).collect()
     };
     for number in 0..20 {
-        let scene = Scene::draw(&stage, number);
+        let scene = DrawnScene::draw(&stage, number);
         let taken = footprints(&scene);
         for (i, one) in taken.iter().enumerate() {
             assert!(taken[..i].iter().all(|other| !one.meets(other)), "scene {number}");
@@ -126,7 +126,7 @@ fn glass_that_returns_nothing_leaves_holes_in_cars() {
     let with = |returned: &str| {
         let text = RECIPE.replace("glass_returned = [0, 0]", returned);
         let stage = stage(&text);
-        let scene = Scene::draw(&stage, 3);
+        let scene = DrawnScene::draw(&stage, 3);
         stage.sweep(&scene).unwrap().points().len()
     };
     let (dark, bright) = (with("glass_returned = [0, 0]"), with("glass_returned = [1, 1]"));
@@ -139,7 +139,7 @@ fn dark_objects_are_detected_at_shorter_ranges() {
         let text = RECIPE.replacen("noise_m = 0", &format!("noise_m = 0{effects}"), 1);
         let text = text.replace("kind = \"car\"", &format!("kind = \"car\"{reflectivity}"));
         let stage = stage(&text);
-        let scene = Scene::draw(&stage, 3);
+        let scene = DrawnScene::draw(&stage, 3);
         let scan = stage.sweep(&scene).unwrap().scan;
         let is_car = |object: u32| {
             let entry = (object as usize).checked_sub(1).map(|i| scene.objects[i].entry);
@@ -164,7 +164,7 @@ fn clusters_of_one_object_have_its_class() {
     let mut segmenter = Segmenter::new(Settings::default()).unwrap();
     let mut seen = std::collections::BTreeSet::new();
     for number in 0..6 {
-        let scene = Scene::draw(&stage, number);
+        let scene = DrawnScene::draw(&stage, number);
         let sweep = stage.sweep(&scene).unwrap();
         let points = Points { points: sweep.points(), rings: Some(sweep.rings()) };
         let found = segmenter.segment(&points).unwrap();

@@ -4,6 +4,7 @@ use super::Error;
 use crate::cast_error::CastError;
 use crate::caster::{AdapterRequest, OpenCaster};
 use crate::effects::Effects;
+use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Pipelines of a GPU that are kept, each with its buffers.
@@ -26,6 +27,12 @@ pub struct Caster {
     why_no_gpu: Option<String>,
     skipped: Vec<String>,
     opened: Mutex<Vec<Arc<OpenCaster>>>,
+}
+
+impl fmt::Debug for Caster {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Caster").field("name", &self.name).finish_non_exhaustive()
+    }
 }
 
 impl Caster {

@@ -50,7 +50,7 @@ impl Scan {
     ///
     /// # Errors
     /// The extension names no format, or the file cannot be written. For `.pcap`: the sensor is
-    /// not what [`Sensor::as_packets_tell`] gives; the scan lacks the attributes `beam` and
+    /// not what [`Sensor::with_packet_geometry`] gives; the scan lacks the attributes `beam` and
     /// `range`; an effect moves points off their beams.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), Error> {
         let path = path.as_ref();
@@ -60,7 +60,9 @@ impl Scan {
                 let returns = packets::returns(&self.effects, None);
                 let returns = returns.map_err(|invalid| of_file(invalid.to_string()))?;
                 let revolution = packets::revolution(self.sensor.profile()).map_err(|invalid| {
-                    of_file(format!("expected the beams of Sensor::as_packets_tell: {invalid}"))
+                    of_file(format!(
+                        "expected the beams of Sensor::with_packet_geometry: {invalid}"
+                    ))
                 })?;
                 if self.beam.is_none() || self.range_m.is_none() {
                     let cause = "expected a scan with the attributes beam and range";

@@ -12,7 +12,7 @@ use formats::scan::{Attribute, AttributeSet};
 use std::sync::Arc;
 
 /// A scan that [`ScanBuilder::run`] makes. Settings that are not given come from the [`Scene`].
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 #[must_use = "`run` makes the scan"]
 pub struct ScanBuilder<'a> {
     scene: &'a Scene,

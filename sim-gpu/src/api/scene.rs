@@ -141,11 +141,14 @@ impl Scene {
         id
     }
 
-    /// Adds a sensor of this name at `pose`.
-    pub fn mount(&mut self, name: &str, sensor: &Sensor, pose: Pose) {
+    /// Adds a sensor of this name at `pose`. Set its other properties through the reference:
+    /// `scene.mount("left", &sensor, pose).deskew = true`.
+    pub fn mount(&mut self, name: &str, sensor: &Sensor, pose: Pose) -> &mut MountedSensor {
         let (name, sensor) = (name.to_owned(), sensor.clone());
         let (motion, start_s, deskew) = (None, 0.0, false);
-        self.sensors.push(MountedSensor { name, sensor, pose, motion, start_s, deskew });
+        let mounted = MountedSensor { name, sensor, pose, motion, start_s, deskew };
+        self.sensors.push(mounted);
+        self.sensors.last_mut().expect("invariant: it was just added")
     }
 
     /// The instances, each at the number that its [`InstanceId`] and the scans' attribute `object`

@@ -6,12 +6,13 @@ use crate::effects::{Effects, Footprint};
 use crate::packets;
 use crate::sensor::{BeamPattern, SensorProfile, builtin_names};
 use glam::DVec3;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// A LiDAR or depth camera: its profile, and the beams that the profile describes.
 ///
-/// A clone shares the beams, which the first scan makes.
+/// A clone shares the beams, which the first scan makes. A sensor is serialised as its profile.
 ///
 /// ```
 /// # use sim_gpu::Sensor;
@@ -20,7 +21,8 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 /// assert_eq!(sensor.rings().iter().max(), Some(&31));
 /// # Ok::<(), sim_gpu::Error>(())
 /// ```
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(from = "SensorProfile", into = "SensorProfile")]
 pub struct Sensor {
     profile: Arc<SensorProfile>,
     pattern: Arc<OnceLock<Arc<BeamPattern>>>,
@@ -57,13 +59,21 @@ impl Sensor {
         Ok(Self::from(SensorProfile::load(path.as_ref())?))
     }
 
+    /// The built-in sensor of this name or, if it ends in `.toml` or `.json`, that of this file.
+    ///
+    /// # Errors
+    /// As [`Sensor::named`] and [`Sensor::read`].
+    pub fn resolve(name_or_file: &str) -> Result<Self, Error> {
+        Ok(Self::from(SensorProfile::resolve(name_or_file)?))
+    }
+
     /// The same VLP-32C with the beams that its packets encode: they start beside the sensor's axis,
     /// at azimuths in hundredths of a degree. Scans of such a sensor can be saved as `.pcap`.
     ///
     /// # Errors
     /// The sensor is not a VLP-32C.
-    pub fn as_packets_tell(&self) -> Result<Self, Error> {
-        Ok(Self::from(packets::as_packets_tell(&self.profile)?))
+    pub fn with_packet_geometry(&self) -> Result<Self, Error> {
+        Ok(Self::from(packets::with_packet_geometry(&self.profile)?))
     }
 
     /// Its name.
@@ -121,6 +131,19 @@ impl Sensor {
         let mut widened = self.widened.lock().unwrap_or_else(PoisonError::into_inner);
         *widened = Some((footprint, Arc::clone(&rays)));
         Ok(rays)
+    }
+}
+
+impl PartialEq for Sensor {
+    /// Whether their profiles are equal, which decide the beams.
+    fn eq(&self, other: &Self) -> bool {
+        self.profile == other.profile
+    }
+}
+
+impl From<Sensor> for SensorProfile {
+    fn from(sensor: Sensor) -> Self {
+        Arc::unwrap_or_clone(sensor.profile)
     }
 }
 

@@ -7,6 +7,7 @@ use super::format::mesh_extensions;
 
 /// A mesh could not be loaded.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum MeshError {
     /// The file does not exist, or cannot be read.
     #[error("{}: cannot be read: {source}", path.display())]

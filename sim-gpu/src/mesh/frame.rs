@@ -31,13 +31,13 @@ formats::named! {
         /// The centre of the bounding box moves to the origin, and its longest side becomes 2, as
         /// in ModelNet40-C.
         Bbox = "bbox",
-        /// The centre of the bounding box moves to the origin; the unit of the file is a metre.
+        /// The mesh stays where it is; the unit of the file is a metre.
         None = "none",
     }
 }
 
-/// A mesh in the world, and its transform: `world = (position - centre) * scale`, where `position`
-/// is that of the file, turned z up.
+/// A mesh around the origin, and its transform: `vertex = (position - centre) * scale`, where
+/// `position` is that of the file, turned z up.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WorldMesh {
     /// The mesh, z up, in metres.
@@ -48,7 +48,8 @@ pub struct WorldMesh {
     pub scale: f64,
 }
 
-/// Turns `mesh` z up, then moves and scales it by `normalize`.
+/// Turns `mesh` z up, then moves and scales it by `normalize`. [`Normalize::None`] only moves the
+/// centre of its bounding box to the origin: whoever places the mesh moves it back by `centre`.
 ///
 /// Centre and size are those of the vertices that triangles refer to. Other vertices are ignored
 /// and moved to the origin. (ModelNet's files have hardly any, so that the mean is ModelNet's.) A

@@ -38,6 +38,7 @@ pub struct MeshEntry {
 
 /// A dataset could not be listed.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum TreeError {
     /// A folder cannot be read.
     #[error("{}: cannot be read: {source}", path.display())]

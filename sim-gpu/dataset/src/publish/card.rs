@@ -68,7 +68,7 @@ pub fn card(publication: &Publication, facts: &Facts) -> String {
 
 /// The dataset in a sentence.
 pub fn summary(facts: &Facts) -> String {
-    let sensors: Vec<&str> = facts.config.sets.iter().map(|set| &*set.sensor.name).collect();
+    let sensors: Vec<&str> = facts.config.sets.iter().map(|set| set.sensor.name()).collect();
     format!(
         "{} {} of meshes of {} classes, simulated by Edgepuck {} for the sensor {}.",
         facts.count(),
@@ -156,7 +156,7 @@ fn sensor(set: &SetConfig) -> String {
         Viewpoints::Poses(poses) => format!("{} given poses", poses.len()),
         Viewpoints::Views(views) => viewpoints(views),
     };
-    format!("- `{}`: {} ({views}).", set.name, set.sensor.description)
+    format!("- `{}`: {} ({views}).", set.name, set.sensor.profile().description)
 }
 
 fn viewpoints(views: &Views) -> String {

@@ -4,15 +4,15 @@
 use super::resume;
 use anyhow::{Context, bail};
 use edgepuck_dataset::{
-    Begin, DatasetConfig, Manifest, Plan, Progress, SurfaceConfig, Viewpoints, make, write_surfaces,
+    Begin, DatasetConfig, Manifest, MeshEntry, Plan, Progress, SurfaceConfig, Viewpoints, Views,
+    make, write_surfaces,
 };
 use edgepuck_program::gen_dataset;
 use edgepuck_shapes::write_tree;
 use formats::atomic;
 use formats::split::Split;
-use sim_gpu::internals::caster::{AdapterRequest, OpenCaster};
-use sim_gpu::internals::mesh::tree::MeshEntry;
-use sim_gpu::internals::sensor::{Layout, Rotating, SensorProfile, Uniform, Views};
+use sim_gpu::Caster;
+use sim_gpu::internals::sensor::{Layout, Rotating, SensorProfile, Uniform};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -46,16 +46,15 @@ pub fn config(flags: &str) -> anyhow::Result<DatasetConfig> {
     gen_dataset::config(&words).with_context(|| format!("gen-dataset {flags}"))
 }
 
-/// Scans `meshes` by `config` into `out` on `adapter`.
+/// Scans `meshes` by `config` into `out` on `caster`.
 pub fn scans(
     config: DatasetConfig,
-    adapter: &AdapterRequest,
+    caster: &Caster,
     meshes: &[MeshEntry],
     out: &Path,
 ) -> anyhow::Result<Manifest> {
-    let caster = OpenCaster::open(adapter, &config.cast_effects())?;
     let plan = Plan { begin: Begin::Resume, ..Plan::new(out, &config, meshes) };
-    Ok(make(&plan, &caster, &Progress::default())?)
+    Ok(make(&plan, caster, &Progress::default())?)
 }
 
 /// Samples the surfaces of `meshes`, whole and as the views of `config` see them, into

@@ -5,15 +5,14 @@ use crate::measure::clock::{Workload, measured};
 use crate::study::datasets::{self, as_even_grid, keep_at_most};
 use crate::study::{plan, resume};
 use anyhow::{Context, ensure};
-use edgepuck_dataset::{DatasetConfig, SetConfig, Variant};
+use edgepuck_dataset::{DatasetConfig, MeshEntry, SetConfig, Variant, discover};
 use edgepuck_program::Outcome;
 use edgepuck_program::flags::need_folder_of_meshes;
 use edgepuck_program::gen_dataset::report_failures;
 use formats::split::Split;
 use infer_cpu::Options;
 use serde::{Deserialize, Serialize};
-use sim_gpu::internals::caster::AdapterRequest;
-use sim_gpu::internals::mesh::tree::{MeshEntry, discover};
+use sim_gpu::Caster;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use train::clouds::Clouds;
@@ -108,7 +107,7 @@ impl Plan {
             anyhow::bail!("flags: expected one sensor (--sensor)");
         };
         if row.source == Source::EvenGrid {
-            *sensor = as_even_grid(sensor.clone())?;
+            *sensor = as_even_grid(sensor.profile().clone())?.into();
         }
         config.variants = vec![Variant::Noisy];
         Ok(config)
@@ -126,7 +125,7 @@ impl Plan {
         Ok(match source {
             Source::Scans | Source::EvenGrid => {
                 let set = config.sets[0].name.clone();
-                let manifest = datasets::scans(config, &AdapterRequest::Cpu, meshes, out)?;
+                let manifest = datasets::scans(config, &Caster::cpu(), meshes, out)?;
                 // All rows are of the same meshes: the first names the failures.
                 if row == 0 {
                     report_failures(&manifest.failures);

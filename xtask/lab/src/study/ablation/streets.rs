@@ -6,7 +6,7 @@ use crate::measure::clock::{Workload, workload};
 use crate::study::{plan, resume};
 use anyhow::{Context, ensure};
 use edgepuck_program::Outcome;
-use edgepuck_scenes::{Recipe as Scenes, Scene, SceneError, Stage, generate};
+use edgepuck_scenes::{DrawnScene, Recipe as Scenes, SceneError, Stage, generate};
 use edgepuck_segment::Settings;
 use formats::hash;
 use formats::split::Split;
@@ -267,7 +267,8 @@ impl Study for Streets<'_> {
 
     fn scanning(&self, row: usize, seed: u64) -> anyhow::Result<(Workload<'_>, usize)> {
         let (stage, n) = (stage(&self.plan.row[row], seed)?, self.plan.cost_scenes);
-        let scenes: Vec<Scene> = (0..n).map(|number| Scene::draw(&stage, number)).collect();
+        let scenes: Vec<DrawnScene> =
+            (0..n).map(|number| DrawnScene::draw(&stage, number)).collect();
         let scan =
             move || Ok(scenes.iter().try_for_each(|scene| stage.sweep(scene).map(|_| ()))?);
         Ok((workload(scan), n as usize))

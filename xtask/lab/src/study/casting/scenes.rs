@@ -4,7 +4,7 @@ use crate::measure::clock::{Spread, Workload, interleave, measured, workload};
 use crate::render::table::{Table, milliseconds};
 use anyhow::{Context, Result};
 use clap::Args;
-use edgepuck_scenes::{Recipe, Scene, Stage};
+use edgepuck_scenes::{DrawnScene, Recipe, Stage};
 use edgepuck_segment::{Segmenter, Settings, Sweep};
 use sim_gpu::internals::bvh::Builder;
 use sim_gpu::internals::target::{Surface, Target};
@@ -50,7 +50,7 @@ pub fn run(args: &ScenesArgs) -> Result<()> {
 }
 
 fn measure(stage: &Stage, number: u32, rounds: usize) -> Result<Measured> {
-    let scene = Scene::draw(stage, number);
+    let scene = DrawnScene::draw(stage, number);
     let mesh = stage.mesh(&scene);
     let n_triangles = mesh.triangles.len();
     let (whole, build) = measured(|| Target::new(Surface::of_mesh(mesh), Builder::Sah));

@@ -9,7 +9,7 @@ use anyhow::{Context, Result};
 use edgepuck_dataset::{DatasetConfig, Plan, Progress, Stage, make};
 use edgepuck_program::gen_dataset;
 use serde::Serialize;
-use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::Caster;
 use sim_gpu::internals::mesh::tree::MeshEntry;
 use std::path::Path;
 use std::sync::atomic::Ordering::Relaxed;
@@ -40,7 +40,7 @@ pub fn measure(
     let config = gen_dataset::config(&[])?;
     let mut datasets = Vec::new();
     for backend in backends {
-        let caster = OpenCaster::open(&backend.request(), &config.cast_effects())?;
+        let caster = Caster::named(backend.name())?;
         let once = |_| once(&config, &caster, &meshes);
         let mut repeats = (0..rounds).map(once).collect::<Result<Vec<_>>>()?;
         repeats.sort_by(|a, b| a.cost.cpu_s.total_cmp(&b.cost.cpu_s));
@@ -49,7 +49,7 @@ pub fn measure(
     Ok(datasets)
 }
 
-fn once(config: &DatasetConfig, caster: &OpenCaster, meshes: &[MeshEntry]) -> Result<Dataset> {
+fn once(config: &DatasetConfig, caster: &Caster, meshes: &[MeshEntry]) -> Result<Dataset> {
     let folder = tempfile::tempdir()?;
     let (plan, progress) = (Plan::new(folder.path(), config, meshes), Progress::default());
     let (made, cost) = measured(|| make(&plan, caster, &progress));

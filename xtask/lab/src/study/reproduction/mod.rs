@@ -20,7 +20,7 @@ use edgepuck_program::gen_dataset::report_failures;
 use edgepuck_program::{Outcome, gen_shapes};
 use formats::atomic;
 use page::{Section, write_csv};
-use sim_gpu::internals::caster::AdapterRequest;
+use sim_gpu::Caster;
 use sim_gpu::internals::mesh::tree::discover;
 use std::cell::RefCell;
 use std::fs;
@@ -104,7 +104,7 @@ fn make_datasets(folder: &Path, scans: &Path) -> anyhow::Result<()> {
     for (name, flags) in DATASETS {
         eprintln!("dataset {name}: gen-dataset {flags}");
         let config = datasets::config(flags)?;
-        let made = datasets::scans(config, &AdapterRequest::Auto, &meshes, &scans.join(name))?;
+        let made = datasets::scans(config, &Caster::auto(), &meshes, &scans.join(name))?;
         report_failures(&made.failures);
     }
     Ok(())
