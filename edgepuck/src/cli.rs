@@ -2,8 +2,7 @@
 
 use crate::{
     Outcome, adapters, card, cluster, corrupt, gen_dataset, gen_drive, gen_scenes, gen_shapes,
-    merge_dataset, outcome, preview_scan, profile, sample_surfaces, scan, segment, trainer,
-    weather,
+    merge_dataset, outcome, preview_scan, profile, sample_surfaces, scan, segment, weather,
 };
 #[cfg(feature = "models")]
 use crate::{advise, detect, export_onnx, import_weights};
@@ -60,21 +59,19 @@ enum Command {
     /// Convert a model file to ONNX, for other inference engines
     #[cfg(feature = "models")]
     ExportOnnx(export_onnx::ExportOnnxArgs),
-    /// Train a network: `edgepuck train --help`
-    #[command(disable_help_flag = true)]
-    Train(trainer::TrainerArgs),
-    /// Measure a model's accuracy on labelled clouds: `edgepuck eval --help`
-    #[command(disable_help_flag = true)]
-    Eval(trainer::TrainerArgs),
-    /// Show which points determined a prediction: `edgepuck explain --help`
-    #[command(disable_help_flag = true)]
-    Explain(trainer::TrainerArgs),
-    /// Compute the Chamfer distance of two clouds: `edgepuck compare-points A B`
-    #[command(disable_help_flag = true)]
-    ComparePoints(trainer::TrainerArgs),
+    #[cfg(feature = "models")]
+    #[command(flatten)]
+    Train(train::cli::Command),
+    #[cfg(feature = "models")]
+    #[command(flatten)]
+    Infer(infer_cpu::cli::Command),
     /// Recommend one configuration of the classifier for a device, based on measurements
     #[cfg(feature = "models")]
     Advise(advise::AdviseArgs),
+    /// A command that only the whole program has.
+    #[cfg(not(feature = "models"))]
+    #[command(external_subcommand)]
+    Other(Vec<OsString>),
 }
 
 /// Runs the command line `words`, which begins with the name of the program. Prints errors and
@@ -119,11 +116,20 @@ fn run(command: &Command) -> anyhow::Result<Outcome> {
         Command::ImportWeights(args) => import_weights::run(args),
         #[cfg(feature = "models")]
         Command::ExportOnnx(args) => export_onnx::run(args),
-        Command::Train(args) => trainer::run("train", args),
-        Command::Eval(args) => trainer::run("eval", args),
-        Command::Explain(args) => trainer::run("explain", args),
-        Command::ComparePoints(args) => trainer::run("compare-points", args),
+        #[cfg(feature = "models")]
+        Command::Train(command) => train::cli::run(command),
+        #[cfg(feature = "models")]
+        Command::Infer(command) => infer_cpu::cli::run(command),
         #[cfg(feature = "models")]
         Command::Advise(args) => advise::run(args),
+        #[cfg(not(feature = "models"))]
+        Command::Other(words) => {
+            let word = words[0].to_string_lossy();
+            Err(Usage(format!(
+                "expected a command, found `{word}`; this program was built without the commands of \
+                 networks: `cargo install --path edgepuck` in a checkout builds it with them"
+            ))
+            .into())
+        }
     }
 }

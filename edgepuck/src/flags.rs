@@ -31,3 +31,11 @@ pub fn positive(word: &str) -> Result<f64, String> {
         _ => Err("expected a finite number above 0".to_owned()),
     }
 }
+
+/// Parses an elevation, degrees.
+pub fn elevation(word: &str) -> Result<f64, String> {
+    match word.parse::<f64>() {
+        Ok(degrees) if (-90.0..=90.0).contains(&degrees) => Ok(degrees),
+        _ => Err("expected degrees from -90 to 90".to_owned()),
+    }
+}

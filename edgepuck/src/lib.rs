@@ -12,6 +12,7 @@ mod cluster;
 mod corrupt;
 #[cfg(feature = "models")]
 pub mod detect;
+mod effect_flags;
 #[cfg(feature = "models")]
 mod export_onnx;
 pub mod flags;
@@ -34,7 +35,6 @@ mod shell;
 pub mod significant_digits;
 #[cfg(feature = "models")]
 pub mod trade_record;
-mod trainer;
 mod weather;
 
 pub use formats::outcome::{self, Outcome, Usage};

@@ -1,21 +1,29 @@
+//! `edgepuck scan`: a scene, or meshes before a sensor, into a scan.
+
 use crate::caster::CasterArgs;
+use crate::effect_flags::EffectFlags;
 use crate::{Outcome, Usage, flags};
-use anyhow::Context;
+use anyhow::{Context, ensure};
 use formats::atomic;
 use formats::hash::Hashing;
+use formats::scan::Attribute;
 use formats::scan_file::ScanFormat;
 use formats::vlp32c::{self, Returns};
+use glam::DVec3;
+use sim_gpu::internals::mesh::MeshFormat;
+use sim_gpu::internals::mesh::frame::{Normalize, Unit, Up};
 use sim_gpu::internals::packets;
 use sim_gpu::internals::scene::SceneFile;
 use sim_gpu::internals::simplify::Simplify;
-use sim_gpu::{Scan, Scene};
+use sim_gpu::{Mesh, Pose, Scan, Scene, Sensor};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub struct Args {
-    /// Scene file [default: two chairs, written to data/default-scene for you to edit]
-    #[arg(value_name = "SCENE")]
-    scene: Option<PathBuf>,
+    /// Scene file (TOML), or meshes (OBJ, OFF, PLY or STL) where their files have them [default: two
+    /// chairs, written to data/default-scene for you to edit]
+    #[arg(value_name = "SCENE|MESH...")]
+    inputs: Vec<PathBuf>,
 
     /// File to write: .npz, .ply, .csv or .pcap (VLP-32C packets, for that sensor only). If the
     /// scene has several sensors, one file per sensor is written, and the sensor's name is appended
@@ -27,48 +35,106 @@ pub struct Args {
     #[arg(long, value_name = "WHICH")]
     returns: Option<Returns>,
 
-    /// Simplify meshes as gen-dataset does; applies to objects without a `simplify` key in the
-    /// scene file
+    /// Simplify meshes of a scene as gen-dataset does; applies to objects without a `simplify` key
+    /// in the scene file
     #[arg(long, value_name = "auto|M", allow_negative_numbers = true)]
     simplify: Option<Simplify>,
+
+    #[command(flatten)]
+    meshes: MeshArgs,
+
+    #[command(flatten)]
+    effects: EffectFlags,
 
     #[command(flatten)]
     caster: CasterArgs,
 }
 
+/// Flags for meshes, which a scene's file states itself.
+#[derive(clap::Args)]
+#[command(next_help_heading = "Scans of meshes")]
+struct MeshArgs {
+    /// Name of a built-in sensor, or path of a profile (TOML) or of an Ouster's metadata (JSON)
+    /// [default: vlp32c]
+    #[arg(long, value_name = "NAME|FILE")]
+    sensor: Option<String>,
+
+    /// Distance of the sensor from the centre of the meshes, at which it looks, metres [default:
+    /// 3]
+    #[arg(long, value_name = "M", value_parser = flags::positive)]
+    distance: Option<f64>,
+
+    /// Elevation of the sensor above the horizon, degrees [default: 20]
+    #[arg(long, value_name = "DEG", value_parser = flags::elevation, allow_negative_numbers = true)]
+    elevation: Option<f64>,
+
+    /// Azimuth of the sensor, counterclockwise from x, degrees [default: 0]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    azimuth: Option<f64>,
+
+    /// Unit of the meshes' coordinates: m, mm, cm, in or ft [default: m]
+    #[arg(long, value_name = "UNIT")]
+    units: Option<Unit>,
+
+    /// How meshes are scaled: unit-sphere, bbox or none [default: none]
+    #[arg(long, value_name = "HOW")]
+    normalize: Option<Normalize>,
+
+    /// The meshes' upward axis: y or z [default: y for OBJ, z for others]
+    #[arg(long, value_name = "AXIS")]
+    up: Option<Up>,
+
+    /// Attributes of each point besides its position, as of gen-dataset [default: range, beam, ring,
+    /// time, object]
+    #[arg(long, value_delimiter = ',', value_name = "LIST")]
+    attributes: Vec<Attribute>,
+
+    /// Seed of all random numbers [default: 0]
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+}
+
+impl MeshArgs {
+    /// A flag that was given, which a scene's file states itself.
+    fn given(&self) -> Option<&'static str> {
+        let given = [
+            (self.sensor.is_some(), "--sensor"),
+            (self.distance.is_some(), "--distance"),
+            (self.elevation.is_some(), "--elevation"),
+            (self.azimuth.is_some(), "--azimuth"),
+            (self.units.is_some(), "--units"),
+            (self.normalize.is_some(), "--normalize"),
+            (self.up.is_some(), "--up"),
+            (!self.attributes.is_empty(), "--attributes"),
+            (self.seed.is_some(), "--seed"),
+        ];
+        given.into_iter().find(|(is_given, _)| *is_given).map(|(_, flag)| flag)
+    }
+}
+
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let format = ScanFormat::of_path(&args.out)?;
-    let scene_file = match &args.scene {
-        Some(file) => file.clone(),
-        None => write_default_scene()?,
-    };
-    let mut file = SceneFile::load(&scene_file)?;
-    file.simplify = args.simplify.or(file.simplify);
-    file.check_triangles().map_err(|error| Usage(error.to_string()))?;
-    flags::need_simplification(file.simplifies())?;
+    let (mut scene, what) = scene(args)?;
     let mut returns = Returns::default();
     if format == ScanFormat::Pcap {
-        returns = cast_packet_geometry(&mut file, args.returns)
-            .with_context(|| format!("{}", scene_file.display()))?;
+        returns = cast_packet_geometry(&mut scene, args.returns).with_context(|| what.clone())?;
     } else if args.returns.is_some() {
         let cause = "--returns applies to packets only: expected --out with the extension .pcap; \
-                     the returns of other files are the scene's: `effects.returns`";
+                     the returns of other files are those of the effects: `effects.returns`";
         return Err(Usage(cause.to_owned()).into());
     }
     let caster = args.caster.caster()?;
-    let in_scene = || scene_file.display().to_string();
-    let scene = Scene::try_from(&file).with_context(in_scene)?;
     let scan =
         |number| scene.scan_mounted(number).with(&caster).culling(args.caster.culling()).run();
-    let scans: Vec<Scan> =
-        (0..scene.sensors.len()).map(scan).collect::<Result<_, _>>().with_context(in_scene)?;
+    let scans: Vec<Scan> = (0..scene.sensors.len())
+        .map(scan)
+        .collect::<Result<_, _>>()
+        .with_context(|| what.clone())?;
     tell_objects(&scene);
     for (scan, mounted) in scans.iter().zip(&scene.sensors) {
         let sensor = &mounted.name;
         if scan.cast_on_cpu {
-            eprintln!(
-                "{sensor}: one mesh exceeds the adapter's largest binding, so the CPU cast it"
-            );
+            eprintln!("{sensor}: one mesh exceeds the GPU's largest buffer, so the CPU cast it");
         }
         let file = if scans.len() > 1 { beside(&args.out, sensor) } else { args.out.clone() };
         match format {
@@ -80,7 +146,84 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         }
         eprintln!("{sensor}: {}: {}", told(&scene, scan), file.display());
     }
+    if scans.iter().all(|scan| scan.is_empty()) {
+        eprintln!("warning: no beam returned a point: expected an object in the sensor's range");
+        return Ok(Outcome::SomeRefused);
+    }
     Ok(Outcome::Success)
+}
+
+/// The scene that the command line asks for, and its name in messages.
+fn scene(args: &Args) -> anyhow::Result<(Scene, String)> {
+    let is_mesh = |file: &PathBuf| MeshFormat::from_path(file).is_some();
+    if !args.inputs.is_empty() && args.inputs.iter().all(is_mesh) {
+        return Ok((scene_of_meshes(args)?, args.inputs[0].display().to_string()));
+    }
+    let file = match &args.inputs[..] {
+        [] => write_default_scene()?,
+        [scene] => scene.clone(),
+        [_, ..] => {
+            let other = args.inputs.iter().find(|file| !is_mesh(file));
+            let other = other.map(|file| file.display().to_string()).unwrap_or_default();
+            let cause =
+                format!("expected one scene, or meshes (.obj, .off, .ply, .stl), found {other}");
+            return Err(Usage(cause).into());
+        }
+    };
+    let what = file.display().to_string();
+    if let Some(flag) = args.meshes.given().or(args.effects.given()) {
+        let cause =
+            format!("{flag} applies to scans of meshes: {what} is a scene, which states it");
+        return Err(Usage(cause).into());
+    }
+    let mut scene = SceneFile::load(&file)?;
+    scene.simplify = args.simplify.or(scene.simplify);
+    scene.check_triangles().map_err(|error| Usage(error.to_string()))?;
+    flags::need_simplification(scene.simplifies())?;
+    Ok((Scene::try_from(&scene).with_context(|| what.clone())?, what))
+}
+
+/// The meshes where their files have them, and a sensor that looks at their middle.
+fn scene_of_meshes(args: &Args) -> anyhow::Result<Scene> {
+    let MeshArgs { units, up, .. } = args.meshes;
+    let normalize = args.meshes.normalize.unwrap_or(Normalize::None);
+    ensure!(args.simplify.is_none(), Usage("--simplify applies to scenes only".to_owned()));
+    let mut scene = Scene::new();
+    scene.seed = args.meshes.seed.unwrap_or_default();
+    if !args.meshes.attributes.is_empty() {
+        scene.attributes = args.meshes.attributes.iter().copied().collect();
+    }
+    let with_intensity = scene.attributes.contains(&Attribute::Intensity);
+    scene.effects = args.effects.effects(0.0, with_intensity)?;
+    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for file in &args.inputs {
+        let mesh = Mesh::read_in(file, up, units.unwrap_or_default())?.normalized(normalize);
+        let [least, most] = mesh.bounds_m().map(DVec3::from_array);
+        (low, high) = (low.min(least), high.max(most));
+        if let Some(doubt) = mesh.doubtful_size().filter(|_| units.is_none()) {
+            eprintln!("warning: {}: {doubt}; --units names another unit", file.display());
+        }
+        let id = scene.add(mesh, Pose::IDENTITY);
+        scene[id].name = file.file_stem().map(|stem| stem.to_string_lossy().into_owned());
+    }
+    let MeshArgs { distance, elevation, azimuth, .. } = args.meshes;
+    let mut pose = Pose::looking_at_origin_deg(
+        distance.unwrap_or(3.0),
+        elevation.unwrap_or(20.0),
+        azimuth.unwrap_or_default(),
+    );
+    pose.position_m += 0.5 * (low + high);
+    for (file, instance) in args.inputs.iter().zip(scene.instances()) {
+        if instance.mesh.surrounds(&[pose.position_m]) {
+            let file = file.display();
+            eprintln!(
+                "warning: {file}: the sensor stands inside its bounding box: expected a larger --distance, or another of --units"
+            );
+        }
+    }
+    let sensor = Sensor::resolve(args.meshes.sensor.as_deref().unwrap_or("vlp32c"))?;
+    scene.mount(sensor.name(), &sensor, pose);
+    Ok(scene)
 }
 
 /// Lists the objects of `scene`, and what simplification made of them.
@@ -128,14 +271,15 @@ fn write_default_scene() -> anyhow::Result<PathBuf> {
     Ok(scene)
 }
 
-/// Gives the sensors the beam geometry that their packets describe, and the scans
-/// the attributes that packets are made of. Says which returns they hold, where `wanted` does
-/// not say otherwise.
-fn cast_packet_geometry(scene: &mut SceneFile, wanted: Option<Returns>) -> anyhow::Result<Returns> {
+/// Gives the sensors the beam geometry of their packets, and the scans the attributes that packets
+/// are made of. Returns the returns that the packets hold: `wanted`, or those of the effects.
+fn cast_packet_geometry(scene: &mut Scene, wanted: Option<Returns>) -> anyhow::Result<Returns> {
     let returns = packets::settle_returns(&mut scene.effects, wanted)?;
-    for (i, sensor) in scene.sensors.iter_mut().enumerate() {
-        sensor.sensor = packets::with_packet_geometry(&sensor.sensor)
-            .with_context(|| format!("sensor[{i}]: no packets of \"{}\"", sensor.sensor.name))?;
+    for (i, mounted) in scene.sensors.iter_mut().enumerate() {
+        mounted.sensor = mounted
+            .sensor
+            .with_packet_geometry()
+            .with_context(|| format!("sensor[{i}]: no packets of \"{}\"", mounted.sensor.name()))?;
     }
     scene.attributes = packets::attributes(&scene.effects, &scene.attributes);
     Ok(returns)

@@ -15,8 +15,6 @@ pub enum Outcome {
     SomeRefused,
     /// SIGTERM stopped the work, which can be resumed.
     Interrupted,
-    /// A child process did the work and ended with this code.
-    ChildExit(u8),
 }
 
 /// An error in the command line.
@@ -34,7 +32,6 @@ pub fn exit_code(result: anyhow::Result<Outcome>) -> u8 {
         Ok(Outcome::SomeRefused) => 3,
         // EX_TEMPFAIL of sysexits.h: try again later.
         Ok(Outcome::Interrupted) => 75,
-        Ok(Outcome::ChildExit(code)) => code,
         Err(error) if is_broken_pipe(&error) => 0,
         Err(error) => {
             say(format_args!("error: {}", joined_causes(&error)));

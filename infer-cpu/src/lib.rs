@@ -37,6 +37,9 @@ mod calibrate;
 mod choose;
 mod classifier;
 mod classifier_team;
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub mod cli;
 mod dense;
 mod edge_conv;
 mod engine;

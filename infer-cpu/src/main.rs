@@ -1,11 +1,20 @@
 //! Classifies clouds of points without a GPU.
 
-mod cli;
-
+use clap::Parser;
+use infer_cpu::cli::{Command, run};
 use std::process::ExitCode;
 
-use clap::Parser;
+/// Classify point clouds on a CPU with PointNet, after a Critical Points Layer or another sampler.
+#[derive(Parser)]
+#[command(name = "infer-cpu", version, max_term_width = 100)]
+#[command(after_help = "\
+Exit status: 0 on success, 1 if an input failed (the message names it), 2 if the
+command line is invalid.")]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
 
 fn main() -> ExitCode {
-    formats::outcome::exit_code(cli::run(&cli::Cli::parse())).into()
+    formats::outcome::exit_code(run(&Cli::parse().command)).into()
 }

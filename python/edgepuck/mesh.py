@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from typing import Any, Literal
 
 import numpy as np
@@ -13,6 +14,7 @@ from ._arguments import Remade, place
 
 Axis = Literal["y", "z"]
 Normalize = Literal["unit-sphere", "bbox", "none"]
+Unit = Literal["m", "mm", "cm", "in", "ft"]
 
 
 class Mesh(Remade):
@@ -24,8 +26,9 @@ class Mesh(Remade):
         faces: The indices of each triangle's vertices, of shape [m, 3], if `source` is vertices.
         normalize: `unit-sphere` moves the mean of the vertices to the origin and scales the
             farthest of them to 1 m. `bbox` moves the middle of the bounding box there and scales its
-            longest side to 2 m. `none` leaves the mesh in its place, and takes the unit of length as
-            a metre.
+            longest side to 2 m. `none` leaves the mesh in its place.
+        units: The unit of length of `source`: m (the default), mm, cm, in or ft. Without it, a mesh
+            that keeps its size and is larger than 100 m or smaller than 1 cm gives a warning.
         up: The upward axis of `source`: y or z. By default, y for OBJ files and z for all others.
 
     Raises:
@@ -44,12 +47,14 @@ class Mesh(Remade):
         faces: ArrayLike | None = None,
         *,
         normalize: Normalize = "unit-sphere",
+        units: Unit | None = None,
         up: Axis | None = None,
     ) -> None:
         if faces is None and isinstance(source, (str, os.PathLike)):
             path = place(source)
-            self._made_of = (path,), {"normalize": normalize, "up": up}
-            self._mesh = _edgepuck.Mesh.read(path, up, normalize)
+            self._made_of = (path,), {"normalize": normalize, "units": units, "up": up}
+            self._mesh = _edgepuck.Mesh.read(path, up, units or "m", normalize)
+            self._warn(path)
             return
         if faces is None and hasattr(source, "vertices") and hasattr(source, "faces"):
             source, faces = source.vertices, source.faces
@@ -65,8 +70,16 @@ class Mesh(Remade):
             if array.ndim != 2:
                 shape = list(array.shape)
                 raise _edgepuck.Error(f"expected {name} of shape [n, 3], found {shape}")
-        self._made_of = (vertices, indices), {"normalize": normalize, "up": up}
-        self._mesh = _edgepuck.Mesh.of_arrays(vertices, indices, up or "z", normalize)
+        self._made_of = (vertices, indices), {"normalize": normalize, "units": units, "up": up}
+        self._mesh = _edgepuck.Mesh.of_arrays(vertices, indices, up or "z", units or "m", normalize)
+        self._warn("mesh")
+
+    def _warn(self, what: str) -> None:
+        """Warn if the unit of the source is probably not the metre."""
+        settings = self._made_of[1]
+        doubt = self._mesh.doubtful_size()
+        if settings["normalize"] == "none" and settings["units"] is None and doubt:
+            warnings.warn(f"{what}: {doubt}; `units` names another unit", stacklevel=3)
 
     def __len__(self) -> int:
         """The number of triangles."""

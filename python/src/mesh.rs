@@ -2,7 +2,7 @@ use crate::error::raised;
 use crate::process;
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use sim_gpu::internals::mesh::frame::{Normalize, Up};
+use sim_gpu::internals::mesh::frame::{Normalize, Unit, Up};
 use std::path::PathBuf;
 
 /// A mesh in the world's frame, with its tree.
@@ -15,11 +15,18 @@ pub struct Mesh {
 impl Mesh {
     /// Read a mesh file.
     #[staticmethod]
-    fn read(py: Python<'_>, path: PathBuf, up: Option<&str>, normalize: &str) -> PyResult<Self> {
+    fn read(
+        py: Python<'_>,
+        path: PathBuf,
+        up: Option<&str>,
+        units: &str,
+        normalize: &str,
+    ) -> PyResult<Self> {
         let up: Option<Up> = up.map(str::parse).transpose().map_err(raised)?;
+        let unit: Unit = units.parse().map_err(raised)?;
         let normalize: Normalize = normalize.parse().map_err(raised)?;
         process::run(py, || {
-            let mesh = sim_gpu::Mesh::read_turned(&path, up).map_err(raised)?;
+            let mesh = sim_gpu::Mesh::read_in(&path, up, unit).map_err(raised)?;
             Ok(Self::new(&mesh, normalize))
         })?
     }
@@ -31,6 +38,7 @@ impl Mesh {
         vertices: PyReadonlyArray2<'_, f64>,
         faces: PyReadonlyArray2<'_, i64>,
         up: &str,
+        units: &str,
         normalize: &str,
     ) -> PyResult<Self> {
         for (name, shape) in [("vertices", vertices.shape()), ("faces", faces.shape())] {
@@ -39,6 +47,7 @@ impl Mesh {
             }
         }
         let up: Up = up.parse().map_err(raised)?;
+        let unit: Unit = units.parse().map_err(raised)?;
         let normalize: Normalize = normalize.parse().map_err(raised)?;
         let rows = vertices.as_array();
         let vertices = rows.rows().into_iter().map(|row| [row[0], row[1], row[2]]);
@@ -55,6 +64,7 @@ impl Mesh {
         let vertices = vertices.collect();
         process::run(py, || {
             let mesh = sim_gpu::Mesh::from_triangles(vertices, triangles).map_err(raised)?;
+            let mesh = mesh.scaled(unit.metres()).map_err(raised)?;
             Ok(Self::new(&if up == Up::Y { mesh.y_up() } else { mesh }, normalize))
         })?
     }
@@ -63,6 +73,11 @@ impl Mesh {
     #[getter]
     fn scale(&self) -> f64 {
         self.mesh.scale()
+    }
+
+    /// Why its unit is probably not the metre, if its size says so.
+    fn doubtful_size(&self) -> Option<String> {
+        self.mesh.doubtful_size()
     }
 
     /// What became the origin, in the source's units.

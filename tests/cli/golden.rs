@@ -181,11 +181,6 @@ fn logits_of_bundled_models_keep_their_bits() {
 #[test]
 fn a_model_trained_for_two_epochs_keeps_its_bytes() {
     let folder = with_shapes();
-    let program = Path::new(env!("CARGO_BIN_EXE_edgepuck"))
-        .with_file_name(format!("edgepuck-train{}", std::env::consts::EXE_SUFFIX));
-    if !program.is_file() {
-        return test_support::skip("the program edgepuck-train is not built");
-    }
     if KernelName::Avx512.kernels().is_none() {
         return test_support::skip("the golden model was trained on a machine with AVX-512");
     }
@@ -195,8 +190,6 @@ fn a_model_trained_for_two_epochs_keeps_its_bytes() {
         "train --data scans/packed/rotational-noisy --recipe {} --epochs 2 --out m.safetensors",
         recipe.display()
     );
-    let mut train = folder.edgepuck(&words);
-    let output = train.env("EDGEPUCK_TRAIN", program).output().unwrap();
-    assert!(output.status.success(), "{}", crate::said(&output));
+    folder.succeeds(&words);
     check(&[("model trained for two epochs", of_bytes(&folder.bytes("m.safetensors")))]);
 }

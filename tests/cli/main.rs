@@ -11,8 +11,6 @@ mod corrupt;
 mod datasets;
 mod drives;
 mod end_to_end;
-#[cfg(unix)]
-mod exit_codes;
 mod export_onnx;
 mod golden;
 mod import_weights;
@@ -27,6 +25,7 @@ mod simplified;
 mod surfaces;
 mod sweeps;
 mod tars;
+mod training;
 mod weather;
 
 use formats::Scan;

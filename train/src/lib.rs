@@ -13,6 +13,8 @@ pub mod batch;
 pub mod batches;
 pub mod calibration;
 pub mod checkpoint;
+#[doc(hidden)]
+pub mod cli;
 pub mod clouds;
 mod cluster;
 pub mod cluster_variation;

@@ -41,14 +41,16 @@ fn become_process(command: &mut Command) -> std::io::Result<u8> {
 fn features(package: &str, words: &[OsString]) -> Vec<&'static str> {
     let any = |is: fn(&str) -> bool| words.iter().any(|word| is(&word.to_string_lossy()));
     let is_in_scene = |key| words.iter().any(|word| has_key(word, key));
+    let reads_hdf5 = modelnet_h5_list::is_among(words);
     if package == LAB {
-        return if modelnet_h5_list::is_among(words) { vec!["hdf5"] } else { Vec::new() };
+        return if reads_hdf5 { vec!["hdf5"] } else { Vec::new() };
     }
     let simplifies = any(|word| word.starts_with("--simplify")) || is_in_scene("simplify");
     let is_coloured = any(|word| word.starts_with("--colours")) || is_in_scene("colours");
-    let needs_hdf5 =
+    let writes_hdf5 =
         any(|word| word.starts_with("--layout")) && any(|word| word.contains("modelnet-h5"));
-    let features = [(simplifies, "simplify"), (needs_hdf5, "hdf5"), (is_coloured, "textures")];
+    let hdf5 = reads_hdf5 || writes_hdf5;
+    let features = [(simplifies, "simplify"), (hdf5, "hdf5"), (is_coloured, "textures")];
     features.into_iter().filter(|(is_needed, _)| *is_needed).map(|(_, name)| name).collect()
 }
 

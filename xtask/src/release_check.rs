@@ -19,6 +19,9 @@ pub fn run() -> anyhow::Result<u8> {
     });
     summary.step("advisories", advisories);
     summary.step("semantic versions", semantic_versions);
+    summary.step("site", |_| {
+        check("site", tool("mdbook", "mdbook")?.args(["build", "docs", "-d", "../target/site"]))
+    });
     python::run_emulated(&mut summary);
     Ok(summary.end())
 }

@@ -69,7 +69,6 @@ fn run_all(args: &Args, summary: &mut Summary) {
     let wheel = python::build_meanwhile(install);
     let fuzz_targets = fuzz::build_meanwhile(args.fuzz_seconds);
     let pi_binary = targets::build_meanwhile();
-    let mdbook = docs::build_meanwhile(install);
     check_source(summary);
     summary.step("tests", |summary| tests(summary, install));
     laboratory(summary, install);
@@ -87,7 +86,6 @@ fn run_all(args: &Args, summary: &mut Summary) {
             smallest_lints(&mut summary);
             summary.step("dependencies", |_| infer_cpu_is_light());
             targets::run(&mut summary, install);
-            docs::build_site(&mut summary, mdbook);
             let with_pytorch = args.peers == peers::Which::All;
             let wheel = python::run(&mut summary, wheel, with_pytorch);
             docs::run_blocks(&mut summary, &wheel, &programs);

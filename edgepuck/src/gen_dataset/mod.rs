@@ -21,7 +21,7 @@ use formats::hash::Hashing;
 use settings::Settings;
 use shard::Shard;
 use signal_hook::consts::SIGTERM;
-use sim_gpu::Caster;
+use sim_gpu::{Caster, Tally};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -62,6 +62,10 @@ pub(crate) struct Args {
     /// JOB_COMPLETION_INDEX (Kubernetes) or HQ_TASK_ID (HyperQueue). `auto` asks Slurm for N, too
     #[arg(long, value_name = "I/N|auto/N|auto")]
     shard: Option<Shard>,
+
+    /// Also print the numbers of rays and the time of each stage
+    #[arg(long, short)]
+    verbose: bool,
 
     #[command(flatten)]
     tars: tars::TarArgs,
@@ -135,7 +139,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let made = if config.layouts.contains(&Layout::Webdataset) {
         tars::run(&args.tars, &plan, &caster)
     } else {
-        make_files(&plan, &caster)
+        make_files(&plan, &caster, args.verbose)
     };
     made.or_else(|error| match error.downcast_ref() {
         Some(DatasetError::Interrupted { .. }) => {
@@ -146,7 +150,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     })
 }
 
-fn make_files(plan: &Plan, caster: &Caster) -> anyhow::Result<Outcome> {
+fn make_files(plan: &Plan, caster: &Caster, verbose: bool) -> anyhow::Result<Outcome> {
     let started = Instant::now();
     let progress = Progress::default();
     // Once all meshes are scanned, SIGTERM ends the program immediately.
@@ -156,7 +160,7 @@ fn make_files(plan: &Plan, caster: &Caster) -> anyhow::Result<Outcome> {
     let manifest = bar::beside(&progress, || make(plan, caster, &progress))?;
     if progress.is_scanned.load(SeqCst) {
         report_failures(&manifest.failures);
-        summary::print(plan.out, &manifest, &progress, started.elapsed());
+        summary::print(plan.out, &manifest, &progress, started.elapsed(), verbose);
     } else {
         eprintln!("{}: the dataset is already complete.", plan.out.display());
     }
@@ -176,7 +180,42 @@ pub(crate) fn end(out: &Path, manifest: &Manifest) -> anyhow::Result<Outcome> {
         Some(picture) => eprintln!("Open this picture to see an example: {}", picture.display()),
         None => eprintln!("No scan holds a point, so no example picture was drawn."),
     }
-    Ok(if manifest.failures.is_empty() { Outcome::Success } else { Outcome::SomeRefused })
+    let all_have_points = report_empty_sets(manifest);
+    Ok(match manifest.failures.is_empty() && all_have_points {
+        true => Outcome::Success,
+        false => Outcome::SomeRefused,
+    })
+}
+
+/// Prints the sets without a point, with the likely reason. Returns whether every set has points.
+fn report_empty_sets(manifest: &Manifest) -> bool {
+    let mut all_have_points = true;
+    for set in &manifest.config.sets {
+        let scans = manifest.meshes.iter().flat_map(|mesh| &mesh.scans);
+        let of_set = scans.filter(|scan| scan.set == set.name).flat_map(|scan| &scan.variants);
+        let tally = of_set.fold(Tally::default(), |mut sum, scan| {
+            sum += scan.tally;
+            sum
+        });
+        if tally.points > 0 || manifest.meshes.is_empty() {
+            continue;
+        }
+        all_have_points = false;
+        let lost = tally.out_of_range + tally.dropped + tally.undetected + tally.negative;
+        let range = &set.sensor.profile().range;
+        let reason = match lost {
+            0 => "no beam met a mesh".to_owned(),
+            _ => format!(
+                "of {lost} beams that met a mesh, {} did so outside the sensor's range of {} to {} m",
+                tally.out_of_range, range.min_m, range.max_m
+            ),
+        };
+        eprintln!(
+            "No scan of {} holds a point: {reason}. --distance, --normalize and --units change this.",
+            set.name
+        );
+    }
+    all_have_points
 }
 
 /// Verifies the dataset in `folder` and prints its problems, one a line.

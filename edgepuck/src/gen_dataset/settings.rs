@@ -1,17 +1,22 @@
 use super::usage;
+use crate::effect_flags::EffectFlags;
 use edgepuck_dataset::{
     ColourSource, DatasetConfig, Hashing, Layout, Normalize, Returns, ScanFormat, SetConfig,
-    Simplify, Up, Variant, Viewpoints, Views,
+    Simplify, Unit, Up, Variant, Viewpoints, Views,
 };
 use formats::scan::Attribute;
 use sim_gpu::Sensor;
-use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel, Quantum};
-use sim_gpu::internals::config::{self, within};
+use sim_gpu::effects::Effects;
+use sim_gpu::internals::config::within;
 use sim_gpu::internals::packets;
 use sim_gpu::internals::pose::load_poses;
 use sim_gpu::internals::sensor::{Layout as BeamLayout, SensorProfile};
 use std::path::PathBuf;
 use std::str::FromStr;
+
+/// The noise by default: the standard deviation of the VLP-32C's ranges is at most 3 cm (its data
+/// sheet), and 1 cm in the paper of Meyer and Reitmann (2026).
+const NOISE_M: f64 = 0.01;
 
 /// Flags that decide what a dataset holds.
 #[derive(clap::Parser)]
@@ -45,32 +50,8 @@ pub struct Settings {
     #[arg(long, value_name = "TOML", conflicts_with_all = ["views", "distance", "elevation", "azimuth_jitter"])]
     poses: Option<PathBuf>,
 
-    /// Standard deviation of the noise, metres; 0 writes clean scans only
-    #[arg(long, default_value_t = 0.01, value_name = "M", allow_negative_numbers = true)]
-    noise: f64,
-
-    /// What the noise is added to: `range` (along the ray) or `xyz` (each coordinate)
-    #[arg(long, default_value = "range", value_name = "MODEL")]
-    noise_model: NoiseModel,
-
-    /// Mean of the noise, metres
-    #[arg(long, default_value_t = 0.0, value_name = "M", allow_negative_numbers = true)]
-    noise_mean: f64,
-
-    /// Probability that a return is missing from a noisy scan
-    #[arg(long, default_value_t = 0.0, value_name = "P", allow_negative_numbers = true)]
-    dropout: f64,
-
-    /// Round the ranges of noisy scans to multiples of M metres, or without a value, of the
-    /// sensor's own quantum
-    #[arg(long, value_name = "M", num_args = 0..=1, default_missing_value = "sensor")]
-    quantise: Option<String>,
-
-    /// TOML file with a table `[effects]` as a scene has it, such as the sensor's detection limit;
-    /// replaces the flags of noise, dropout and quantisation
-    #[arg(long, value_name = "TOML",
-          conflicts_with_all = ["noise", "noise_model", "noise_mean", "dropout", "quantise"])]
-    effects: Option<PathBuf>,
+    #[command(flatten)]
+    effects: EffectFlags,
 
     /// Diffuse reflectivity of the meshes, from 0 (black) to 1 (white)
     #[arg(long, default_value_t = 1.0, value_name = "R", allow_negative_numbers = true)]
@@ -99,6 +80,10 @@ pub struct Settings {
     /// How meshes are scaled: unit-sphere, bbox or none [default: unit-sphere or the sensor's own]
     #[arg(long, value_name = "HOW")]
     normalize: Option<Normalize>,
+
+    /// Unit of the meshes' coordinates: m, mm, cm, in or ft; only with --normalize none
+    #[arg(long, default_value = "m", value_name = "UNIT")]
+    units: Unit,
 
     /// The meshes' upward axis: y or z [default: y for OBJ, z for others]
     #[arg(long, value_name = "AXIS")]
@@ -158,10 +143,16 @@ impl Settings {
                          again for each tar";
             return Err(usage(cause));
         }
-        let mut effects = self.effects()?;
+        let with_intensity = self.attributes.contains(&Attribute::Intensity);
+        let mut effects = self.effects.effects(NOISE_M, with_intensity)?;
         if self.simplify.is_some() && effects.motion.is_some() {
             let cause = "--simplify cannot be used with effects.motion: the resolution of a moving \
                          sensor changes";
+            return Err(usage(cause));
+        }
+        let normalize = self.normalize.or(recommended).unwrap_or_default();
+        if self.units != Unit::Metre && normalize != Normalize::None {
+            let cause = "--units applies to --normalize none: other meshes are scaled anyway";
             return Err(usage(cause));
         }
         within("--reflectivity", self.reflectivity, 0.0..=1.0).map_err(usage)?;
@@ -178,7 +169,8 @@ impl Settings {
         variants.extend((effects != effects.clean()).then_some(Variant::Noisy));
         Ok(DatasetConfig {
             seed: self.seed,
-            normalize: self.normalize.or(recommended).unwrap_or_default(),
+            normalize,
+            units: self.units,
             up: self.up,
             simplify: self.simplify,
             attributes: self.attributes.iter().copied().collect(),
@@ -194,36 +186,6 @@ impl Settings {
             reflectivity: self.reflectivity,
             colours: self.colours,
         })
-    }
-
-    fn effects(&self) -> anyhow::Result<Effects> {
-        let intensity = self.attributes.contains(&Attribute::Intensity).then_some(Intensity);
-        if let Some(file) = &self.effects {
-            let EffectsFile { mut effects } = config::read(file)?;
-            if let Some(weather) = &mut effects.weather {
-                weather.empty_beams.get_or_insert(false);
-            }
-            return Ok(Effects { intensity: effects.intensity.or(intensity), ..effects });
-        }
-        let noise = Noise { mean_m: self.noise_mean, sigma_m: self.noise, model: self.noise_model };
-        let step_m = match self.quantise.as_deref() {
-            None => None,
-            Some("sensor") => Some(None),
-            Some(metres) => Some(Some(metres.parse().map_err(|_| {
-                usage(format!(
-                    "--quantise: expected a number of metres or sensor, found {metres:?}"
-                ))
-            })?)),
-        };
-        let effects = Effects {
-            noise: (self.noise != 0.0 || self.noise_mean != 0.0).then_some(noise),
-            dropout: (self.dropout != 0.0).then_some(Dropout { probability: self.dropout }),
-            quantum: step_m.map(|step_m| Quantum { step_m }),
-            intensity,
-            ..Effects::default()
-        };
-        effects.validate().map_err(usage)?;
-        Ok(effects)
     }
 
     fn sets(&self) -> anyhow::Result<Vec<SetConfig>> {
@@ -289,12 +251,6 @@ impl FromStr for FromTo {
             None => Ok(Self { from: number(text)?, to: None }),
         }
     }
-}
-
-#[derive(serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-struct EffectsFile {
-    effects: Effects,
 }
 
 /// Gives the sensors the beam geometry of their packets, and the effects the returns that packets

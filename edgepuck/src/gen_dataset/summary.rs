@@ -1,31 +1,23 @@
 use edgepuck_dataset::internals::layout;
 use edgepuck_dataset::{Manifest, Progress, Stage};
 use std::path::Path;
-use std::sync::atomic::Ordering::Relaxed;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::Duration;
 
-pub fn print(out: &Path, manifest: &Manifest, progress: &Progress, total: Duration) {
-    progress.notes().iter().for_each(|note| eprintln!("{note}"));
-    let count = |counter: &std::sync::atomic::AtomicU64| counter.load(Relaxed);
+pub fn print(out: &Path, manifest: &Manifest, progress: &Progress, total: Duration, verbose: bool) {
+    print_notes(&progress.notes());
     let seconds = total.as_secs_f64();
     eprintln!(
         "{} meshes, {} failed; {} scans, {} points in {seconds:.1} s ({:.1} meshes/s)",
         manifest.meshes.len(),
         manifest.failures.len(),
-        count(&progress.scans),
-        count(&progress.points),
-        count(&progress.meshes) as f64 / seconds,
+        progress.scans.load(Relaxed),
+        progress.points.load(Relaxed),
+        progress.meshes.load(Relaxed) as f64 / seconds,
     );
-    let (cast, culled) = (count(&progress.rays_cast), count(&progress.rays_culled));
-    eprintln!(
-        "{cast} rays cast, {culled} culled, {} decided in f64",
-        count(&progress.rays_decided_in_f64)
-    );
-    let stages: Vec<String> = Stage::ALL
-        .iter()
-        .map(|&stage| format!("{} {:.1}", stage.name(), progress.spent(stage).as_secs_f64()))
-        .collect();
-    eprintln!("seconds over all threads: {}", stages.join(", "));
+    if verbose {
+        print_costs(progress);
+    }
     let simplified = manifest.meshes.iter().filter_map(|mesh| Some((mesh, mesh.simplified?)));
     let (before, after) = simplified.fold((0, 0), |(before, after), (mesh, simplified)| {
         (before + mesh.triangles, after + simplified.triangles)
@@ -40,4 +32,28 @@ pub fn print(out: &Path, manifest: &Manifest, progress: &Progress, total: Durati
         eprintln!("Meshes that failed are listed in {}", layout::failures(out).display());
     }
     eprintln!("Dataset: {}", out.display());
+}
+
+/// Prints the first notes, and how many more there are.
+fn print_notes(notes: &[String]) {
+    const MOST: usize = 10;
+    notes.iter().take(MOST).for_each(|note| eprintln!("{note}"));
+    if notes.len() > MOST {
+        eprintln!("... and {} more such notes", notes.len() - MOST);
+    }
+}
+
+/// Prints the work of the casters, and the time of each stage.
+fn print_costs(progress: &Progress) {
+    let count = |counter: &AtomicU64| counter.load(Relaxed);
+    let (cast, culled) = (count(&progress.rays_cast), count(&progress.rays_culled));
+    eprintln!(
+        "{cast} rays cast, {culled} culled, {} decided in f64",
+        count(&progress.rays_decided_in_f64)
+    );
+    let stages: Vec<String> = Stage::ALL
+        .iter()
+        .map(|&stage| format!("{} {:.1}", stage.name(), progress.spent(stage).as_secs_f64()))
+        .collect();
+    eprintln!("seconds over all threads: {}", stages.join(", "));
 }

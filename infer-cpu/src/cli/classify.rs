@@ -5,14 +5,14 @@ use std::io::{self, BufReader, stdin};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use crate::kernel::KernelName;
+use crate::sampler::{SamplerKind, SamplerSpec};
+use crate::{Classifier, Options, Precision, UpAxis};
 use anyhow::Context;
 use formats::FormatError;
 use formats::cloud_file::CloudFormat;
 use formats::model_card::{ModelCard, Normalization};
 use formats::outcome::joined_causes;
-use infer_cpu::kernel::KernelName;
-use infer_cpu::sampler::{SamplerKind, SamplerSpec};
-use infer_cpu::{Classifier, Options, Precision, UpAxis};
 
 use super::input;
 use super::model::ModelArgs;

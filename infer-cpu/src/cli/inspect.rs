@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use infer_cpu::sampler::SamplerSpec;
-use infer_cpu::{LayerShape, ModelCard, NetShape, Precision, Summary};
+use crate::sampler::SamplerSpec;
+use crate::{LayerShape, ModelCard, NetShape, Precision, Summary};
 use serde_json::{Value, json};
 
 use super::Outcome;
@@ -32,7 +32,7 @@ pub struct InspectArgs {
 
 pub fn run(args: &InspectArgs) -> anyhow::Result<Outcome> {
     let path = model::find(args.model.as_deref())?;
-    let summary = infer_cpu::inspect(&path)?;
+    let summary = crate::inspect(&path)?;
     let sampler = SamplerSpec::as_trained(&path, &summary.card)?;
     let text = match args.json {
         true => format!("{}\n", as_json(&path, &summary, &sampler)),

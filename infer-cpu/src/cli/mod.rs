@@ -1,3 +1,5 @@
+//! The commands of the programs `infer-cpu` and `edgepuck`.
+
 mod bench;
 mod classify;
 mod input;
@@ -10,22 +12,12 @@ mod report;
 mod sample;
 mod sampler;
 
-use clap::{Parser, Subcommand};
+use clap::Subcommand;
 use formats::outcome::{Outcome, Usage};
 
-/// Classify point clouds on a CPU with PointNet, after a Critical Points Layer or another sampler.
-#[derive(Parser)]
-#[command(name = "infer-cpu", version, max_term_width = 100)]
-#[command(after_help = "\
-Exit status: 0 on success, 1 if an input failed (the message names it), 2 if the
-command line is invalid.")]
-pub struct Cli {
-    #[command(subcommand)]
-    command: Command,
-}
-
+/// A command and its flags.
 #[derive(Subcommand)]
-enum Command {
+pub enum Command {
     /// Classify clouds
     Classify(Box<classify::ClassifyArgs>),
     /// Reduce a cloud with a sampler, and write the chosen points
@@ -39,8 +31,12 @@ enum Command {
     Bench(Box<bench::BenchArgs>),
 }
 
-pub fn run(cli: &Cli) -> anyhow::Result<Outcome> {
-    match &cli.command {
+/// Runs `command` in the current folder, and prints its results.
+///
+/// # Errors
+/// With the file and the cause, or a [`Usage`].
+pub fn run(command: &Command) -> anyhow::Result<Outcome> {
+    match command {
         Command::Classify(args) => classify::run(args),
         Command::Sample(args) => sample::run(args),
         Command::Inspect(args) => inspect::run(args),
@@ -53,8 +49,8 @@ pub fn run(cli: &Cli) -> anyhow::Result<Outcome> {
 }
 
 /// Turns an error of a model or of options into a [`Usage`] if only another command line can help.
-fn of_setup(error: infer_cpu::Error) -> anyhow::Error {
-    use infer_cpu::Error;
+fn of_setup(error: crate::Error) -> anyhow::Error {
+    use crate::Error;
     match error {
         Error::KernelMissing(_)
         | Error::KernelPrecision { .. }

@@ -4,8 +4,8 @@ use std::io::{self, Write};
 use std::path::Path;
 use std::time::Duration;
 
+use crate::{Precision, Prediction};
 use formats::outcome::say;
-use infer_cpu::{Precision, Prediction};
 use serde::Serialize;
 
 #[derive(Clone, Copy, PartialEq, Eq)]

@@ -4,11 +4,11 @@ use std::collections::BTreeSet;
 use std::io::{Write, stdout};
 use std::path::PathBuf;
 
+use crate::sampler::{SamplerKind, SamplerSpec};
+use crate::{Classifier, Options};
 use anyhow::Context;
 use formats::cloud_file::{CloudFormat, write_cloud};
 use formats::outcome::say;
-use infer_cpu::sampler::{SamplerKind, SamplerSpec};
-use infer_cpu::{Classifier, Options};
 
 use super::input;
 use super::model::ModelArgs;
@@ -84,7 +84,7 @@ fn choose(args: &SampleArgs, points: &[[f64; 3]]) -> anyhow::Result<Vec<u32>> {
     if args.sampler != SamplerKind::Cpl {
         let spec = args.how.apply(Some(args.sampler), SamplerSpec::default())?;
         spec.check().map_err(|error| of_setup(error.into()))?;
-        return infer_cpu::choose(points, &spec).with_context(here);
+        return crate::choose(points, &spec).with_context(here);
     }
     let (model, card) = args.model.open()?;
     let spec = args.how.apply(Some(args.sampler), SamplerSpec::as_trained(&model, &card)?)?;

@@ -1,4 +1,4 @@
-use infer_cpu::sampler::{FpsStart, FrontChoice, Resize, SamplerKind, SamplerSpec};
+use crate::sampler::{FpsStart, FrontChoice, Resize, SamplerKind, SamplerSpec};
 
 use super::Usage;
 

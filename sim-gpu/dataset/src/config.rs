@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use sim_gpu::effects::Effects;
 use sim_gpu::internals::config::InvalidValue;
 use sim_gpu::internals::material::ColourSource;
-use sim_gpu::internals::mesh::frame::{Normalize, Up};
+use sim_gpu::internals::mesh::frame::{Normalize, Unit, Up};
 use sim_gpu::internals::sensor::Views;
 use sim_gpu::internals::simplify::Simplify;
 use sim_gpu::{Pose, Sensor};
@@ -22,6 +22,9 @@ pub struct DatasetConfig {
     pub seed: u64,
     /// How meshes are scaled into the world.
     pub normalize: Normalize,
+    /// The unit of the meshes' coordinates.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub units: Unit,
     /// The meshes' upward axis; `None` is each format's default.
     pub up: Option<Up>,
     /// How far meshes are simplified; not at all if `None`.
@@ -125,6 +128,7 @@ impl DatasetConfig {
         Self {
             seed: 0,
             normalize: Normalize::default(),
+            units: Unit::Metre,
             up: None,
             simplify: None,
             attributes: AttributeSet::new(),

@@ -15,7 +15,7 @@ use sim_gpu::effects::Effects;
 use sim_gpu::internals::bvh::Builder;
 use sim_gpu::internals::caster::OpenCaster;
 use sim_gpu::internals::config::{InvalidValue, within};
-use sim_gpu::internals::mesh::frame::{Normalize, Up};
+use sim_gpu::internals::mesh::frame::{Normalize, Unit, Up};
 use sim_gpu::internals::mesh::tree::MeshEntry;
 use sim_gpu::internals::scan::{ScanError, ScanRequest, scan};
 use sim_gpu::internals::sensor::{BeamPattern, Views};
@@ -142,7 +142,8 @@ impl Corrupted<'_> {
 
     /// The clouds of one mesh, by view and by set.
     fn draw(&self, entry: &MeshEntry, sets: &[CorruptedSet]) -> Result<Vec<Drawn>, DatasetError> {
-        let (_, mesh, kept) = read(entry, self.up, Normalize::UnitSphere, Hashing::None)?;
+        let (_, mesh, kept) =
+            read(entry, self.up, Unit::Metre, Normalize::UnitSphere, Hashing::None)?;
         if kept.is_empty() {
             let cause = "expected a triangle with an area, found none";
             return Err(MeshFailure::new(entry, cause).into());

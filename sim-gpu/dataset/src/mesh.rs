@@ -17,7 +17,7 @@ use sim_gpu::Scene;
 use sim_gpu::internals::bvh::Builder;
 use sim_gpu::internals::job::{Cast, CastJob};
 use sim_gpu::internals::material::{Material, MaterialChoice, MaterialError, Materials};
-use sim_gpu::internals::mesh::frame::{Normalize, Up, to_world};
+use sim_gpu::internals::mesh::frame::{Normalize, Unit, Up, to_world};
 use sim_gpu::internals::mesh::tree::MeshEntry;
 use sim_gpu::internals::mesh::validate::triangle_stats;
 use sim_gpu::internals::mesh::{LoadedMesh, TriangleMesh, load_hashed};
@@ -50,8 +50,9 @@ pub(crate) struct Prepared<'a> {
 /// Reads the mesh of `entry` and aims every beam that may hit it.
 pub(crate) fn prepare<'a>(run: &Run<'a>, entry: &MeshEntry) -> Result<Prepared<'a>, MeshFailure> {
     let (config, progress) = (run.plan.config, run.progress);
-    let (mut record, mesh, kept) =
-        progress.time(Stage::Read, || read(entry, config.up, config.normalize, config.hash))?;
+    let (mut record, mesh, kept) = progress.time(Stage::Read, || {
+        read(entry, config.up, config.units, config.normalize, config.hash)
+    })?;
     let materials = materials(entry, config)?;
     let id = record.entry.id();
     let centre = DVec3::from_array(record.views_around);
@@ -75,6 +76,9 @@ pub(crate) fn prepare<'a>(run: &Run<'a>, entry: &MeshEntry) -> Result<Prepared<'
     let builder = Builder::for_rays(surface.len(), views.iter().map(rays_of).sum());
     let target = progress.time(Stage::Build, || Target::new(surface, builder));
     let scene = view::scene(config, target, centre, materials);
+    if config.normalize == Normalize::None {
+        note_doubts(progress, &record.source, &scene, &views);
+    }
     let placed = view::placed(&scene);
     let jobs: Vec<CastJob> =
         progress.time(Stage::Aim, || views.iter().map(|view| view.aim(&placed)).collect());
@@ -83,6 +87,21 @@ pub(crate) fn prepare<'a>(run: &Run<'a>, entry: &MeshEntry) -> Result<Prepared<'
     progress.rays_cast.fetch_add(cast as u64, Relaxed);
     progress.rays_culled.fetch_add((beams - cast) as u64, Relaxed);
     Ok(Prepared { record, views, jobs, scene })
+}
+
+/// Notes what is probably wrong with the unit of a mesh or with the place of a sensor.
+fn note_doubts(progress: &Progress, source: &str, scene: &Scene, views: &[View]) {
+    let [instance] = scene.instances() else { return };
+    let sensors_m: Vec<DVec3> = views.iter().map(|view| view.pose().position_m).collect();
+    if let Some(doubt) = instance.mesh.doubtful_size() {
+        progress.note(format!("{source}: {doubt}; --units names another unit"));
+    }
+    if instance.mesh.surrounds(&sensors_m) {
+        progress.note(format!(
+            "{source}: a sensor stands inside its bounding box: expected a larger --distance, or \
+             another of --units"
+        ));
+    }
 }
 
 pub(crate) fn materials(
@@ -113,12 +132,14 @@ fn viewpoints<'a>(config: &'a DatasetConfig, id: &str, centre: DVec3) -> Vec<Vie
 pub(crate) fn read(
     entry: &MeshEntry,
     up: Option<Up>,
+    unit: Unit,
     normalize: Normalize,
     hashing: Hashing,
 ) -> Result<(MeshRecord, TriangleMesh, Vec<u32>), MeshFailure> {
     let (LoadedMesh { mesh, format, dropped_faces }, hash) = load_hashed(&entry.path, hashing)
         .map_err(|error| MeshFailure::unreadable(entry, &error))?;
     let up = up.unwrap_or(format.default_up());
+    let mesh = mesh.in_metres(unit);
     let world = to_world(&mesh, up, normalize);
     let stats = triangle_stats(&world.mesh);
     let (centre, views_around) = if normalize == Normalize::None {
@@ -131,8 +152,8 @@ pub(crate) fn read(
         source: entry.relative.clone(),
         hash,
         up,
-        centre: centre.to_array(),
-        scale: world.scale,
+        centre: (centre / unit.metres()).to_array(),
+        scale: world.scale * unit.metres(),
         views_around: views_around.to_array(),
         triangles: mesh.triangles.len() as u64,
         dropped_faces: dropped_faces as u64,

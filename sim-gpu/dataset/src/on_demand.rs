@@ -281,7 +281,8 @@ impl Clouds {
             return Ok(ready);
         }
         let (entry, config) = (&self.meshes[number], &self.config);
-        let (record, mesh, kept) = read(entry, config.up, config.normalize, Hashing::None)?;
+        let (record, mesh, kept) =
+            read(entry, config.up, config.units, config.normalize, Hashing::None)?;
         let materials = materials(entry, config)?;
         // Rays are cast at it in every epoch, which pays for the better tree.
         let target = Target::new(Surface::new(mesh, kept), Builder::Sah);

@@ -11,7 +11,7 @@ use formats::hash::Hashing;
 use formats::rng::StreamKey;
 use glam::DVec3;
 use sim_gpu::internals::bvh::Builder;
-use sim_gpu::internals::mesh::frame::{Normalize, Up};
+use sim_gpu::internals::mesh::frame::{Normalize, Unit, Up};
 use sim_gpu::internals::mesh::tree::MeshEntry;
 use sim_gpu::internals::sensor::Views;
 use sim_gpu::internals::surface_points::{area_uniform, seen_from};
@@ -66,7 +66,7 @@ pub fn write_surfaces(
 
 /// The clouds of one mesh: of set 0 its whole surface, of set 1 what each view sees of it.
 fn draw(mesh: &MeshEntry, config: &SurfaceConfig) -> Result<Vec<Drawn>, MeshFailure> {
-    let (_, in_world, kept) = read(mesh, config.up, config.normalize, Hashing::None)?;
+    let (_, in_world, kept) = read(mesh, config.up, Unit::Metre, config.normalize, Hashing::None)?;
     let surface = Surface::new(in_world, kept);
     let n = config.points as usize;
     let id = Entry::from(mesh).id();

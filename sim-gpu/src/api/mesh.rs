@@ -2,7 +2,7 @@
 
 use super::Error;
 use crate::bvh::Builder;
-use crate::mesh::frame::{Normalize, Up, WorldMesh, to_world, z_up};
+use crate::mesh::frame::{Normalize, Unit, Up, WorldMesh, to_world, z_up};
 use crate::mesh::unit_frame::bounding_box;
 use crate::mesh::{LoadedMesh, TriangleMesh, check, load};
 use crate::target::{Surface, Target};
@@ -55,14 +55,14 @@ impl Mesh {
     /// # Errors
     /// The file cannot be read, or is not what its extension says: with the file and the line.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, Error> {
-        Self::read_turned(path.as_ref(), None)
+        Self::read_in(path.as_ref(), None, Unit::Metre)
     }
 
-    /// As [`Mesh::read`], of a file whose upward axis may be another than its format's.
+    /// As [`Mesh::read`], of a file whose upward axis or unit may be another.
     #[doc(hidden)]
-    pub fn read_turned(path: &Path, up: Option<Up>) -> Result<Self, Error> {
+    pub fn read_in(path: &Path, up: Option<Up>, unit: Unit) -> Result<Self, Error> {
         let LoadedMesh { mesh, format, .. } = load(path)?;
-        Ok(Self::upright(mesh, up.unwrap_or(format.default_up())))
+        Ok(Self::upright(mesh.in_metres(unit), up.unwrap_or(format.default_up())))
     }
 
     /// A mesh of these vertices, `[n][3]` in metres, z up, and these triangles, `[m][3]` indices of

@@ -3,6 +3,7 @@
 mod caster;
 mod error;
 mod mesh;
+mod plausibility;
 mod scan;
 mod scan_builder;
 mod scene;

@@ -59,6 +59,7 @@ fn materials(object: &SceneObject) -> Result<Option<Materials>, Error> {
 /// The mesh of `object`, and what simplification made of it if it was asked for.
 fn mesh(file: &SceneFile, object: &SceneObject) -> Result<(Mesh, Option<Simplified>), Error> {
     let LoadedMesh { mesh, format, .. } = load(&object.mesh)?;
+    let mesh = mesh.in_metres(object.units);
     let up = object.up.unwrap_or(format.default_up());
     let normalize = object.normalize.unwrap_or(Normalize::None);
     match file.simplify_of(object) {

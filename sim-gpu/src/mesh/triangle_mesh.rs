@@ -1,5 +1,6 @@
 //! The mesh type of all formats.
 
+use super::frame::Unit;
 use glam::DVec3;
 
 /// A triangle mesh in f64.
@@ -9,6 +10,17 @@ pub struct TriangleMesh {
     pub vertices: Vec<DVec3>,
     /// Corners as indices into `vertices`, `[n_triangles, 3]`, in the file's order; all in range.
     pub triangles: Vec<[u32; 3]>,
+}
+
+impl TriangleMesh {
+    /// The same mesh in metres, from coordinates in this unit.
+    #[must_use]
+    pub fn in_metres(mut self, unit: Unit) -> Self {
+        if unit != Unit::Metre {
+            self.vertices.iter_mut().for_each(|vertex| *vertex *= unit.metres());
+        }
+        self
+    }
 }
 
 /// The result of parsing a mesh file.

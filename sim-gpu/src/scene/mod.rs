@@ -9,7 +9,7 @@ use glam::{DAffine3, DQuat, DVec3};
 use crate::config::{self, ConfigError, InvalidValue};
 use crate::effects::Effects;
 use crate::material::MaterialChoice;
-use crate::mesh::frame::{Normalize, Up};
+use crate::mesh::frame::{Normalize, Unit, Up};
 use crate::pose::{Pose, Trajectory};
 use crate::sensor::SensorProfile;
 use crate::simplify::Simplify;
@@ -51,6 +51,8 @@ pub struct SceneObject {
     pub up: Option<Up>,
     /// `unit-sphere`, `bbox` or `none`. `None`, the default, is `none`: the mesh keeps its units.
     pub normalize: Option<Normalize>,
+    /// The unit of its file; the metre by default.
+    pub units: Unit,
     /// The position of the mesh's origin, metres.
     pub position_m: DVec3,
     /// The rotation of the upright, scaled mesh.

@@ -13,7 +13,7 @@ use super::{SceneObject, SceneSensor};
 use crate::config::{InvalidValue, positive, within};
 use crate::effects::Effects;
 use crate::material::{ColourSource, MaterialChoice, MaterialTable};
-use crate::mesh::frame::{Normalize, Up};
+use crate::mesh::frame::{Normalize, Unit, Up};
 use crate::pose::{PoseKeys, Trajectory};
 use crate::sensor::SensorProfile;
 use crate::simplify::Simplify;
@@ -42,6 +42,8 @@ pub(super) struct ObjectTable {
     label: Option<String>,
     up: Option<Up>,
     normalize: Option<Normalize>,
+    #[serde(default)]
+    units: Unit,
     #[serde(default)]
     position_m: [f64; 3],
     yaw_deg: Option<f64>,
@@ -260,6 +262,7 @@ impl ObjectTable {
             label: self.label,
             up: self.up,
             normalize: self.normalize,
+            units: self.units,
             position_m: keys.position_m(&table)?,
             rotation: keys.rotation(&table)?.unwrap_or(DQuat::IDENTITY),
             motion: trajectory(key("trajectory"), folder, self.trajectory)?,

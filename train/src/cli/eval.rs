@@ -2,15 +2,15 @@ use std::collections::BTreeMap;
 use std::iter::repeat_n;
 use std::path::{Path, PathBuf};
 
+use crate::accuracy_report;
+use crate::clouds::Clouds;
+use crate::evaluate::confusion;
+use crate::object_report::{self, Labels, Object, Table, Truth, classified};
+use crate::run::MOST_POINTS;
 use formats::atomic;
 use formats::labelled::LabelledSet;
 use formats::split::Split;
 use infer_cpu::{Classifier, ModelCard, Options, Precision};
-use train::accuracy_report;
-use train::clouds::Clouds;
-use train::evaluate::confusion;
-use train::object_report::{self, Labels, Object, Table, Truth, classified};
-use train::run::MOST_POINTS;
 
 use super::Usage;
 

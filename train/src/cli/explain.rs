@@ -1,11 +1,11 @@
 use std::path::PathBuf;
 
+use crate::explanation_drawing;
+use crate::lime::{Explanation, Lime, explain};
+use crate::random_baseline::RandomBaseline;
 use formats::atomic;
 use infer_cpu::sampler::{Resize, SamplerKind, SamplerSpec};
 use infer_cpu::{Classifier, ModelCard, Normalization, Options};
-use train::explanation_drawing;
-use train::lime::{Explanation, Lime, explain};
-use train::random_baseline::RandomBaseline;
 
 use super::compare_points::read_finite;
 use super::{Usage, print};

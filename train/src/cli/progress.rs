@@ -1,8 +1,8 @@
 //! The progress of a training on standard error: a bar for the current epoch, and a line for each
 //! finished one.
 
+use crate::run::Progress;
 use indicatif::{ProgressBar, ProgressStyle};
-use train::run::Progress;
 
 const TEMPLATE: &str = "epoch {prefix} {bar:30} {pos}/{len} {msg} {eta} left";
 

@@ -1,9 +1,9 @@
 use std::path::PathBuf;
 
+use crate::clouds::Clouds;
+use crate::recipe::Recipe;
+use crate::run::{Job, points_to_read};
 use formats::split::Split;
-use train::clouds::Clouds;
-use train::recipe::Recipe;
-use train::run::{Job, points_to_read};
 
 use super::Usage;
 use super::progress::shown;

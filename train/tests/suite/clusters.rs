@@ -1,16 +1,10 @@
-use std::path::Path;
-
 use formats::labelled::LabelledSet;
-use formats::model_card::{ModelCard, Normalization};
-use formats::packed::{ClusterWriter, Remarks};
+use formats::model_card::Normalization;
 use formats::rng::StreamKey;
-use infer_cpu::{Classifier, Options};
 use train::augment::{TrainingCloud, augment};
 use train::clouds::Clouds;
 use train::cluster_variation::ClusterVariation;
 use train::recipe::{Augment, Recipe, Sampling};
-
-use crate::program::{stderr, train};
 
 /// Edges of boxes of each class, metres.
 const BOXES: [(&str, [f64; 3]); 3] =
@@ -132,88 +126,4 @@ fn variations_are_refused_where_they_mean_nothing() {
     assert!(error(Recipe { clusters, ..metric() }).contains("`clusters.density`"));
     let recipe = Recipe { keep_known: Some(0.95), validation: 0.0, ..metric() };
     assert!(error(recipe).contains("`validation`: expected more than 0"));
-}
-
-/// A set of `n` clusters of each class, of 10 to 90 points.
-fn write(path: &Path, n: usize, seed: u64) {
-    let classes = BOXES.map(|(name, _)| name.to_owned()).to_vec();
-    let mut writer = ClusterWriter::create(path, classes).unwrap();
-    for i in 0..3 * n {
-        let key = StreamKey::new(seed, "cluster", i as u32);
-        let points = cluster(i % 3, 10 + key.below(81, 0) as usize, key);
-        let remarks = Remarks {
-            name: &format!("{}_{i}_v0", BOXES[i % 3].0),
-            id: &format!("{i}#0"),
-            sensor: if i % 2 == 0 { "vlp32c" } else { "hdl64e" },
-            range_m: 3.0 + 0.1 * i as f32,
-            truth_share: 1.0,
-            height_m: f32::NAN,
-        };
-        writer.push(&points, i % 3, &remarks).unwrap();
-    }
-    writer.finish().unwrap();
-}
-
-#[test]
-fn a_network_of_clusters_is_trained_and_answers_unknown() {
-    let folder = tempfile::tempdir().unwrap();
-    write(&folder.path().join("train.npz"), 240, 1);
-    write(&folder.path().join("test.npz"), 30, 2);
-    let recipe = "points = 48\nbatch = 20\nepochs = 20\nsampling = \"random\"\n\
-        normalization = \"metric\"\nbalance = 1.0\nclouds_per_epoch = 200\n\
-        unknown = [\"wall\"]\nkeep_known = 0.95\n\
-        [network]\ninput_transform = false\nfeature_transform = false\ntrunk = [16, 32]\n\
-        head = [16]\n\
-        [augment]\ndrop = 0.0\nscale = [0.9, 1.1]\nshift = 0.0\nrotate_degrees = 180.0\n\
-        [clusters]\ndensity = [8, 64]\ncut = 0.1\n";
-    std::fs::write(folder.path().join("r.toml"), recipe).unwrap();
-    let ran = train(folder.path(), "train --data . --recipe r.toml --out m.safetensors");
-    assert!(ran.status.success(), "{}", stderr(&ran));
-    let path = folder.path().join("m.safetensors");
-    let card = ModelCard::read(&path).unwrap();
-    assert_eq!(card.normalization, Normalization::Metric);
-    assert_eq!(card.unknown_classes, ["wall"]);
-    assert!(card.unknown_energy.is_some() && card.temperature != 1.0);
-    let mut classifier = Classifier::load(&path, &Options::default()).unwrap();
-    let answers: Vec<String> = (0..3)
-        .map(|class| {
-            let points = cluster(class, 80, StreamKey::new(9, "cluster", class as u32));
-            classifier.classify(&points).unwrap().answer().to_owned()
-        })
-        .collect();
-    assert_eq!(answers, ["car", "person", "unknown"]);
-
-    let words = "eval --model m.safetensors --data test.npz --csv t.csv --svg t.svg --min-points 8";
-    let ran = train(folder.path(), words);
-    let text = String::from_utf8_lossy(&ran.stdout).into_owned();
-    assert!(ran.status.success(), "{}", stderr(&ran));
-    for expected in ["negatives  all", "car        hdl64e", "AUROC", "calibration error"] {
-        assert!(text.contains(expected), "{expected}: {text}");
-    }
-    let csv = std::fs::read_to_string(folder.path().join("t.csv")).unwrap();
-    assert!(csv.starts_with("class,group,hits,of,share,low,high\ncar,all,"), "{csv}");
-    let svg = std::fs::read_to_string(folder.path().join("t.svg")).unwrap();
-    let wrong: usize =
-        csv.lines().filter(|line| line.split(',').nth(1) == Some("all")).map(missed).sum();
-    assert!(svg.contains(&format!("{wrong} objects named wrongly")), "{wrong}: {svg:.500}");
-    let ran = train(folder.path(), "eval --model m.safetensors --data test.npz --known plane");
-    assert!(stderr(&ran).contains("--known: expected some of car, person, wall, found plane"));
-    assert_eq!(ran.status.code(), Some(2));
-}
-
-/// The objects of a line of the table that are not hit.
-fn missed(line: &str) -> usize {
-    let number = |column| line.split(',').nth(column).unwrap().parse::<usize>().unwrap();
-    number(3) - number(2)
-}
-
-#[test]
-fn a_class_that_is_to_be_unknown_must_be_one() {
-    let folder = tempfile::tempdir().unwrap();
-    write(&folder.path().join("train.npz"), 20, 1);
-    let recipe = "normalization = \"metric\"\nbatch = 10\nunknown = [\"tree\"]\n";
-    std::fs::write(folder.path().join("r.toml"), recipe).unwrap();
-    let ran = train(folder.path(), "train --data train.npz --recipe r.toml --out m.safetensors");
-    let error = stderr(&ran);
-    assert!(error.contains("`unknown`: expected some of the classes") && error.contains("`tree`"));
 }

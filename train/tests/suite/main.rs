@@ -7,8 +7,6 @@ mod clusters;
 mod export;
 mod gradients;
 mod init;
-mod killed;
-mod program;
 mod reference;
 mod resume;
 mod robust;

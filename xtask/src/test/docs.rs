@@ -1,57 +1,16 @@
-//! Builds the documentation in `docs` as a site, and runs its code blocks.
+//! Runs the code blocks of the documentation in `docs`.
 
-use super::meanwhile::{Meanwhile, nice};
 use super::peers::Programs;
 use super::python::{Wheel, counts, path_behind, pytest};
 use crate::summary::{Counts, Summary};
-use anyhow::{Context, anyhow, bail, ensure};
-use std::path::{Path, PathBuf};
+use anyhow::{Context, anyhow, bail};
+use std::path::Path;
 use std::process::Command;
 use xtask::venv::{self, cache_dir, succeeds};
-use xtask::workspace::{cargo, root};
-
-/// The version of mdBook, which builds the site.
-const MDBOOK: &str = "0.5.4";
+use xtask::workspace::root;
 
 /// Debian's Python, whose PyTorch has 100 MB and needs no GPU; that of PyPI has 5 GB.
 const SYSTEM_PYTHON: &str = "/usr/bin/python3";
-
-pub fn build_meanwhile(install: bool) -> Option<anyhow::Result<Meanwhile>> {
-    (install && !mdbook().exists()).then(|| {
-        let mut build = cargo(&["install", "mdbook", "--version", MDBOOK, "--locked"]);
-        build.args(["--no-default-features", "--features", "search", "--root"]);
-        build.arg(mdbook_folder()).current_dir(cache_dir());
-        // It runs for a second.
-        build.env("CARGO_PROFILE_RELEASE_OPT_LEVEL", "0");
-        std::fs::create_dir_all(cache_dir())?;
-        Meanwhile::start("mdbook-build", &mut nice(&build))
-    })
-}
-
-fn mdbook_folder() -> PathBuf {
-    cache_dir().join(format!("mdbook-{MDBOOK}"))
-}
-
-fn mdbook() -> PathBuf {
-    mdbook_folder().join("bin/mdbook")
-}
-
-/// Builds the site, under `target/site`.
-pub fn build_site(summary: &mut Summary, mdbook_build: Option<anyhow::Result<Meanwhile>>) {
-    summary.step("site", |summary| {
-        if let Some(build) = mdbook_build {
-            let (built, log) = build?.end()?;
-            ensure!(built.success(), "mdBook cannot be built: {log}");
-        }
-        if !mdbook().exists() {
-            return Ok(summary.skip("site", 1, "mdBook is missing"));
-        }
-        let mut build = Command::new(mdbook());
-        build.arg("build").arg(root().join("docs")).arg("--dest-dir");
-        succeeds(build.arg(root().join("target/site"))).map_err(|cause| anyhow!(cause))?;
-        Ok(Counts::PASSED)
-    });
-}
 
 /// Runs the code blocks of all pages, and the examples of the Python package with PyTorch, as a
 /// user who has installed the `wheel` and our `programs`.
@@ -86,13 +45,4 @@ fn run_with(wheel: &Wheel, programs: &Programs) -> anyhow::Result<Counts> {
     let folders = [Some(&*folder.join("bin")), program.parent()];
     tests.env("PATH", path_behind(folders.into_iter().flatten())?);
     counts(&mut tests)
-}
-
-#[cfg(test)]
-mod tests {
-    #[test]
-    fn releases_build_the_site_with_the_version_that_is_tested() {
-        let release = include_str!("../../../.github/workflows/docs.yml");
-        assert!(release.contains(&format!("mdbook --version {} ", super::MDBOOK)));
-    }
 }

@@ -1,7 +1,9 @@
 //! Checks of the source that neither rustc nor Clippy makes: modules do not depend on each other in
-//! circles, `unsafe` stands only where CONTRIBUTING.md allows it, and libraries do not print.
+//! circles, `unsafe` stands only where CONTRIBUTING.md allows it, libraries do not print, and links
+//! lead to files.
 
 mod circles;
+mod links;
 mod modules;
 mod tokens;
 
@@ -36,6 +38,7 @@ pub fn check(summary: &mut Summary) -> anyhow::Result<Counts> {
             "unsafe",
             crates.iter().flat_map(|found| misplaced_unsafe(found, &unsafe_allowed)).collect(),
         ),
+        ("links", links::broken()?),
         ("printing", crates.iter().flat_map(|found| printing(found, &printing_allowed)).collect()),
     ] {
         counts = counts.and(if faults.is_empty() { Counts::PASSED } else { Counts::FAILED });

@@ -7,9 +7,9 @@ use std::iter::repeat_n;
 use std::path::Path;
 use std::time::Instant;
 
+use crate::{Classifier, ClassifierTeam, ModelCard, Options, Precision, TNets};
 use anyhow::Context;
 use formats::rng::StreamKey;
-use infer_cpu::{Classifier, ClassifierTeam, ModelCard, Options, Precision, TNets};
 use serde::Serialize;
 
 use super::machine::Machine;

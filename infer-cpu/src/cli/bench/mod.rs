@@ -8,9 +8,9 @@ mod variant;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use crate::{Precision, TNets};
 #[cfg(feature = "npz")]
 use formats::labelled::read_labelled;
-use infer_cpu::{Precision, TNets};
 
 pub use latency::run;
 use variant::Variant;
@@ -54,7 +54,7 @@ pub struct BenchArgs {
 
     /// Kernels to use: scalar, avx2, avx512, neon, neon_f16, neon_dot [default: the fastest]
     #[arg(long)]
-    kernel: Option<infer_cpu::kernel::KernelName>,
+    kernel: Option<crate::kernel::KernelName>,
 
     /// Number of points in the clouds that the samplers choose from
     #[arg(long, default_value_t = 1024, value_name = "N")]
@@ -90,7 +90,7 @@ fn calibration(_: &BenchArgs, _: &Path) -> anyhow::Result<Option<BTreeMap<String
 #[cfg(feature = "npz")]
 fn calibration(args: &BenchArgs, model: &Path) -> anyhow::Result<Option<BTreeMap<String, f32>>> {
     let Some(path) = &args.calibrate else { return Ok(None) };
-    Ok(Some(infer_cpu::activation_ranges_of_set(model, &read_labelled(path)?)?))
+    Ok(Some(crate::activation_ranges_of_set(model, &read_labelled(path)?)?))
 }
 
 fn at_least_one(word: &str) -> Result<usize, String> {

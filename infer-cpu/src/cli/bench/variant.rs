@@ -3,9 +3,9 @@
 use std::fmt;
 use std::str::FromStr;
 
+use crate::Options;
+use crate::sampler::{SamplerKind, SamplerSpec};
 use formats::FormatError;
-use infer_cpu::Options;
-use infer_cpu::sampler::{SamplerKind, SamplerSpec};
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Variant {
@@ -66,7 +66,7 @@ impl fmt::Display for Variant {
 
 #[cfg(test)]
 mod tests {
-    use infer_cpu::sampler::{FrontChoice, Resize};
+    use crate::sampler::{FrontChoice, Resize};
 
     use super::*;
 

@@ -11,10 +11,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
+use crate::live::{EgoMotion, LiveOptions, Pipeline, Recorder};
+use crate::{Classifier, Options, Precision};
 use formats::ouster::Metadata;
 use glam::DVec3;
-use infer_cpu::live::{EgoMotion, LiveOptions, Pipeline, Recorder};
-use infer_cpu::{Classifier, Options, Precision};
 use signal_hook::consts::{SIGINT, SIGTERM};
 
 use super::model::ModelArgs;

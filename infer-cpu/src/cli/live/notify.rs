@@ -7,8 +7,8 @@ use std::io;
 use std::process;
 use std::time::{Duration, Instant};
 
+use crate::live::Counts;
 use anyhow::Context;
-use infer_cpu::live::Counts;
 
 use manager::Manager;
 

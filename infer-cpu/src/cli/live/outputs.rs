@@ -2,7 +2,7 @@
 
 use std::io::{self, BufWriter, ErrorKind, StdoutLock, Write};
 
-use infer_cpu::live::{Object, Pipeline, RecordError, Recorder};
+use crate::live::{Object, Pipeline, RecordError, Recorder};
 
 pub struct Outputs {
     lines: Option<BufWriter<StdoutLock<'static>>>,

@@ -1,6 +1,6 @@
 //! The report of `--stats`.
 
-use infer_cpu::live::{Pipeline, Stage};
+use crate::live::{Pipeline, Stage};
 
 use super::source::Read;
 

@@ -12,9 +12,9 @@ use std::sync::mpsc::{
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
+use crate::live::Arrival;
 use anyhow::Context;
 use formats::pcap;
-use infer_cpu::live::Arrival;
 use socket2::{Domain, Protocol, Socket, Type};
 
 /// The most packets in the queue: two thirds of a second of a VLP-32C.

@@ -5,10 +5,10 @@ use std::time::Duration;
 
 use formats::rng::StreamKey;
 
-use crate::program::folder;
+use super::folder;
 
 fn run(folder: &Path, out: &str) -> std::process::Child {
-    Command::new(env!("CARGO_BIN_EXE_edgepuck-train"))
+    Command::new(env!("CARGO_BIN_EXE_edgepuck"))
         .args(["train", "--data", ".", "--recipe", "small.toml", "--epochs", "40", "--out", out])
         .current_dir(folder)
         .stdout(Stdio::null())

@@ -1,0 +1,80 @@
+//! What is probably wrong with the unit or the place of a mesh.
+
+use super::Mesh;
+use crate::mesh::frame::Unit;
+use glam::DVec3;
+
+/// Sizes of meshes that are expected, metres: beyond them, the unit is probably another.
+const EXPECTED_M: std::ops::RangeInclusive<f64> = 0.01..=100.0;
+
+impl Mesh {
+    /// Why the unit of its source is probably not the metre, if its size says so.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn doubtful_size(&self) -> Option<String> {
+        let [low, high] = self.bounds_m().map(DVec3::from_array);
+        let size = high - low;
+        (!EXPECTED_M.contains(&size.max_element())).then(|| {
+            let likely = if size.max_element() > 1.0 { Unit::Millimetre } else { Unit::Inch };
+            format!(
+                "expected a size of 1 cm to 100 m, found {} if its unit is the metre ({} if it is {})",
+                shown(size),
+                shown(size * likely.metres()),
+                likely.plural()
+            )
+        })
+    }
+
+    /// Whether one of `sensors_m` stands inside its bounding box: it then sees the mesh from inside.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn surrounds(&self, sensors_m: &[DVec3]) -> bool {
+        let [low, high] = self.bounds_m().map(DVec3::from_array);
+        let is_inside = |sensor: &DVec3| sensor.cmpgt(low).all() && sensor.cmplt(high).all();
+        sensors_m.iter().any(is_inside)
+    }
+}
+
+/// `0.45 x 0.4 x 0.9 m`.
+fn shown(size: DVec3) -> String {
+    let [x, y, z] = size.to_array().map(|side| format!("{:.3e}", side).parse().unwrap_or(side));
+    format!("{x} x {y} x {z} m")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tetrahedron(size: f64) -> Mesh {
+        let corners = [[0.0; 3], [size, 0.0, 0.0], [0.0, size, 0.0], [0.0, 0.0, size]];
+        Mesh::from_triangles(corners.to_vec(), vec![[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]])
+            .unwrap()
+    }
+
+    #[test]
+    fn sizes_of_another_unit_are_doubted_with_both_sizes() {
+        for (size, expected) in [
+            (
+                950.0,
+                Some(
+                    "950 x 950 x 950 m if its unit is the metre (0.95 x 0.95 x 0.95 m if it is millimetres)",
+                ),
+            ),
+            (0.002, Some("0.002 x 0.002 x 0.002 m")),
+            (0.01, None),
+            (100.0, None),
+        ] {
+            let found = tetrahedron(size).doubtful_size();
+            assert_eq!(found.is_some(), expected.is_some(), "{size}: {found:?}");
+            let (found, part) = (found.unwrap_or_default(), expected.unwrap_or_default());
+            assert!(found.contains(part), "{found}");
+        }
+    }
+
+    #[test]
+    fn a_sensor_inside_the_bounding_box_is_found() {
+        let mesh = tetrahedron(2.0);
+        assert!(mesh.surrounds(&[DVec3::splat(9.0), DVec3::splat(1.9)]));
+        assert!(!mesh.surrounds(&[DVec3::new(1.0, 1.0, 2.0), DVec3::splat(-0.1)]));
+    }
+}
