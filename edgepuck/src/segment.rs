@@ -2,10 +2,11 @@ use crate::{Outcome, Usage, preview};
 use edgepuck_segment::{Label, Segmentation, Segmenter, Settings, Sweep};
 use formats::cloud_file::{read_cloud, read_intensities, write_cloud};
 use formats::scan_file::read_scan;
-use formats::{FormatError, Scan, atomic, ouster, velodyne};
+use formats::{FormatError, Scan, Senders, atomic, ouster, velodyne};
 use plotters::style::{Color, HSLColor, RGBColor};
 use std::borrow::Cow;
 use std::io::Write;
+use std::net::IpAddr;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -21,6 +22,10 @@ pub struct SweepArgs {
     /// Metadata (JSON) of the Ouster OS0, OS1 or OS2 whose packets are in the capture SWEEP
     #[arg(long, value_name = "FILE")]
     metadata: Option<PathBuf>,
+
+    /// Address of the sensor whose packets are used [default: the first sensor of the capture]
+    #[arg(long, value_name = "ADDRESS")]
+    from: Option<IpAddr>,
 
     /// Position of the sensor in the sweep, in metres [default: 0 0 0]
     #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true)]
@@ -112,17 +117,22 @@ impl SweepArgs {
         given.unwrap_or_default()
     }
 
-    /// The first turn, if the sweep is a capture.
+    /// The first turn of a sensor, if the sweep is a capture.
     fn read_capture(&self) -> Result<Option<Scan>, FormatError> {
-        if let Some(file) = &self.metadata {
-            let metadata = ouster::Metadata::read(file)?;
-            return ouster::read_frame(&self.sweep, &metadata).map(Some);
-        }
         let is = |end: &str| self.sweep.extension().is_some_and(|it| it.eq_ignore_ascii_case(end));
-        match is("pcap") || is("pcapng") {
-            true => velodyne::read_turn(&self.sweep).map(Some),
-            false => Ok(None),
+        let mut senders = Senders::new(self.from);
+        let scan = match &self.metadata {
+            Some(file) => {
+                let metadata = ouster::Metadata::read(file)?;
+                ouster::read_frame(&self.sweep, &metadata, &mut senders)?
+            }
+            None if is("pcap") || is("pcapng") => velodyne::read_turn(&self.sweep, &mut senders)?,
+            None => return Ok(None),
+        };
+        if let Some(warning) = senders.warning() {
+            eprintln!("warning: {}: {warning}", self.sweep.display());
         }
+        Ok(Some(scan))
     }
 
     /// The title of a picture of the sweep.

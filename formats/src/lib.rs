@@ -102,6 +102,8 @@ mod python_literal;
 #[cfg(feature = "files")]
 mod records;
 
+#[cfg(feature = "pcap")]
+pub use capture::Senders;
 pub use error::FormatError;
 pub use scan::{Attribute, AttributeSet, Scan};
 pub use split::Split;

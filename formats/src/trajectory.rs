@@ -76,6 +76,58 @@ fn pose_of(line: &str, at_s: f64) -> Result<KeyedPose, String> {
     Ok(KeyedPose { time_s, position_m, quaternion_xyzw: quaternion.map(|q| q / length) })
 }
 
+/// Times of packets that are further outside of poses have none: a recording may begin and end
+/// within a turn.
+const TURN_S: f64 = 0.1;
+/// From the start of Unix time to that of GPS time, less the leap seconds since (IS-GPS-200,
+/// 20.3.3.5.2.4; 18 since 2017), and a week: seconds.
+const UNIX_OF_GPS_S: f64 = 315_964_800.0 - 18.0;
+const WEEK_S: f64 = 604_800.0;
+/// TAI, the time of PTP's masters, less Unix time since 2017, seconds.
+const TAI_S: f64 = 37.0;
+
+/// Checks that poses whose first and last times are `known_s` cover the packets that were sent in
+/// `sent_s`, Unix time in seconds. A single pose covers all times.
+///
+/// # Errors
+/// Both spans, and what the times seem to be.
+pub fn check_cover(known_s: [f64; 2], sent_s: [f64; 2]) -> Result<(), String> {
+    let [first, last] = known_s;
+    let cover =
+        |shift: f64| first + shift <= sent_s[0] + TURN_S && sent_s[1] <= last + shift + TURN_S;
+    if first == last || cover(0.0) {
+        return Ok(());
+    }
+    let meet = |shift: f64, sent: f64| (first + shift - 1.0..=last + shift + 1.0).contains(&sent);
+    let seem = |what: &str, shift: f64| format!("they seem to be {what}: add {shift} s to each");
+    let clue = match first.abs() {
+        1e17.. => "they seem to be nanoseconds: divide them by 1e9".to_owned(),
+        1e14.. => "they seem to be microseconds: divide them by 1e6".to_owned(),
+        1e11.. => "they seem to be milliseconds: divide them by 1e3".to_owned(),
+        _ if meet(UNIX_OF_GPS_S, sent_s[0]) => seem("GPS time", UNIX_OF_GPS_S),
+        _ if cover(-TAI_S) => seem("TAI, as of PTP", -TAI_S),
+        ..1e8 if sent_s[0] > 1e8 => {
+            let week_s = (sent_s[0] - UNIX_OF_GPS_S).rem_euclid(WEEK_S);
+            match meet(0.0, week_s) {
+                true => seem("seconds of a GPS week", sent_s[0] - week_s),
+                false => "they seem to count from the start of a drive, as do KITTI's lines of 12 \
+                          numbers, which have no times: add its Unix time to each"
+                    .to_owned(),
+            }
+        }
+        _ if sent_s[0] < 1e8 => "the packets seem to have no Unix times".to_owned(),
+        _ if last < sent_s[0] || first > sent_s[1] => {
+            "they seem to be of another clock or drive".to_owned()
+        }
+        _ => "they must cover all packets".to_owned(),
+    };
+    Err(format!(
+        "expected poses from {:.3} s to {:.3} s, Unix time, when the packets were sent, found poses \
+         from {first:.3} s to {last:.3} s; {clue}",
+        sent_s[0], sent_s[1]
+    ))
+}
+
 /// The rotation of the matrix with these rows, from the largest component of the quaternion
 /// (Shepperd 1978).
 fn quaternion_of(rows: [[f64; 3]; 3]) -> Result<[f64; 4], String> {
@@ -156,5 +208,40 @@ mod tests {
         for (text, expected) in cases {
             assert_eq!(read(text).unwrap_err(), expected);
         }
+    }
+
+    /// 2025-03-02T00:10:00 UTC is Unix time 1740874200 s, and, 18 leap seconds later, 618 s of week
+    /// 2356 of GPS time.
+    #[test]
+    fn poses_that_do_not_cover_the_packets_are_refused_with_the_likely_cause() {
+        let sent_s = [1_740_874_200.0, 1_740_874_260.0];
+        let cover = |first: f64, last: f64| check_cover([first, last], sent_s);
+        let [from, to] = sent_s;
+        for [first, last] in [[from, to], [from + 0.09, to - 0.09], [0.0, 2e9], [7.0, 7.0]] {
+            assert_eq!(cover(first, last), Ok(()));
+        }
+        let gps_s = f64::from(2356 * 7 * 86_400 + 618);
+        let cases = [
+            ([from * 1e9, to * 1e9], "nanoseconds: divide them by 1e9"),
+            ([from * 1e6, to * 1e6], "microseconds: divide them by 1e6"),
+            ([from * 1e3, to * 1e3], "milliseconds: divide them by 1e3"),
+            ([gps_s, gps_s + 60.0], "GPS time: add 315964782 s to each"),
+            ([618.0, 678.0], "seconds of a GPS week: add 1740873582 s to each"),
+            ([from + 37.0, to + 37.0], "TAI, as of PTP: add -37 s to each"),
+            ([0.0, 60.0], "count from the start of a drive, as do KITTI's"),
+            ([from - 7200.0, to - 7200.0], "another clock or drive"),
+            ([from, to - 10.0], "must cover all packets"),
+            ([from + 10.0, to], "must cover all packets"),
+        ];
+        for ([first, last], clue) in cases {
+            let cause = cover(first, last).unwrap_err();
+            let start = format!(
+                "expected poses from 1740874200.000 s to 1740874260.000 s, Unix time, when the \
+                 packets were sent, found poses from {first:.3} s to {last:.3} s; they "
+            );
+            assert!(cause.starts_with(&start) && cause.contains(clue), "{cause}");
+        }
+        let cause = check_cover(sent_s, [0.0, 60.0]).unwrap_err();
+        assert!(cause.ends_with("the packets seem to have no Unix times"), "{cause}");
     }
 }

@@ -4,6 +4,7 @@
 use std::fs;
 use std::path::Path;
 
+use formats::Senders;
 use formats::ouster::{Decoder, Header, Metadata, PacketError, Profile, read_frame};
 use formats::returns::{Kind, Return};
 use formats::velodyne;
@@ -319,7 +320,7 @@ fn the_first_whole_frame_of_a_capture_is_read_also_from_fragments() {
     let metadata = parse(&flat(Profile::Dual)).unwrap();
     let read = |frames: &[Vec<u8>]| {
         fs::write(&path, pcapng(frames)).unwrap();
-        read_frame(&path, &metadata).map_err(|error| error.to_string())
+        read_frame(&path, &metadata, &mut Senders::default()).map_err(|error| error.to_string())
     };
     let scan = read(&capture(1480)).unwrap();
     assert_eq!(scan.len(), 32 * 3 * 2);
@@ -347,7 +348,7 @@ fn a_capture_without_a_whole_frame_is_named() {
     let path = folder.path().join("frames.pcapng");
     let read = |frames: &[Vec<u8>], metadata: &Value| {
         fs::write(&path, pcapng(frames)).unwrap();
-        let scan = read_frame(&path, &parse(metadata).unwrap());
+        let scan = read_frame(&path, &parse(metadata).unwrap(), &mut Senders::default());
         scan.map_err(|error| error.to_string().split_once("pcapng: ").unwrap().1.to_owned())
     };
     let mut metadata = flat(Profile::Dual);

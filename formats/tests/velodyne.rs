@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use formats::hash::Hashing;
 use formats::velodyne::{Decoder, Header, Model, PacketError, count_returns, read_turn};
 use formats::vlp32c::{Returns, Revolution, write};
-use formats::{FormatError, Scan};
+use formats::{FormatError, Scan, Senders};
 use proptest::prelude::*;
 use test_support::{need, shared_data};
 
@@ -41,7 +41,7 @@ fn capture(folder: &Path, returns: Returns) -> PathBuf {
 fn a_turn_that_was_written_is_read_to_the_units_of_its_packets() {
     let folder = tempfile::tempdir().unwrap();
     for returns in Returns::ALL {
-        let scan = read_turn(&capture(folder.path(), returns)).unwrap();
+        let scan = read_turn(&capture(folder.path(), returns), &mut Senders::default()).unwrap();
         let path = folder.path().join("turn.pcap");
         assert_eq!(count_returns(&path).unwrap(), u64::from(REVOLUTION.n_beams), "{returns}");
         assert_eq!(scan.len(), REVOLUTION.n_beams as usize, "{returns}");
@@ -73,7 +73,7 @@ fn a_turn_that_was_written_is_read_to_the_units_of_its_packets() {
 fn pcapng_and_vlan_change_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let classic = capture(folder.path(), Returns::Strongest);
-    let expected = read_turn(&classic).unwrap();
+    let expected = read_turn(&classic, &mut Senders::default()).unwrap();
     let frames = frames(&fs::read(&classic).unwrap());
     let tagged: Vec<Vec<u8>> = frames
         .iter()
@@ -82,8 +82,53 @@ fn pcapng_and_vlan_change_nothing() {
     let path = folder.path().join("turn.pcapng");
     for frames in [frames, tagged] {
         fs::write(&path, pcapng(&frames)).unwrap();
-        assert_eq!(read_turn(&path).unwrap(), expected);
+        assert_eq!(read_turn(&path, &mut Senders::default()).unwrap(), expected);
     }
+}
+
+/// A second sensor of the model at another address, whose ranges are the first's plus 16.384 m, and
+/// another program of the network.
+#[test]
+fn of_two_sensors_one_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let alone = capture(folder.path(), Returns::Strongest);
+    let path = folder.path().join("two.pcapng");
+    let (mut second, mut both) = (Vec::new(), vec![b"\xff\xff\xff\xff\xff\xff".repeat(4)]);
+    for frame in frames(&fs::read(&alone).unwrap()) {
+        let mut other = frame.clone();
+        other[26..30].copy_from_slice(&[10, 0, 0, 7]);
+        for block in other[PROTOCOLS..][..1200].chunks_mut(100) {
+            block[4..].chunks_mut(3).for_each(|range| range[1] ^= 0x10);
+        }
+        let mut chatter = other[..PROTOCOLS + 20].to_vec();
+        chatter[16..18].copy_from_slice(&[0, 48]);
+        chatter[38..40].copy_from_slice(&[0, 28]);
+        chatter[29] = 9;
+        both.extend([chatter, frame, other.clone()]);
+        second.push(other);
+    }
+    fs::write(&path, pcapng(&second)).unwrap();
+    let expected = [&alone, &path].map(|path| read_turn(path, &mut Senders::default()).unwrap());
+    assert_ne!(expected[0], expected[1]);
+    fs::write(&path, pcapng(&both)).unwrap();
+    let mut senders = Senders::default();
+    assert_eq!(read_turn(&path, &mut senders).unwrap(), expected[0]);
+    let n = both.len() as u64 / 3;
+    let warning = format!(
+        "expected packets of one sensor, found those of 192.168.1.201, which are used, and of \
+         10.0.0.7 ({n} so far), which are not; --from ADDRESS chooses another"
+    );
+    assert_eq!((senders.warning(), senders.n_dropped()), (Some(warning), 2 * n - 1));
+    let mut chosen = Senders::new(Some([10, 0, 0, 7].into()));
+    assert_eq!(read_turn(&path, &mut chosen).unwrap(), expected[1]);
+    assert_eq!(chosen.warning(), None);
+    let error = read_turn(&path, &mut Senders::new(Some([10, 0, 0, 1].into()))).unwrap_err();
+    let found = format!(
+        "found none among {0} UDP packets, {0} of them from other addresses than 10.0.0.1: \
+         10.0.0.9, 192.168.1.201, 10.0.0.7",
+        3 * n
+    );
+    assert!(error.to_string().ends_with(&found), "{error}");
 }
 
 #[test]
@@ -94,7 +139,7 @@ fn what_is_no_turn_is_named() {
     let error = |bytes: &[u8]| -> String {
         let path = folder.path().join("x.pcap");
         fs::write(&path, bytes).unwrap();
-        let error: FormatError = read_turn(&path).unwrap_err();
+        let error: FormatError = read_turn(&path, &mut Senders::default()).unwrap_err();
         error.to_string().split_once("x.pcap").unwrap().1.to_owned()
     };
     assert_eq!(error(b""), ": header: expected a capture, pcap or pcapng");

@@ -4,22 +4,28 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use super::{Decoder, Header, Metadata, PacketError};
-use crate::capture::{Points, each_packet};
+use crate::capture::{Points, Senders, each_packet};
 use crate::error::FormatError;
 use crate::scan::Scan;
 
 /// Reads the first complete frame of the capture at `path`, pcap or pcapng: points in the sensor's
 /// frame, ranges, rings, times in seconds since the frame's first packet, and reflectivities divided
-/// by 255. UDP packets of another length than lidar packets are skipped.
+/// by 255. UDP packets of another length than lidar packets or of another of the `senders` are
+/// skipped.
 ///
 /// # Errors
 /// A file that is not such a capture or has no complete frame; a packet that cannot be decoded,
 /// with its number.
-pub fn read_frame(path: &Path, metadata: &Metadata) -> Result<Scan, FormatError> {
+pub fn read_frame(
+    path: &Path,
+    metadata: &Metadata,
+    senders: &mut Senders,
+) -> Result<Scan, FormatError> {
     let decoder = Decoder::new(metadata);
     let (mut frame, mut most) = (Frame::default(), 0);
     let expected = usize::from(metadata.columns_per_frame - metadata.n_columns_unsent());
-    let n_packets = each_packet(path, |payload| {
+    let is_data = |payload: &[u8]| decoder.header(payload).is_ok();
+    let n_packets = each_packet(path, senders, is_data, |payload| {
         if payload.len() != decoder.packet_size() {
             return Ok(ControlFlow::Continue(()));
         }
@@ -35,7 +41,7 @@ pub fn read_frame(path: &Path, metadata: &Metadata) -> Result<Scan, FormatError>
     if most < expected {
         let cause = format!(
             "expected a whole frame of {expected} columns, found {most} at most among \
-             {n_packets} UDP packets"
+             {n_packets} UDP packets{senders}"
         );
         return Err(FormatError::malformed(path, "packets", cause));
     }

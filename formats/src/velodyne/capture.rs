@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::packet::{TURN, advance};
 use super::{Decoder, Header, Model, PacketError};
-use crate::capture::{Points, each_packet};
+use crate::capture::{Points, Senders, each_packet};
 use crate::error::FormatError;
 use crate::returns::Kind;
 use crate::scan::Scan;
@@ -20,7 +20,8 @@ use crate::vlp32c::{AZIMUTH_UNIT_DEG, Returns, WHITE};
 pub fn count_returns(path: &Path) -> Result<u64, FormatError> {
     let decoder = Decoder::new(Model::Vlp32c);
     let mut count = 0;
-    each_packet(path, |payload| {
+    let is_data = |payload: &[u8]| Header::parse(payload).is_ok();
+    each_packet(path, &mut Senders::default(), is_data, |payload| {
         let (mut all, mut strongest) = (0, 0);
         let header = decoder.decode(payload, |found| {
             all += 1;
@@ -35,18 +36,20 @@ pub fn count_returns(path: &Path) -> Result<u64, FormatError> {
 
 /// Reads the first complete turn of a VLP-16 or VLP-32C in the capture at `path`, pcap or pcapng:
 /// points in the sensor's frame, ranges, rings, times in seconds since the first packet, and
-/// reflectivities divided by 100. UDP packets of another length are skipped.
+/// reflectivities divided by 100. UDP packets of another length or of another of the `senders` are
+/// skipped.
 ///
 /// # Errors
 /// A file that is not such a capture or has no complete turn; a packet that cannot be decoded,
 /// with its number.
-pub fn read_turn(path: &Path) -> Result<Scan, FormatError> {
+pub fn read_turn(path: &Path, senders: &mut Senders) -> Result<Scan, FormatError> {
     let mut turn = Turn::default();
-    let n_packets = each_packet(path, |payload| turn.take(payload))?;
+    let is_data = |payload: &[u8]| Header::parse(payload).is_ok();
+    let n_packets = each_packet(path, senders, is_data, |payload| turn.take(payload))?;
     // Rounding may lose a unit.
     if turn.end() < f64::from(TURN) - 1.0 {
         let found = match turn.decoder {
-            None => format!("none among {n_packets} UDP packets"),
+            None => format!("none among {n_packets} UDP packets{senders}"),
             Some(_) => format!("{:.1} degrees of one", turn.end() * AZIMUTH_UNIT_DEG),
         };
         let cause = format!("expected a turn of a VLP-16 or VLP-32C, found {found}");

@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use formats::FormatError;
-use formats::trajectory::{KeyedPose, read_trajectory};
+use formats::trajectory::{KeyedPose, check_cover, read_trajectory};
 use glam::{DQuat, DVec3};
 
 /// The position and orientation of the sensor.
@@ -77,6 +77,15 @@ impl EgoMotion {
                 }
             }
         }
+    }
+
+    /// Checks that the poses cover packets that were sent from the first to the second of these
+    /// Unix times, seconds, to within a turn. A twist and a single pose cover all times.
+    ///
+    /// # Errors
+    /// Both spans, and what the times of the poses seem to be.
+    pub fn check_cover(&self, sent_s: [f64; 2]) -> Result<(), String> {
+        self.known_s().map_or(Ok(()), |known_s| check_cover(known_s, sent_s))
     }
 
     /// The times of the first and the last pose; `None` for a twist.

@@ -33,6 +33,7 @@ mod pipeline;
 mod recorder;
 mod sensor;
 mod stats;
+mod timeline;
 mod tracker;
 
 pub use counts::Counts;
@@ -43,3 +44,4 @@ pub use pipeline::{Arrival, Decoded, LiveError, LiveOptions, Pipeline};
 pub use recorder::{RecordError, Recorder};
 pub use sensor::Flaw;
 pub use stats::{Stage, Stats};
+pub use timeline::Timeline;

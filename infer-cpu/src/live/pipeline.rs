@@ -46,11 +46,20 @@ pub struct LiveOptions {
     pub ego_motion: Option<EgoMotion>,
     /// The metadata of an Ouster; without it, the sensor is a Velodyne.
     pub ouster: Option<Metadata>,
+    /// Whether the packets come from a recording, whose times of arrival may have been changed
+    /// since. Then the sensor's stamps give the intervals between packets.
+    pub is_recorded: bool,
 }
 
 impl Default for LiveOptions {
     fn default() -> Self {
-        Self { min_points: 20, segmentation: Settings::default(), ego_motion: None, ouster: None }
+        Self {
+            min_points: 20,
+            segmentation: Settings::default(),
+            ego_motion: None,
+            ouster: None,
+            is_recorded: false,
+        }
     }
 }
 
@@ -83,6 +92,12 @@ impl Arrival {
         // A clock before 1970 is not set; its time is taken as 0.
         let time_s = since.map_or(0.0, |since| since.as_secs_f64());
         Self { time_s, moment: Some(Instant::now()) }
+    }
+
+    /// The arrival at a valid time: a capture may have any time stamp.
+    pub(super) fn likely(self) -> Self {
+        let time_s = if LIKELY_S.contains(&self.time_s) { self.time_s } else { 0.0 };
+        Self { time_s, ..self }
     }
 }
 
@@ -194,13 +209,9 @@ impl Pipeline {
     }
 
     /// Processes a packet. [`Pipeline::answer`] then reports the clusters that it completes.
-    pub fn take(&mut self, payload: &[u8], mut arrival: Arrival) {
-        // A capture may have any time stamp.
-        if !LIKELY_S.contains(&arrival.time_s) {
-            arrival.time_s = 0.0;
-        }
+    pub fn take(&mut self, payload: &[u8], arrival: Arrival) {
         self.taken_s = None;
-        let Err(flaw) = self.take_data(payload, arrival) else { return };
+        let Err(flaw) = self.take_data(payload, arrival.likely()) else { return };
         self.counts.foreign += 1;
         if let Some(sensor) = &mut self.sensor {
             sensor.n_foreign += 1;
@@ -212,6 +223,10 @@ impl Pipeline {
                 self.tracker.forget();
             }
         }
+        self.note(flaw);
+    }
+
+    fn note(&mut self, flaw: Flaw) {
         if !self.flaws.iter().any(|known| known.is_like(&flaw)) {
             self.flaws.push(flaw);
         }
@@ -230,6 +245,9 @@ impl Pipeline {
         stats.spend(Stage::Decode, decoded - start);
         let (succession, time_s) =
             sensor.clock.take(facts.stamp_us, facts.duration_us, arrival.time_s);
+        if let Some([recorded_s, stamped_s]) = sensor.clock.disagreement_s() {
+            self.note(Flaw::Times { recorded_s, stamped_s });
+        }
         if self.is_in_order(succession, &facts) {
             self.taken_s = Some(time_s);
             self.segment(&facts, Tag { time_s, moment: arrival.moment });
@@ -398,7 +416,7 @@ impl Sensor {
         settings.column_width_deg = settings.column_width_deg.max(step_deg.min(WIDEST_DEG));
         let stream = Stream::new(settings, n_rings * ROOM_PER_RING)
             .expect("invariant: settings were checked, and a sensor's elevations are right");
-        let clock = PacketClock::new(decoder.wraps_us());
+        let clock = PacketClock::new(decoder.wraps_us(), options.is_recorded);
         Ok(Self { decoder, clock, stream, start_s, n_foreign: 0 })
     }
 

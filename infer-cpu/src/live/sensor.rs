@@ -7,8 +7,8 @@ use formats::returns::Return;
 use formats::vlp32c::SEQUENCE_US;
 use formats::{ouster, velodyne};
 
-/// Why a payload is not the sensor's data.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+/// Why a payload is not the sensor's data, or its time is doubtful.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Flaw {
     /// An error of a Velodyne packet.
@@ -17,6 +17,17 @@ pub enum Flaw {
     /// An error of an Ouster packet.
     #[error(transparent)]
     Ouster(#[from] ouster::PacketError),
+    /// The times of a recording contradict the sensor's stamps. Its packets are used nonetheless.
+    #[error(
+        "by the times of the recording, {recorded_s:.3} s have passed since the first packet, and by \
+         the sensor's stamps {stamped_s:.3} s: the stamps are used"
+    )]
+    Times {
+        /// The time since the first packet by the recording, seconds.
+        recorded_s: f64,
+        /// The same by the stamps.
+        stamped_s: f64,
+    },
 }
 
 impl Flaw {
@@ -30,6 +41,7 @@ impl Flaw {
         match (self, other) {
             (Self::Velodyne(a), Self::Velodyne(b)) => discriminant(a) == discriminant(b),
             (Self::Ouster(a), Self::Ouster(b)) => discriminant(a) == discriminant(b),
+            (Self::Times { .. }, Self::Times { .. }) => true,
             _ => false,
         }
     }

@@ -9,7 +9,7 @@ use std::time::Duration;
 use serde_json::Value;
 
 use crate::program::Folder;
-use crate::street::{PACKET_S, PACKETS_PER_S, capture, packets, street};
+use crate::street::{PACKET_S, PACKETS_PER_S, Thing, capture, capture_of, packets, street};
 
 pub const LIVE: &str = "live --model m.safetensors --threads 1";
 
@@ -96,6 +96,110 @@ fn poses_bring_objects_into_the_world() {
     assert_eq!(steady[0]["frame"], "world");
 }
 
+/// The capture is from 1000 s to 1000.9993 s: the last of 754 packets of 1.327104 ms.
+#[test]
+fn poses_that_do_not_cover_the_capture_are_refused_before_any_output() {
+    let folder = folder();
+    let line = |time: &str| format!("{time} 0 0 0 0 0 0 1\n");
+    let kitti = "1 0 0 0 0 1 0 0 0 0 1 0\n".repeat(20);
+    let cases = [
+        (kitti, "0.000 s to 1.900 s; the packets seem to have no Unix times"),
+        (line("0") + &line("1"), "0.000 s to 1.000 s; the packets seem to have no Unix times"),
+        (line("1000e9") + &line("1001e9"), "1001000000000.000 s; they seem to be milliseconds"),
+        (line("1000") + &line("1000.8"), "1000.000 s to 1000.800 s; "),
+        (line("1000.2") + &line("1002"), "1000.200 s to 1002.000 s; "),
+    ];
+    for (poses, found) in cases {
+        folder.write("p.tum", poses);
+        let ran = folder.run(&format!("{LIVE} --pcap drive.pcap --poses p.tum --mcap p.mcap"));
+        let expected = "error: p.tum: times: expected poses from 1000.000 s to 1000.999 s, Unix \
+                        time, when the packets were sent, found poses from ";
+        ran.assert_refused(1, expected);
+        assert!(ran.err.contains(found) && !folder.path("p.mcap").exists(), "{}", ran.err);
+    }
+    // A pipe is read once: the packets after the last pose have no answers.
+    folder.write("p.tum", line("1000") + &line("1000.5"));
+    let mut command = folder.command(&format!("{LIVE} --pcap /dev/stdin --poses p.tum"));
+    let capture = std::fs::File::open(folder.path("drive.pcap")).unwrap();
+    let mut cat = Command::new("cat").stdin(capture).stdout(Stdio::piped()).spawn().unwrap();
+    let output = command.stdin(cat.stdout.take().unwrap()).output().unwrap();
+    let err = String::from_utf8(output.stderr).unwrap();
+    assert!(err.contains("expected poses from 1000.000 s to 1000.6"), "{err}");
+    assert_eq!(output.status.code(), Some(1));
+    drop(command);
+    cat.wait().unwrap();
+}
+
+#[test]
+fn of_two_sensors_one_is_used_and_the_other_is_told_of_once() {
+    let folder = folder();
+    let sent = packets(&street(), 7, PACKETS_PER_S);
+    let elsewhere = [Thing { at: [4.0, 8.0], velocity: [0.0; 2], size: [3.0, 2.0, 2.0] }];
+    let others = packets(&elsewhere, 90_000_000, PACKETS_PER_S);
+    let time_us = |i: usize| 1_000_000_000 + (i as f64 * PACKET_S * 1e6) as u64;
+    let both =
+        sent.iter().zip(&others).enumerate().flat_map(|(i, (one, other))| {
+            [(time_us(i), 201, &one[..]), (time_us(i), 202, &other[..])]
+        });
+    folder.write("two.pcap", capture_of(both));
+    let other = others.iter().enumerate().map(|(i, packet)| (time_us(i), &packet[..]));
+    folder.write("other.pcap", capture(other));
+    let alone = folder.run(&format!("{LIVE} --pcap drive.pcap")).out;
+    let ran = folder.run(&format!("{LIVE} --pcap two.pcap --json --stats"));
+    assert_eq!((ran.code, ran.out), (0, alone));
+    let warning = "warning: expected packets of one sensor, found those of 192.168.1.201, which \
+                   are used, and of 192.168.1.202 (1 so far), which are not; --from ADDRESS";
+    assert_eq!((ran.err.starts_with(warning), ran.err.matches("warning").count()), (true, 1));
+    assert!(ran.err.contains("754 from other addresses"), "{}", ran.err);
+    let alone = folder.run(&format!("{LIVE} --pcap other.pcap")).out;
+    let ran = folder.run(&format!("{LIVE} --pcap two.pcap --from 192.168.1.202"));
+    assert_eq!((ran.code, ran.err.as_str(), ran.out), (0, "", alone));
+}
+
+/// The times of a capture that lost them, holds nanoseconds in the field of microseconds, or was
+/// replayed at ten times the speed, or a tenth.
+#[test]
+fn the_stamps_of_a_sensor_rule_over_the_times_of_a_capture() {
+    let folder = folder();
+    let expected = folder.run(&format!("{LIVE} --pcap drive.pcap")).json();
+    let sent = packets(&street(), 7, PACKETS_PER_S);
+    let time_us = |i: usize| (i as f64 * PACKET_S * 1e6) as u64;
+    let all: [(&dyn Fn(usize) -> u64, f64); 4] = [
+        (&|_| 0, 0.0),
+        (&|i| time_us(i) / 1_000_000 * 1_000_000 + time_us(i) % 1_000_000 * 1000, 0.0),
+        (&|i| 1_000_000_000 + time_us(i) / 10, 1000.0),
+        (&|i| 1_000_000_000 + time_us(i) * 10, 1000.0),
+    ];
+    for (time_us, start_s) in all {
+        let timed = sent.iter().enumerate().map(|(i, packet)| (time_us(i), &packet[..]));
+        folder.write("x.pcap", capture(timed));
+        let ran = folder.run(&format!("{LIVE} --pcap x.pcap"));
+        let start = "warning: by the times of the recording, ";
+        assert_eq!((ran.err.starts_with(start), ran.err.lines().count()), (true, 1), "{}", ran.err);
+        let found = ran.json();
+        assert_eq!(found.len(), expected.len());
+        for (found, expected) in found.iter().zip(&expected) {
+            let since = |object: &Value, start_s| object["last_s"].as_f64().unwrap() - start_s;
+            let apart_s = since(found, start_s) - since(expected, 1000.0);
+            assert!(apart_s.abs() < 2e-5, "{apart_s}");
+        }
+    }
+}
+
+#[test]
+fn a_sensor_that_is_silent_is_told_of() {
+    let folder = Folder::new();
+    let port = free_port();
+    let mut child = listen(&folder, port, "");
+    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
+    let mut next = || lines.next().unwrap().unwrap();
+    assert_eq!(next(), format!("listening on UDP 127.0.0.1:{port}"));
+    let expected = "warning: no packets have come for 5 s: expected the sensor to send to port ";
+    assert!(next().starts_with(expected));
+    child.kill().unwrap();
+    child.wait().unwrap();
+}
+
 pub fn free_port() -> u16 {
     UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port()
 }
@@ -175,7 +279,9 @@ fn what_cannot_be_listened_to_is_named() {
     let refused = |line: &str, code: i32, start: &str| {
         folder.run(&format!("{LIVE} {line}")).assert_refused(code, start);
     };
-    refused("", 2, "error: the following required arguments were not provided");
+    let required = "error: the following required arguments were not provided:\n  \
+                    <--udp <PORT>|--pcap <FILE>>";
+    refused("", 2, required);
     refused("--udp 2368 --pcap drive.pcap", 2, "error: the argument '--udp <PORT>' cannot be used");
     refused("--pcap absent.pcap", 1, "error: absent.pcap: ");
     refused("--pcap notes.txt", 1, "error: notes.txt: header: expected a capture, pcap or pcapng");
@@ -184,7 +290,12 @@ fn what_cannot_be_listened_to_is_named() {
         1,
         "error: poses.tum: line 1: expected 8 numbers (time, x y z, qx qy qz qw) or 12 (a matrix), found 3",
     );
-    refused("--pcap drive.pcap --from 10.0.0.1", 2, "error: expected packets of a VLP-16");
+    refused(
+        "--pcap drive.pcap --from 10.0.0.1",
+        2,
+        "error: expected packets of a VLP-16 or VLP-32C, found none among 754 UDP packets, 754 of \
+         them from other addresses than 10.0.0.1: 192.168.1.201",
+    );
     refused(
         "--pcap drive.pcap --twist 0 0 nan 0 0 0",
         2,

@@ -145,19 +145,24 @@ pub fn ouster_packet(things: &[Thing], number: usize) -> Vec<u8> {
     bytes
 }
 
-/// A capture of packets that were sent at these microseconds of Unix time, in libpcap's classic
-/// format: a header, then before each frame its time and twice its length.
+/// A capture of packets that 192.168.1.201 sent at these microseconds of Unix time.
 pub fn capture<'a>(packets: impl IntoIterator<Item = (u64, &'a [u8])>) -> Vec<u8> {
+    capture_of(packets.into_iter().map(|(time_us, payload)| (time_us, 201, payload)))
+}
+
+/// A capture of packets with the last number of their sender's address, in libpcap's classic format:
+/// a header, then before each frame its time and twice its length.
+pub fn capture_of<'a>(packets: impl IntoIterator<Item = (u64, u8, &'a [u8])>) -> Vec<u8> {
     let words =
         |words: &[u32]| words.iter().flat_map(|word| word.to_le_bytes()).collect::<Vec<_>>();
     let mut file = words(&[0xa1b2_c3d4, 2 | 4 << 16, 0, 0, 65_535, 1]);
-    for (time_us, payload) in packets {
+    for (time_us, sender, payload) in packets {
         let udp_length = payload.len() as u16 + 8;
         let mut frame = vec![0xff; 6];
         frame.extend([0x60, 0x76, 0x88, 0, 0, 0, 8, 0]);
         frame.extend([0x45, 0]);
         frame.extend((udp_length + 20).to_be_bytes());
-        frame.extend([0, 0, 0, 0, 64, 17, 0, 0, 192, 168, 1, 201, 255, 255, 255, 255]);
+        frame.extend([0, 0, 0, 0, 64, 17, 0, 0, 192, 168, 1, sender, 255, 255, 255, 255]);
         frame.extend([2368u16, 2368, udp_length, 0].iter().flat_map(|word| word.to_be_bytes()));
         frame.extend(payload);
         let length = frame.len() as u32;

@@ -6,13 +6,14 @@ mod report;
 mod source;
 
 use std::net::{IpAddr, Ipv4Addr};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
-use crate::live::{EgoMotion, LiveOptions, Pipeline, Recorder};
+use crate::live::{EgoMotion, Flaw, LiveOptions, Pipeline, Recorder, Timeline};
 use crate::{Classifier, Options, Precision};
+use formats::FormatError;
 use formats::ouster::Metadata;
 use glam::DVec3;
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -21,13 +22,17 @@ use super::model::ModelArgs;
 use super::{Outcome, Usage, n_threads, of_setup};
 use notify::Notifier;
 use outputs::Outputs;
-use source::{Source, Tick};
+use source::{Sensor, Source, Tick};
 
 /// The bundled weights for objects of streets.
 const MODELS: [&str; 1] = ["street-128.safetensors"];
 
+/// A sensor that is silent for this long is told of: its turns take at most 0.2 s.
+const SILENCE: Duration = Duration::from_secs(5);
+
 /// Flags of `live`.
 #[derive(clap::Args)]
+#[group(id = "source", args = ["udp", "pcap"], required = true, multiple = false)]
 #[command(after_help = "\
 Examples:
   infer-cpu live --udp 2368
@@ -54,7 +59,7 @@ SIGTERM and Ctrl-C end the program after the last objects, with exit status 0. A
 systemd (Type=notify), it reports when it receives packets, and serves the watchdog.")]
 pub struct LiveArgs {
     /// Receive packets on this UDP port; a Velodyne's is 2368, an Ouster's 7502
-    #[arg(long, value_name = "PORT", required_unless_present = "pcap", conflicts_with = "pcap")]
+    #[arg(long, value_name = "PORT")]
     udp: Option<u16>,
 
     /// Read packets from a capture, pcap or pcapng
@@ -80,8 +85,8 @@ pub struct LiveArgs {
     #[arg(long)]
     stats: bool,
 
-    /// Drop packets from all other addresses
-    #[arg(long, value_name = "IP")]
+    /// Address of the sensor whose packets are used [default: the first sensor that sends]
+    #[arg(long, value_name = "ADDRESS")]
     from: Option<IpAddr>,
 
     /// Join a multicast group
@@ -131,45 +136,67 @@ fn rate(word: &str) -> Result<f64, String> {
 
 /// Runs the pipeline until the packets end or a signal comes.
 pub fn run(args: &LiveArgs) -> anyhow::Result<Outcome> {
-    let mut pipeline = args.pipeline()?;
+    let options = args.options()?;
+    args.check_poses(&options)?;
+    let mut pipeline = args.pipeline(&options)?;
     let is_over = Arc::new(AtomicBool::new(false));
     for signal in [SIGTERM, SIGINT] {
         signal_hook::flag::register(signal, Arc::clone(&is_over))?;
     }
     let mut notifier = Notifier::of_environment()?;
-    let source = args.source(&is_over)?;
+    let source = args.source(options.ouster.as_ref(), &is_over)?;
     let mut outputs = args.outputs()?;
     notifier.ready()?;
+    let (mut heard, mut is_silent) = (Instant::now(), false);
+    let (mut first_s, mut uncovered) = (None, None);
     let read = source.run(|tick| {
         match tick {
-            Tick::Packet(payload, arrival) => pipeline.take(payload, arrival),
+            Tick::Packet(payload, arrival) => {
+                pipeline.take(payload, arrival);
+                (heard, is_silent) = (arrival.moment.unwrap_or(heard), false);
+            }
+            Tick::Quiet if heard.elapsed() >= SILENCE && !is_silent => {
+                is_silent = true;
+                eprintln!("warning: {}", args.silence());
+            }
             Tick::Quiet => {}
             Tick::End => {
                 notifier.stopping();
                 pipeline.end();
             }
         }
-        pipeline.answer(|object| outputs.object(object));
-        outputs.packet(&pipeline);
+        if let Some(decoded) = pipeline.decoded() {
+            let first_s = *first_s.get_or_insert(decoded.time_s);
+            uncovered = args.check_cover(&options, [first_s, decoded.time_s]).err();
+        }
+        if uncovered.is_none() {
+            pipeline.answer(|object| outputs.object(object));
+            outputs.packet(&pipeline);
+        }
         for flaw in pipeline.new_flaws() {
-            eprintln!(
-                "warning: ignored a packet, and will ignore others with the same flaw: {flaw}"
-            );
+            match flaw {
+                Flaw::Times { .. } => eprintln!("warning: {flaw}"),
+                _ => eprintln!(
+                    "warning: ignored a packet, and will ignore others with the same flaw: {flaw}"
+                ),
+            }
         }
         notifier.alive(pipeline.counts(), Instant::now());
-        !is_over.load(Ordering::Relaxed) && outputs.are_wanted()
+        !is_over.load(Ordering::Relaxed) && outputs.are_wanted() && uncovered.is_none()
     });
     let ended = outputs.end(&pipeline);
     let read = read?;
     ended?;
+    uncovered.map_or(Ok(()), Err)?;
     if args.stats {
         report::print(&pipeline, &read);
     }
     if pipeline.counts().packets == 0 {
         let cause = format!(
-            "expected packets of {}, found none among {} UDP packets",
+            "expected packets of {}, found none among {} UDP packets{}",
             if args.metadata.is_some() { "the Ouster" } else { "a VLP-16 or VLP-32C" },
-            read.n_packets
+            read.n_packets,
+            read.senders
         );
         // A service may be stopped before its sensor is switched on.
         if args.udp.is_none() {
@@ -181,14 +208,16 @@ pub fn run(args: &LiveArgs) -> anyhow::Result<Outcome> {
 }
 
 impl LiveArgs {
-    fn pipeline(&self) -> anyhow::Result<Pipeline> {
+    fn pipeline(&self, live: &LiveOptions) -> anyhow::Result<Pipeline> {
         let (model, _) = self.model.open_or(&MODELS)?;
         let threads = n_threads(self.threads);
         let options = Options { precision: self.precision, threads, ..Options::default() };
         let classifier = Classifier::load(&model, &options).map_err(of_setup)?;
-        let mut options = LiveOptions::default();
-        options.min_points = self.min_points;
-        options.ego_motion = match (&self.poses, self.twist.as_deref()) {
+        Ok(Pipeline::new(classifier, live)?)
+    }
+
+    fn options(&self) -> anyhow::Result<LiveOptions> {
+        let ego_motion = match (&self.poses, self.twist.as_deref()) {
             (Some(file), _) => Some(EgoMotion::read(file)?),
             (None, Some(&[x, y, z, roll, pitch, yaw])) => Some(EgoMotion::Twist {
                 linear_m_s: DVec3::new(x, y, z),
@@ -196,8 +225,47 @@ impl LiveArgs {
             }),
             _ => None,
         };
-        options.ouster = self.metadata.as_deref().map(Metadata::read).transpose()?;
-        Ok(Pipeline::new(classifier, &options)?)
+        Ok(LiveOptions {
+            min_points: self.min_points,
+            ego_motion,
+            ouster: self.metadata.as_deref().map(Metadata::read).transpose()?,
+            is_recorded: self.pcap.is_some(),
+            ..LiveOptions::default()
+        })
+    }
+
+    /// Checks that poses cover the whole capture, before there is any output. The packets of a pipe
+    /// can be read only once: they are checked as they come.
+    fn check_poses(&self, options: &LiveOptions) -> anyhow::Result<()> {
+        let file = self.pcap.as_deref().filter(|file| self.poses.is_some() && file.is_file());
+        let Some(file) = file else { return Ok(()) };
+        let mut timeline = Timeline::new(options);
+        let mut sensor = Sensor::new(self.from, options.ouster.as_ref());
+        sensor.has_warned = true;
+        let source = Source::Capture { file: file.to_path_buf(), sensor, realtime: false };
+        source.run(|tick| {
+            if let Tick::Packet(payload, arrival) = tick {
+                timeline.take(payload, arrival);
+            }
+            true
+        })?;
+        timeline.span_s().map_or(Ok(()), |sent_s| Ok(self.check_cover(options, sent_s)?))
+    }
+
+    fn check_cover(&self, options: &LiveOptions, sent_s: [f64; 2]) -> Result<(), FormatError> {
+        let covered = options.ego_motion.as_ref().map_or(Ok(()), |m| m.check_cover(sent_s));
+        let file = self.poses.as_deref().unwrap_or(Path::new("poses"));
+        covered.map_err(|cause| FormatError::malformed(file, "times", cause))
+    }
+
+    /// What may keep packets from coming.
+    fn silence(&self) -> String {
+        let (port, seconds) = (self.udp.unwrap_or_default(), SILENCE.as_secs());
+        let sender = self.from.map_or("the sensor".to_owned(), |from| from.to_string());
+        format!(
+            "no packets have come for {seconds} s: expected {sender} to send to port {port} of this \
+             machine, and firewalls to let UDP pass"
+        )
     }
 
     fn outputs(&self) -> anyhow::Result<Outputs> {
@@ -206,12 +274,19 @@ impl LiveArgs {
         Ok(Outputs::new(prints, recorder))
     }
 
-    fn source(&self, is_over: &Arc<AtomicBool>) -> anyhow::Result<Source> {
+    fn source(
+        &self,
+        metadata: Option<&Metadata>,
+        is_over: &Arc<AtomicBool>,
+    ) -> anyhow::Result<Source> {
+        let sensor = Sensor::new(self.from, metadata);
         match (&self.pcap, self.udp) {
-            (Some(file), _) => Ok(Source::capture(file, self.from, self.realtime)),
+            (Some(file), _) => {
+                Ok(Source::Capture { file: file.clone(), sensor, realtime: self.realtime })
+            }
             (None, port) => {
                 let address = (self.interface, port.unwrap_or_default()).into();
-                Source::udp(address, self.multicast, self.from, is_over)
+                Source::udp(address, self.multicast, sensor, is_over)
             }
         }
     }

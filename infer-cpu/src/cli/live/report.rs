@@ -34,7 +34,7 @@ pub fn print(pipeline: &Pipeline, read: &Read) {
         counts.late,
         counts.duplicated,
         counts.foreign,
-        read.n_from_others,
+        read.senders.n_dropped(),
         read.n_overrun,
         counts.restarts
     );

@@ -5,7 +5,7 @@ use std::net::{IpAddr, Ipv4Addr, SocketAddr, UdpSocket};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{
     Receiver, RecvTimeoutError, SyncSender, TryRecvError, TrySendError, sync_channel,
 };
@@ -14,7 +14,8 @@ use std::time::{Duration, Instant};
 
 use crate::live::Arrival;
 use anyhow::Context;
-use formats::pcap;
+use formats::ouster::{self, Metadata};
+use formats::{Senders, pcap, velodyne};
 use socket2::{Domain, Protocol, Socket, Type};
 
 /// The most packets in the queue: two thirds of a second of a VLP-32C.
@@ -35,34 +36,59 @@ pub enum Tick<'a> {
 }
 
 pub enum Source {
-    Capture { file: PathBuf, from: Option<IpAddr>, realtime: bool },
+    Capture { file: PathBuf, sensor: Sensor, realtime: bool },
     Udp(Box<Listener>),
+}
+
+/// Chooses the packets of one sensor.
+pub struct Sensor {
+    senders: Senders,
+    /// For the packets of an Ouster; without it, they are a Velodyne's.
+    ouster: Option<Box<ouster::Decoder>>,
+    /// Whether the user was told of other sensors.
+    pub has_warned: bool,
+}
+
+impl Sensor {
+    /// The sensor at the address `from` or the first one: an Ouster with this `metadata`, or a
+    /// Velodyne.
+    pub fn new(from: Option<IpAddr>, metadata: Option<&Metadata>) -> Self {
+        let ouster = metadata.map(|metadata| Box::new(ouster::Decoder::new(metadata)));
+        Self { senders: Senders::new(from), ouster, has_warned: false }
+    }
+
+    fn sent(&mut self, payload: &[u8], source: IpAddr) -> bool {
+        let is_used = self.senders.takes(source, || match &self.ouster {
+            Some(decoder) => decoder.header(payload).is_ok(),
+            None => velodyne::Header::parse(payload).is_ok(),
+        });
+        if !is_used
+            && !self.has_warned
+            && let Some(warning) = self.senders.warning()
+        {
+            eprintln!("warning: {warning}");
+            self.has_warned = true;
+        }
+        is_used
+    }
 }
 
 #[derive(Default)]
 pub struct Read {
     /// All UDP packets.
     pub n_packets: u64,
-    /// Packets from other addresses, which were dropped.
-    pub n_from_others: u64,
+    /// Their senders.
+    pub senders: Senders,
     /// Packets that were dropped because the queue was full.
     pub n_overrun: u64,
 }
 
 /// A thread that receives packets, and their queue.
 pub struct Listener {
-    thread: JoinHandle<io::Result<()>>,
+    thread: JoinHandle<io::Result<Read>>,
     filled: Receiver<Slot>,
     empty: SyncSender<Slot>,
-    counts: Arc<ListenerCounts>,
     is_over: Arc<AtomicBool>,
-}
-
-#[derive(Default)]
-struct ListenerCounts {
-    packets: AtomicU64,
-    from_others: AtomicU64,
-    overrun: AtomicU64,
 }
 
 struct Slot {
@@ -72,19 +98,15 @@ struct Slot {
 }
 
 impl Source {
-    /// The packets of the capture at `file`: those `from` an address, or all.
-    pub fn capture(file: &Path, from: Option<IpAddr>, realtime: bool) -> Self {
-        Self::Capture { file: file.to_path_buf(), from, realtime }
-    }
-
-    /// The packets to `address`, which are received from now on until `is_over`.
+    /// The packets of `sensor` to `address`, which are received from now on until `is_over`.
     pub fn udp(
         address: SocketAddr,
         multicast: Option<Ipv4Addr>,
-        from: Option<IpAddr>,
+        sensor: Sensor,
         is_over: &Arc<AtomicBool>,
     ) -> anyhow::Result<Self> {
         let socket = bind(address, multicast).with_context(|| format!("UDP {address}"))?;
+        eprintln!("listening on UDP {}", socket.local_addr()?);
         let (fill, filled) = sync_channel(RING);
         let (empty, empties) = sync_channel(RING);
         for _ in 0..RING {
@@ -92,13 +114,12 @@ impl Source {
             // The channel has room for all slots.
             let _ = empty.send(Slot { bytes, n_bytes: 0, arrival: Arrival::now() });
         }
-        let counts = Arc::new(ListenerCounts::default());
-        let (thread_counts, thread_is_over) = (Arc::clone(&counts), Arc::clone(is_over));
-        let thread = thread::Builder::new().name("receiver".to_owned()).spawn(move || {
-            receive(&socket, from, &fill, &empties, &thread_counts, &thread_is_over)
-        })?;
+        let thread_is_over = Arc::clone(is_over);
+        let thread = thread::Builder::new()
+            .name("receiver".to_owned())
+            .spawn(move || receive(&socket, sensor, &fill, &empties, &thread_is_over))?;
         let is_over = Arc::clone(is_over);
-        Ok(Self::Udp(Box::new(Listener { thread, filled, empty, counts, is_over })))
+        Ok(Self::Udp(Box::new(Listener { thread, filled, empty, is_over })))
     }
 
     /// Passes every packet to `take`, until there are no more or it returns false, and then the
@@ -106,7 +127,7 @@ impl Source {
     pub fn run(self, mut take: impl FnMut(Tick<'_>) -> bool) -> anyhow::Result<Read> {
         let read = match self {
             Self::Udp(listener) => listener.run(&mut take)?,
-            Self::Capture { file, from, realtime } => replay(&file, from, realtime, &mut take)?,
+            Self::Capture { file, sensor, realtime } => replay(&file, sensor, realtime, &mut take)?,
         };
         take(Tick::End);
         Ok(read)
@@ -137,19 +158,18 @@ fn bind(address: SocketAddr, multicast: Option<Ipv4Addr>) -> io::Result<UdpSocke
 /// Receives packets into empty slots until `is_over`.
 fn receive(
     socket: &UdpSocket,
-    from: Option<IpAddr>,
+    mut sensor: Sensor,
     fill: &SyncSender<Slot>,
     empties: &Receiver<Slot>,
-    counts: &ListenerCounts,
     is_over: &AtomicBool,
-) -> io::Result<()> {
-    let mut spare: Option<Slot> = None;
+) -> io::Result<Read> {
+    let (mut spare, mut read): (Option<Slot>, _) = (None, Read::default());
     let mut overrun = [0; 1];
     while !is_over.load(Ordering::Relaxed) {
         let slot = match spare.take().map_or_else(|| empties.try_recv(), Ok) {
             Ok(slot) => Some(slot),
             Err(TryRecvError::Empty) => None,
-            Err(TryRecvError::Disconnected) => return Ok(()),
+            Err(TryRecvError::Disconnected) => break,
         };
         let mut slot = slot;
         let buffer = slot.as_mut().map_or(&mut overrun[..], |slot| &mut slot.bytes);
@@ -162,24 +182,25 @@ fn receive(
             }
             Err(error) => return Err(error),
         };
-        counts.packets.fetch_add(1, Ordering::Relaxed);
-        if from.is_some_and(|from| from != sender.ip()) {
-            counts.from_others.fetch_add(1, Ordering::Relaxed);
+        read.n_packets += 1;
+        let payload = slot.as_ref().map_or(&overrun[..], |slot| &slot.bytes[..n_bytes]);
+        if !sensor.sent(payload, sender.ip()) {
             spare = slot;
             continue;
         }
         let Some(mut slot) = slot else {
-            counts.overrun.fetch_add(1, Ordering::Relaxed);
+            read.n_overrun += 1;
             continue;
         };
         (slot.n_bytes, slot.arrival) = (n_bytes, Arrival::now());
         match fill.try_send(slot) {
             // It cannot be full: there are only as many slots as it has room for.
             Ok(()) | Err(TrySendError::Full(_)) => {}
-            Err(TrySendError::Disconnected(_)) => return Ok(()),
+            Err(TrySendError::Disconnected(_)) => break,
         }
     }
-    Ok(())
+    read.senders = sensor.senders;
+    Ok(read)
 }
 
 /// Whether the socket has no packet yet.
@@ -207,28 +228,21 @@ impl Listener {
         }
         self.is_over.store(true, Ordering::Relaxed);
         let ended = self.thread.join().map_err(|_| anyhow::anyhow!("the receiver panicked"))?;
-        ended.context("receiving packets")?;
-        let value = |count: &AtomicU64| count.load(Ordering::Relaxed);
-        Ok(Read {
-            n_packets: value(&self.counts.packets),
-            n_from_others: value(&self.counts.from_others),
-            n_overrun: value(&self.counts.overrun),
-        })
+        ended.context("receiving packets")
     }
 }
 
 /// Passes the packets of a capture to `take`, at their times if `realtime`.
 fn replay(
     file: &Path,
-    from: Option<IpAddr>,
+    mut sensor: Sensor,
     realtime: bool,
     take: &mut impl FnMut(Tick<'_>) -> bool,
 ) -> anyhow::Result<Read> {
     let (mut read, start, mut first_s) = (Read::default(), Instant::now(), None);
     pcap::read(file, |packet| {
         read.n_packets += 1;
-        if from.is_some_and(|from| from != packet.source) {
-            read.n_from_others += 1;
+        if !sensor.sent(&packet.payload, packet.source) {
             return ControlFlow::Continue(());
         }
         let time_s = packet.time_s.unwrap_or_default();
@@ -244,5 +258,6 @@ fn replay(
             false => ControlFlow::Break(()),
         }
     })?;
+    read.senders = sensor.senders;
     Ok(read)
 }
