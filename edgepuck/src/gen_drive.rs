@@ -9,6 +9,7 @@ use formats::vlp32c::{Capture, SEQUENCE_US, SEQUENCES_PER_PACKET, START_S};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::gen_scenes::read_recipe;
+use crate::overwrite::Overwrite;
 use crate::{Outcome, Usage};
 
 #[derive(clap::Args)]
@@ -43,6 +44,9 @@ pub struct Args {
     /// Seed of all random numbers
     #[arg(long, default_value_t = 0)]
     seed: u64,
+
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 /// The longest drive: a capture of one day has 16 GB.
@@ -74,6 +78,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         let found = args.out.display();
         return Err(Usage(format!("--out: expected a file name with .pcap, found {found}")).into());
     }
+    args.overwrite.check([&*args.out])?;
     let mut recipe = read_recipe(&args.recipe)?;
     recipe.use_sensors(std::slice::from_ref(&args.sensor));
     let stage = Stage::new(recipe, &args.recipe, args.meshes.as_deref(), args.seed)?;

@@ -14,6 +14,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 
 use crate::caster::CasterArgs;
+use crate::overwrite::Overwrite;
 use crate::{Outcome, preview, segment};
 
 #[derive(clap::Args)]
@@ -48,11 +49,16 @@ pub(crate) struct Args {
     seed: u64,
 
     #[command(flatten)]
+    overwrite: Overwrite,
+
+    #[command(flatten)]
     caster: CasterArgs,
 }
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let mut recipe = read_recipe(&args.recipe)?;
+    let outputs = ["packed", "sweeps"].map(|folder| args.out.join(folder));
+    args.overwrite.clear(outputs.iter().map(PathBuf::as_path))?;
     recipe.use_sensors(&args.sensor);
     let meshes = args.meshes.as_deref();
     let caster = args.caster.caster()?;

@@ -1,6 +1,7 @@
 //! `edgepuck gen-shapes`: writes procedural shapes as mesh files.
 
 use crate::Outcome;
+use crate::overwrite::Overwrite;
 use anyhow::Context;
 use edgepuck_shapes as shapes;
 use std::path::PathBuf;
@@ -22,6 +23,9 @@ pub(crate) struct Args {
     /// Number of test shapes of each class
     #[arg(long, default_value_t = TEST_PER_CLASS, value_name = "N")]
     test: u32,
+
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 /// The default number of training shapes of each class.
@@ -31,6 +35,8 @@ pub const TRAIN_PER_CLASS: u32 = 40;
 pub const TEST_PER_CLASS: u32 = 10;
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
+    let classes = shapes::ShapeClass::ALL.map(|class| args.out.join(class.name()));
+    args.overwrite.clear(classes.iter().map(PathBuf::as_path))?;
     shapes::write_tree(&args.out, args.seed, args.train, args.test)
         .context("cannot write the shapes")?;
     let classes = shapes::ShapeClass::ALL.len() as u32;

@@ -23,6 +23,7 @@ pub mod gen_shapes;
 #[cfg(feature = "models")]
 mod import_weights;
 mod merge_dataset;
+mod overwrite;
 mod preview;
 mod preview_scan;
 mod profile;

@@ -1,5 +1,6 @@
 use crate::Outcome;
 use crate::gen_dataset::report_failures;
+use crate::overwrite::Overwrite;
 use edgepuck_dataset::{SurfaceConfig, write_surfaces};
 use sim_gpu::internals::mesh::frame::{Normalize, Up};
 use sim_gpu::internals::mesh::tree::discover;
@@ -34,9 +35,14 @@ pub struct SampleSurfacesArgs {
     /// Seed of all random numbers
     #[arg(long, default_value_t = 0)]
     seed: u64,
+
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 pub fn run(args: &SampleSurfacesArgs) -> anyhow::Result<Outcome> {
+    let outputs = ["surface", "seen"].map(|set| args.out.join(format!("{set}-train.npz")));
+    args.overwrite.check(outputs.iter().map(PathBuf::as_path))?;
     let meshes = discover(&args.meshes, args.seed)?;
     let config = SurfaceConfig {
         seed: args.seed,

@@ -2,6 +2,7 @@
 
 use crate::caster::CasterArgs;
 use crate::effect_flags::EffectFlags;
+use crate::overwrite::Overwrite;
 use crate::{Outcome, Usage, flags};
 use anyhow::{Context, ensure};
 use formats::atomic;
@@ -15,7 +16,7 @@ use sim_gpu::internals::mesh::frame::{Normalize, Unit, Up};
 use sim_gpu::internals::packets;
 use sim_gpu::internals::scene::SceneFile;
 use sim_gpu::internals::simplify::Simplify;
-use sim_gpu::{Mesh, Pose, Scan, Scene, Sensor};
+use sim_gpu::{Mesh, MountedSensor, Pose, Scan, Scene, Sensor};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -30,6 +31,9 @@ pub struct Args {
     /// to the file's name
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
+
+    #[command(flatten)]
+    overwrite: Overwrite,
 
     /// Returns of each beam in the packets: strongest, last, or dual (both)
     #[arg(long, value_name = "WHICH")]
@@ -123,6 +127,13 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
                      the returns of other files are those of the effects: `effects.returns`";
         return Err(Usage(cause.to_owned()).into());
     }
+    let several = scene.sensors.len() > 1;
+    let file = |mounted: &MountedSensor| match several {
+        true => beside(&args.out, &mounted.name),
+        false => args.out.clone(),
+    };
+    let files: Vec<PathBuf> = scene.sensors.iter().map(file).collect();
+    args.overwrite.check(files.iter().map(PathBuf::as_path))?;
     let caster = args.caster.caster()?;
     let scan =
         |number| scene.scan_mounted(number).with(&caster).culling(args.caster.culling()).run();
@@ -131,18 +142,17 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         .collect::<Result<_, _>>()
         .with_context(|| what.clone())?;
     tell_objects(&scene);
-    for (scan, mounted) in scans.iter().zip(&scene.sensors) {
+    for ((scan, mounted), file) in scans.iter().zip(&scene.sensors).zip(&files) {
         let sensor = &mounted.name;
         if scan.cast_on_cpu {
             eprintln!("{sensor}: one mesh exceeds the GPU's largest buffer, so the CPU cast it");
         }
-        let file = if scans.len() > 1 { beside(&args.out, sensor) } else { args.out.clone() };
         match format {
             ScanFormat::Pcap => {
                 let revolution = packets::revolution(mounted.sensor.profile())?;
-                vlp32c::write(&file, Hashing::None, &revolution, returns, scan)?;
+                vlp32c::write(file, Hashing::None, &revolution, returns, scan)?;
             }
-            _ => scan.save(&file)?,
+            _ => scan.save(file)?,
         }
         eprintln!("{sensor}: {}: {}", told(&scene, scan), file.display());
     }

@@ -15,20 +15,22 @@ sensors look along x.
 from importlib.metadata import version as _version
 
 from ._edgepuck import Error, adapters, set_num_threads
-from .classifier import Classifier, Prediction
-from .dataset import Dataset
-from .mesh import Mesh, box
-from .scan import Scan
-from .scene import Scene, scan_scene
-from .scenes import DrawnScene, Scenes
-from .segment import segment
-from .sensor import Sensor
+from ._classifier import Classifier, Prediction
+from ._dataset import Dataset
+from ._detect import Detection, detect
+from ._mesh import Mesh, box
+from ._scan import Scan
+from ._scene import Scene, scan_scene
+from ._scenes import DrawnScene, Scenes
+from ._segment import segment
+from ._sensor import Sensor
 
 __version__ = _version("edgepuck")
 
 __all__ = [
     "Classifier",
     "Dataset",
+    "Detection",
     "DrawnScene",
     "Error",
     "Mesh",
@@ -39,6 +41,7 @@ __all__ = [
     "Sensor",
     "adapters",
     "box",
+    "detect",
     "scan_scene",
     "segment",
     "set_num_threads",

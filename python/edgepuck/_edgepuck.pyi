@@ -1,4 +1,4 @@
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, final
 
 import numpy as np
@@ -13,8 +13,10 @@ __all__ = [
     "Scenes",
     "Sensor",
     "adapters",
+    "detect",
     "main",
     "run",
+    "save_scan",
     "seed_of_epoch",
     "segment",
     "set_num_threads",
@@ -123,6 +125,14 @@ class Scenes:
     def draw(self, number: int) -> dict[str, Any]: ...
 
 def adapters() -> list[str]: ...
+def detect(
+    cloud: NDArray[np.float32],
+    rings: NDArray[np.uint16] | None,
+    model: str,
+    precision: str,
+    min_points: int,
+) -> list[dict[str, Any]]: ...
+def save_scan(path: str, columns: Mapping[str, Any]) -> None: ...
 def main(words: Sequence[str]) -> int: ...
 def run(words: Sequence[str]) -> None: ...
 def seed_of_epoch(seed: int, epoch: int) -> int: ...

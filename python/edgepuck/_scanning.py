@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _arguments, _edgepuck
-from .scan import Scan, scan_of
+from ._scan import Scan, scan_of
 
 
 def scan(

@@ -2,13 +2,16 @@
 
 use crate::error::raised;
 use formats::Scan;
+use formats::hash::Hashing;
 use formats::scan::{Attribute, ColumnSlot};
+use formats::scan_file::{ScanFormat, write_scan};
 use glam::DMat4;
 use numpy::ndarray::Array2;
-use numpy::{Element, IntoPyArray, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{Element, IntoPyArray, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use sim_gpu::internals::pose::Pose;
+use sim_gpu::Pose;
+use std::path::PathBuf;
 
 /// `[n, 3]`.
 pub fn vectors(py: Python<'_>, vectors: Vec<[f32; 3]>) -> PyResult<Bound<'_, PyAny>> {
@@ -48,6 +51,42 @@ pub fn scan(py: Python<'_>, mut scan: Scan) -> PyResult<Bound<'_, PyDict>> {
         }
     }
     Ok(columns)
+}
+
+/// A scan of the `columns` of [`scan`].
+pub fn scan_of(columns: &Bound<'_, PyDict>) -> PyResult<Scan> {
+    let mut scan = Scan::default();
+    for (name, column) in columns {
+        let name: String = name.extract()?;
+        match name.as_str() {
+            "origin" => scan.origin = column.extract()?,
+            "positions" => scan.positions = points(&column.extract()?)?,
+            name => match scan.slot(name.parse().map_err(raised)?) {
+                ColumnSlot::F32(slot) => *slot = Some(list(&column)?),
+                ColumnSlot::U8(slot) => *slot = Some(list(&column)?),
+                ColumnSlot::U16(slot) => *slot = Some(list(&column)?),
+                ColumnSlot::U32(slot) => *slot = Some(list(&column)?),
+                ColumnSlot::Vector(slot) => *slot = Some(points(&column.extract()?)?),
+            },
+        }
+    }
+    Ok(scan)
+}
+
+/// Write the scan of these columns to a file of the format that its extension names.
+#[pyfunction]
+pub fn save_scan(path: PathBuf, columns: &Bound<'_, PyDict>) -> PyResult<()> {
+    let format = ScanFormat::of_path(&path).map_err(raised)?;
+    if format == ScanFormat::Pcap {
+        return Err(raised(format!("{}: `edgepuck scan` writes packets", path.display())));
+    }
+    write_scan(&path, format, Hashing::None, &scan_of(columns)?).map_err(raised)?;
+    Ok(())
+}
+
+fn list<T: Element + Copy>(column: &Bound<'_, PyAny>) -> PyResult<Vec<T>> {
+    let column: PyReadonlyArray1<'_, T> = column.extract()?;
+    Ok(column.as_array().to_vec())
 }
 
 /// `[n]`, where there are any.

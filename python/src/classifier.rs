@@ -70,7 +70,7 @@ impl Classifier {
         });
         let found = found.map_err(raised)?;
         let told = PyDict::new(py);
-        told.set_item("label", &*found.label)?;
+        told.set_item("label", found.answer())?;
         told.set_item("index", found.class)?;
         told.set_item("is_unknown", found.is_unknown)?;
         told.set_item("confidence", found.confidence())?;

@@ -7,6 +7,7 @@
 mod arrays;
 mod classifier;
 mod clouds;
+mod detect;
 mod error;
 mod mesh;
 mod process;
@@ -19,9 +20,13 @@ mod sensor;
 #[pyo3::pymodule]
 mod _edgepuck {
     #[pymodule_export]
+    use super::arrays::save_scan;
+    #[pymodule_export]
     use super::classifier::Classifier;
     #[pymodule_export]
     use super::clouds::{Clouds, seed_of_epoch};
+    #[pymodule_export]
+    use super::detect::detect;
     #[pymodule_export]
     use super::error::Error;
     #[pymodule_export]

@@ -153,6 +153,10 @@ fn view([distance_m, elevation_deg, azimuth_deg]: [f64; 3]) -> PyResult<Pose> {
     if distance_m <= 0.0 {
         return Err(raised(format!("expected a distance above 0, found {distance_m}")));
     }
+    if !(-90.0..=90.0).contains(&elevation_deg) {
+        let cause = format!("expected an elevation from -90 to 90 degrees, found {elevation_deg}");
+        return Err(raised(cause));
+    }
     Ok(Pose::looking_at_origin_deg(distance_m, elevation_deg, azimuth_deg))
 }
 

@@ -6,6 +6,7 @@ use edgepuck_segment::Settings;
 use numpy::IntoPyArray;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
+use sim_gpu::Pose;
 use std::path::PathBuf;
 
 /// The scenes of a recipe.
@@ -65,7 +66,9 @@ impl Scenes {
             objects.append(of_object)?;
         }
         told.set_item("objects", objects)?;
-        told.set_item("scan", arrays::scan(py, sweep.scan)?)?;
+        let columns = arrays::scan(py, sweep.scan)?;
+        columns.set_item("pose", arrays::matrix(&Pose::IDENTITY))?;
+        told.set_item("scan", columns)?;
         Ok(told)
     }
 }

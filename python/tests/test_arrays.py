@@ -1,6 +1,7 @@
 """Meshes come from arrays, and scans are arrays."""
 
 import pickle
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -196,3 +197,60 @@ def test_a_pickled_scene_has_the_same_scan(cube: tuple) -> None:
     scans = [of.scan(ep.Sensor("vlp32c"), pose=np.eye(4), noise=0.01) for of in (scene, again)]
     assert len(again) == 2 and len(scans[0]) > 0
     np.testing.assert_array_equal(scans[0].positions, scans[1].positions)
+
+
+def test_a_mesh_in_millimetres_has_its_size_in_metres(cube: tuple) -> None:
+    vertices, faces = cube
+    mesh = ep.Mesh(1000 * vertices, faces, normalize="none", units="mm")
+    np.testing.assert_allclose(mesh.vertices, vertices, rtol=1e-15)
+    with pytest.warns(UserWarning, match=r"1000 x 1000 x 1000 m .* `units` names another"):
+        ep.Mesh(1000 * vertices, faces, normalize="none")
+
+
+def test_a_scan_is_saved_as_its_extension_says(cube: tuple, tmp_path: Path) -> None:
+    scan = ep.Sensor("vlp32c").scan(ep.Mesh(*cube))
+    for name in ["a.npz", "a.ply", "a.csv"]:
+        scan.save(tmp_path / name)
+    saved = np.load(tmp_path / "a.npz")
+    np.testing.assert_array_equal(saved["positions"], scan.positions)
+    np.testing.assert_array_equal(saved["ring"].ravel(), scan.ring)
+    assert f"element vertex {len(scan)}" in (tmp_path / "a.ply").read_bytes()[:400].decode("latin-1")
+    lines = (tmp_path / "a.csv").read_text().splitlines()
+    assert len(lines) == len(scan) + 1 and lines[0].startswith("x,y,z")
+    first = np.array(lines[1].split(",")[:3], dtype=np.float32)
+    np.testing.assert_array_equal(first, scan.positions[0])
+
+
+def test_a_batch_has_the_answers_of_its_clouds(cube: tuple) -> None:
+    lidar, mesh, classify = ep.Sensor("vlp32c"), ep.Mesh(*cube), ep.Classifier("edge-64")
+    scans = [lidar.scan(mesh, azimuth=azimuth) for azimuth in (0, 40)]
+    alone = [classify(scan).logits for scan in scans]
+    for found, expected in zip(classify(scans), alone, strict=True):
+        np.testing.assert_array_equal(found.logits, expected)
+    clouds = np.stack([scan.positions[:500] for scan in scans])
+    first, second = classify(clouds)
+    np.testing.assert_array_equal(first.logits, classify(clouds[0]).logits)
+    # A fourth column, such as KITTI's intensity, is no coordinate.
+    with_intensity = np.column_stack([clouds[1], np.ones(500)])
+    np.testing.assert_array_equal(second.logits, classify(with_intensity).logits)
+
+
+def test_objects_of_a_street_are_detected_where_they_stand() -> None:
+    scene = ep.Scenes("street", seed=1)[0]
+    found = ep.detect(scene.scan)
+    clusters = ep.segment(scene.scan)
+    for one in found:
+        points = scene.scan.positions[clusters == one.cluster]
+        assert len(points) == one.points >= 20
+        low, high = points.min(axis=0) - 1e-4, points.max(axis=0) + 1e-4
+        assert (low <= one.centre).all() and (one.centre <= high).all()
+    least = np.median([one.confidence for one in found])
+    assert all(one.confidence >= least for one in ep.detect(scene.scan, min_confidence=least))
+
+
+def test_scans_know_where_their_sensor_stood(cube: tuple) -> None:
+    scan = ep.Sensor("vlp32c").scan(ep.Mesh(*cube), distance=4, elevation=0)
+    np.testing.assert_allclose(scan.sensor_position[0], [4, 0, 0], atol=1e-6)
+    drawn = ep.Scenes("street", seed=1)[0].scan
+    np.testing.assert_array_equal(drawn.pose, np.eye(4))
+    np.testing.assert_array_equal(drawn.sensor_position[-1], [0, 0, 0])

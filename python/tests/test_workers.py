@@ -194,3 +194,11 @@ def test_a_child_opens_the_adapter_for_itself(shapes: Path) -> None:
     # Of noise in f32 and in f64; positions are below 1.
     on_cpu, _ = ep.Dataset(shapes, points=64).batch(BATCHES[0])
     np.testing.assert_allclose(expected, on_cpu, atol=1e-6)
+
+
+def test_a_transform_is_applied_to_each_cloud(shapes: Path) -> None:
+    plain, halved = ep.Dataset(shapes), ep.Dataset(shapes, transform=lambda cloud: 0.5 * cloud)
+    (cloud, label), (half, same) = plain[0], halved[0]
+    np.testing.assert_array_equal(half, 0.5 * cloud)
+    assert same == label
+    np.testing.assert_array_equal(halved.__getitems__([0])[0][0], half)

@@ -14,6 +14,7 @@ use formats::{FormatError, atomic};
 use infer_cpu::model_file;
 use prost::Message;
 
+use crate::overwrite::Overwrite;
 use crate::{Outcome, Usage, checkout};
 use graph::{Graph, Size};
 use pointnet::{Net, NetInputs};
@@ -59,6 +60,9 @@ pub struct ExportOnnxArgs {
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 
+    #[command(flatten)]
+    overwrite: Overwrite,
+
     /// Include the model's Critical Points Layer in the graph, like infer-cpu's --sampler cpl
     #[arg(long)]
     critical_points: bool,
@@ -70,6 +74,7 @@ pub struct ExportOnnxArgs {
 }
 
 pub fn run(args: &ExportOnnxArgs) -> anyhow::Result<Outcome> {
+    args.overwrite.check([&*args.out])?;
     let path = find(&args.model);
     let (card, net) = read(&path)?;
     let n_points = args.critical_points.then(|| kept_points(args, &path, &card)).transpose()?;

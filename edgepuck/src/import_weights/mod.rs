@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use crate::Outcome;
+use crate::overwrite::Overwrite;
 use anyhow::Context;
 use card::CardArgs;
 use checkpoint::Checkpoint;
@@ -26,6 +27,9 @@ pub struct ImportWeightsArgs {
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 
+    #[command(flatten)]
+    overwrite: Overwrite,
+
     /// Importer table (TOML), for a model whose layers have other names
     #[arg(long, value_name = "FILE")]
     table: Option<PathBuf>,
@@ -39,6 +43,7 @@ pub struct ImportWeightsArgs {
 }
 
 pub fn run(args: &ImportWeightsArgs) -> anyhow::Result<Outcome> {
+    args.overwrite.check([&*args.out])?;
     let checkpoint = Checkpoint::open(&args.checkpoint)?;
     let tables = match &args.table {
         Some(path) => vec![Table::read(path)?],

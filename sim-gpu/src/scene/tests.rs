@@ -137,3 +137,35 @@ fn bad_scenes_are_named() {
         assert!(error.contains("my.toml") || error.contains("none.toml"), "{error}");
     }
 }
+
+/// The blocks of TOML in a page.
+fn snippets(page: &str) -> impl Iterator<Item = &str> {
+    page.split("```toml\n").skip(1).filter_map(|rest| rest.split("```").next())
+}
+
+#[test]
+fn the_scenes_of_effects_md_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    for file in ["ego.tum", "car.tum"] {
+        let poses = "1699999999 0 0 0 0 0 0 1\n1700000001 5 0 0 0 0 0 1\n";
+        std::fs::write(folder.path().join(file), poses).unwrap();
+    }
+    let page = include_str!("../../EFFECTS.md");
+    assert!(snippets(page).count() >= 2);
+    for snippet in snippets(page) {
+        let missing = |table, text| if snippet.contains(table) { "" } else { text };
+        let (object, sensor) = (missing("[[object]]", OBJECT), missing("[[sensor]]", SENSOR));
+        let text = format!("{object}{sensor}{snippet}");
+        let scene = SceneFile::parse(&text, &folder.path().join("scene.toml"));
+        scene.unwrap_or_else(|error| panic!("{error}\n{snippet}"));
+    }
+    // The poses in its prose have no orientation: they look along x.
+    let poses =
+        page.split("`trajectory = ").nth(1).and_then(|rest| rest.split('`').next()).unwrap();
+    let moving = format!("{OBJECT}trajectory = {poses}\n{SENSOR}");
+    let scene = parse(&moving.replace('\n', "\n")).unwrap();
+    let pose = scene.objects[0].motion.as_ref().unwrap().at(0.5);
+    assert_eq!(pose.position_m, DVec3::new(2.5, 0.0, 1.0));
+    // Half of the 10 degrees.
+    assert!(pose.rotation.angle_between(DQuat::from_rotation_z(5f64.to_radians())) < 1e-12);
+}

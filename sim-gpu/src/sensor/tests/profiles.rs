@@ -159,3 +159,21 @@ count = 5 -> count = 4294967296 -> expected u32
 distance_m = 5.0 -> distance_m = 0 -> views.distance_m
 normalize = "bbox" -> normalize = "box" -> unknown variant `box`
 "#;
+
+#[test]
+fn the_profiles_of_sensors_md_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let csv = "azimuth_deg,elevation_deg\n".to_owned() + &"1,2\n".repeat(80_000);
+    std::fs::write(folder.path().join("mid360.csv"), csv).unwrap();
+    let page = include_str!("../../../SENSORS.md");
+    let mut snippets = page.split("```toml\n").skip(1).filter_map(|rest| rest.split("```").next());
+    let head = snippets.next().unwrap();
+    let layouts: Vec<&str> = snippets.collect();
+    assert_eq!(layouts.len(), 3);
+    for layout in layouts {
+        let file = folder.path().join("my_sensor.toml");
+        let found = profile::parse(&format!("{head}\n{layout}"), &file);
+        let profile = found.unwrap_or_else(|error| panic!("{error}\n{layout}"));
+        assert!(!profile.pattern().is_empty());
+    }
+}

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike
 
 from . import _edgepuck, _scanning
 from ._arguments import whole
-from .mesh import Mesh, native
-from .scan import Scan, scan_of
-from .sensor import Sensor
-from .sensor import native as sensor_of
+from ._mesh import Mesh, native
+from ._scan import Scan, scan_of
+from ._sensor import Sensor
+from ._sensor import native as sensor_of
 
 
 class Scene:

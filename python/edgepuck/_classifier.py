@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _edgepuck
 from ._arguments import Remade, place, whole
-from .scan import Scan
+from ._scan import Scan
 
 
 @dataclass(eq=False)
@@ -18,9 +20,9 @@ class Prediction:
     """The answer of a network to a cloud."""
 
     label: str
-    """The name of the most probable class, known or not."""
+    """The answer: the name of the most probable class, or `unknown`."""
     index: int
-    """The index of the class in `Classifier.classes`."""
+    """The index of the most probable class in `Classifier.classes`, known or not."""
     is_unknown: bool
     """Whether the object belongs to no known class."""
     confidence: float
@@ -64,21 +66,44 @@ class Classifier(Remade):
         """The names of the classes."""
         return self._classifier.classes
 
-    def __call__(self, cloud: Scan | ArrayLike, *, ground_z: float | None = None) -> Prediction:
-        """Classify a cloud, [n, 3], z up.
+    @overload
+    def __call__(self, cloud: Scan, *, ground_z: float | None = None) -> Prediction: ...
+    @overload
+    def __call__(self, cloud: Sequence[Scan], *, ground_z: float | None = None) -> list[Prediction]: ...
+    @overload
+    def __call__(self, cloud: ArrayLike, *, ground_z: float | None = None) -> Prediction | list[Prediction]: ...
+    def __call__(
+        self, cloud: Scan | Sequence[Scan] | ArrayLike, *, ground_z: float | None = None
+    ) -> Prediction | list[Prediction]:
+        """Classify a cloud, or each cloud of a batch.
 
         Args:
-            cloud: The points, which must be finite.
+            cloud: A scan, or finite points, [n, 3], z up. Further columns, such as the intensity in
+                [n, 4], are ignored. A batch is a list of these, or an array of shape [b, n, 3].
             ground_z: The height of the ground below the object, metres, for models such as
                 `street-128` that were trained with it.
         """
+        if _is_batch(cloud):
+            batch: Any = cloud
+            return [Prediction(**self._classify(one, ground_z)) for one in batch]
+        return Prediction(**self._classify(cloud, ground_z))
+
+    def _classify(self, cloud: Any, ground_z: float | None) -> dict[str, Any]:
         points = cloud.positions if isinstance(cloud, Scan) else cloud
-        return Prediction(**self._classifier.classify(points_of(points), ground_z))
+        return self._classifier.classify(points_of(points), ground_z)
+
+
+def _is_batch(cloud: Any) -> bool:
+    if isinstance(cloud, Scan):
+        return False
+    if isinstance(cloud, (list, tuple)) and cloud and isinstance(cloud[0], (Scan, np.ndarray)):
+        return isinstance(cloud[0], Scan) or cloud[0].ndim == 2
+    return np.ndim(cloud) == 3
 
 
 def points_of(cloud: ArrayLike) -> NDArray[np.float32]:
-    """`cloud` as points of shape [n, 3]."""
-    points = np.ascontiguousarray(cloud, dtype=np.float32)
-    if points.ndim != 2:
+    """The first three columns of `cloud`, which are points of shape [n, 3]."""
+    points = np.asarray(cloud, dtype=np.float32)
+    if points.ndim != 2 or points.shape[1] < 3:
         raise _edgepuck.Error(f"expected points of shape [n, 3], found {list(points.shape)}")
-    return points
+    return np.ascontiguousarray(points[:, :3])

@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _edgepuck, _scanning
 from ._arguments import Remade, place
-from .mesh import Mesh
-from .mesh import native as mesh_of
-from .scan import Scan
+from ._mesh import Mesh
+from ._mesh import native as mesh_of
+from ._scan import Scan
 
 
 class Sensor(Remade):

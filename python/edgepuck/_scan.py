@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ._edgepuck import Error
+from . import _edgepuck
 
 # The columns in files whose names are keywords of Python, or too short there.
 _NAMES = {"return": "return_number", "sensor": "sensor_position"}
@@ -52,21 +52,32 @@ class Scan:
     medium: NDArray[np.uint8] | None = None
     """The source of the return: 0 a surface, 1 rain, 2 snow, 3 fog, 4 dust or spray, [n]."""
     sensor_position: NDArray[np.float32] | None = None
-    """Position of the sensor when it fired the beam, metres, [n, 3]."""
+    """Position of the sensor when it fired the beam, metres, relative to `origin`, [n, 3]: that of
+    `pose`, unless the sensor moved and the attribute `sensor` was requested."""
     attitude: NDArray[np.float32] | None = None
     """Orientation of the sensor at that time, a rotation vector, radians, [n, 3]."""
     normal: NDArray[np.float32] | None = None
     """Unit normal of the surface, towards the sensor, [n, 3]."""
     pose: NDArray[np.float64] | None = None
-    """Transform from the frame of the sensor to that of the positions, [4, 4]. None if the positions
-    are in the frame of the sensor."""
+    """Transform from the frame of the sensor to that of the positions, [4, 4], when the scan began.
+    It is the identity if the positions are in the frame of the sensor."""
+
+    _is_at_rest = False
+
+    def __post_init__(self) -> None:
+        if self.pose is None:
+            self.pose = np.eye(4)
+        if self.sensor_position is None:
+            at = (self.pose[:3, 3] - self.origin).astype(np.float32)
+            self.sensor_position = np.broadcast_to(at, self.positions.shape)
+            self._is_at_rest = True
 
     def __len__(self) -> int:
         """The number of points."""
         return len(self.positions)
 
     def __repr__(self) -> str:
-        columns = (field.name for field in fields(self) if field.name not in ("origin", "pose"))
+        columns = (field.name for field in fields(self) if field.name not in ("origin", "pose", "sensor_position"))
         known = ", ".join(name for name in columns if getattr(self, name) is not None)
         return f"<Scan of {len(self)} points: {known}>"
 
@@ -76,27 +87,25 @@ class Scan:
 
     def in_sensor_frame(self) -> NDArray[np.float32]:
         """The positions in the frame of the sensor, x forward and z up, metres, [n, 3]."""
-        if self.pose is None:
-            return self.positions
+        assert self.pose is not None
         from_sensor = self.positions + (self.origin - self.pose[:3, 3])
         return np.ascontiguousarray(from_sensor @ self.pose[:3, :3], dtype=np.float32)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write an NPZ file, which `edgepuck preview` and `edgepuck segment` read.
+        """Write a file with the extension .npz, .ply or .csv, like `edgepuck scan`.
 
         Raises:
-            Error: The file's name does not end in `.npz`.
+            Error: The name has another extension, or the file cannot be written.
         """
-        if not os.fspath(path).endswith(".npz"):
-            raise Error(f"{os.fspath(path)}: expected a file that ends in .npz")
         names = {name: column for column, name in _NAMES.items()}
-        columns = {field.name: getattr(self, field.name) for field in fields(self)}
-        del columns["pose"]
-        known = {names.get(name, name): of for name, of in columns.items() if of is not None}
-        if not known["origin"].any():
-            del known["origin"]
-        with open(path, "wb") as file:
-            np.savez(file, **known)
+        columns = {names.get(field.name, field.name): getattr(self, field.name) for field in fields(self)}
+        left_out = {"pose", "sensor"} if self._is_at_rest else {"pose"}
+        known = {
+            name: np.ascontiguousarray(of)
+            for name, of in columns.items()
+            if of is not None and name not in left_out
+        }
+        _edgepuck.save_scan(os.fspath(path), known)
 
 
 def scan_of(columns: Mapping[str, Any]) -> Scan:

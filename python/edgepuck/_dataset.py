@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from multiprocessing.context import get_spawning_popen
 from typing import Any
 
@@ -48,6 +48,7 @@ class Dataset:
         min_points: A view with fewer points is replaced by another view.
         cache_mb: The size of the cache of meshes in each process, MiB.
         adapter: The adapter, as in `Sensor`.
+        transform: A function that `dataset[i]` applies to each cloud; `batch` does not.
 
     Raises:
         Error: The folder has no mesh, or a setting is wrong. A mesh that cannot be read raises an
@@ -74,6 +75,7 @@ class Dataset:
         min_points: int = 64,
         cache_mb: int = 1024,
         adapter: str = "cpu",
+        transform: Callable[[NDArray[np.float32]], Any] | None = None,
     ) -> None:
         flags = {
             "sensor": place(sensor),
@@ -91,7 +93,7 @@ class Dataset:
             "dropout": dropout,
         }
         words = [f"--{flag}={value}" for flag, value in flags.items() if value is not None]
-        self._seed = seed
+        self._seed, self._transform = seed, transform
         cache = whole("cache_mb", cache_mb, 0, 2**30) << 20
         self._arguments = (os.path.abspath(meshes), split, words, cache, adapter)
         self._clouds = _edgepuck.Clouds(*self._arguments)
@@ -131,13 +133,13 @@ class Dataset:
         seed = _edgepuck.seed_of_epoch(self._seed, self.epoch)
         return self._clouds.draw(seed, [self._number(index) for index in indices])
 
-    def __getitem__(self, index: int) -> tuple[NDArray[np.float32], int]:
-        clouds, labels = self.batch([index])
-        return clouds[0], int(labels[0])
+    def __getitem__(self, index: int) -> tuple[Any, int]:
+        return self.__getitems__([index])[0]
 
-    def __getitems__(self, indices: Sequence[int]) -> list[tuple[NDArray[np.float32], int]]:
+    def __getitems__(self, indices: Sequence[int]) -> list[tuple[Any, int]]:
         clouds, labels = self.batch(indices)
-        return list(zip(clouds, labels.tolist(), strict=True))
+        transformed = clouds if self._transform is None else map(self._transform, clouds)
+        return list(zip(transformed, labels.tolist(), strict=True))
 
     def _number(self, index: int) -> int:
         return number("clouds", index, len(self))
@@ -145,10 +147,17 @@ class Dataset:
     def __getstate__(self) -> dict[str, Any]:
         # Only children of this process can share its memory.
         shared = None if get_spawning_popen() is None else self._epoch
-        return {"arguments": self._arguments, "seed": self._seed, "epoch": self.epoch, "shared": shared}
+        return {
+            "arguments": self._arguments,
+            "seed": self._seed,
+            "transform": self._transform,
+            "epoch": self.epoch,
+            "shared": shared,
+        }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self._arguments, self._seed = state["arguments"], state["seed"]
+        self._transform = state["transform"]
         self._clouds = _edgepuck.Clouds(*self._arguments)
         shared = state["shared"]
         self._epoch = multiprocessing.RawValue("Q", state["epoch"]) if shared is None else shared

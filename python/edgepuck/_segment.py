@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _edgepuck
-from .classifier import points_of
-from .scan import Scan
+from ._classifier import points_of
+from ._scan import Scan
 
 
 def segment(
@@ -21,7 +21,8 @@ def segment(
     and -3 is a point that is not finite.
 
     Args:
-        sweep: A scan, or points of shape [n, 3] in the frame of the sensor, metres, z up.
+        sweep: A scan, or points of shape [n, 3] in the frame of the sensor, metres, z up; further
+            columns are ignored.
         rings: The ring of each point, from below, [n]. A scan has its own.
         radius: If given, clusters are the connected components of points within this distance,
             metres, and there is no ground. This suits clouds that are not sweeps of a sensor.
@@ -34,10 +35,14 @@ def segment(
     if isinstance(sweep, Scan):
         rings = sweep.ring if rings is None else rings
         sweep = sweep.in_sensor_frame()
-    of_points = None
-    if rings is not None:
-        found = np.asarray(rings)
-        if found.ndim != 1 or (found.size and not (0 <= found.min() and found.max() < 2**16)):
-            raise _edgepuck.Error("rings: expected whole numbers from 0 to 65535 of shape [n]")
-        of_points = np.ascontiguousarray(found, dtype=np.uint16)
-    return _edgepuck.segment(points_of(sweep), of_points, radius, min_points)
+    return _edgepuck.segment(points_of(sweep), rings_of(rings), radius, min_points)
+
+
+def rings_of(rings: ArrayLike | None) -> NDArray[np.uint16] | None:
+    """The rings of points, [n], if they are known."""
+    if rings is None:
+        return None
+    found = np.asarray(rings)
+    if found.ndim != 1 or (found.size and not (0 <= found.min() and found.max() < 2**16)):
+        raise _edgepuck.Error("rings: expected whole numbers from 0 to 65535 of shape [n]")
+    return np.ascontiguousarray(found, dtype=np.uint16)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from . import _arguments, _edgepuck
 from ._arguments import Remade, number, place, whole
-from .scan import Scan, scan_of
+from ._scan import Scan, scan_of
 
 
 @dataclass(eq=False, repr=False)

@@ -1,0 +1,40 @@
+//! The one rule for outputs that exist already.
+
+use crate::Usage;
+use std::path::Path;
+
+/// The flag of commands that write files.
+#[derive(clap::Args)]
+pub struct Overwrite {
+    /// Replace outputs that exist already
+    #[arg(long)]
+    overwrite: bool,
+}
+
+impl Overwrite {
+    /// Checks that none of the files or folders `outputs` exists, unless they may be replaced.
+    ///
+    /// # Errors
+    /// Names the first that does.
+    pub fn check<'a>(&self, outputs: impl IntoIterator<Item = &'a Path>) -> Result<(), Usage> {
+        let existing = outputs.into_iter().find(|path| !self.overwrite && path.exists());
+        let refused = |path: &Path| {
+            Usage(format!("{}: it exists already: --overwrite replaces it", path.display()))
+        };
+        existing.map_or(Ok(()), |path| Err(refused(path)))
+    }
+
+    /// As [`Overwrite::check`]; removes the folders that are there.
+    ///
+    /// # Errors
+    /// As [`Overwrite::check`], or a folder cannot be removed.
+    pub fn clear<'a>(&self, folders: impl IntoIterator<Item = &'a Path>) -> anyhow::Result<()> {
+        for folder in folders {
+            self.check([folder])?;
+            if folder.exists() {
+                std::fs::remove_dir_all(folder)?;
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,71 @@
+"""Detection of objects in sweeps."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+
+from numpy.typing import ArrayLike
+
+from . import _edgepuck
+from ._arguments import place, whole
+from ._classifier import points_of
+from ._scan import Scan
+from ._segment import rings_of
+
+
+@dataclass
+class Detection:
+    """An object of a known class in a sweep."""
+
+    label: str
+    """The name of its class."""
+    confidence: float
+    """The probability of the class."""
+    points: int
+    """The number of its points."""
+    cluster: int
+    """The number of its cluster, as of `segment`."""
+    centre: list[float]
+    """The centre of the box around its points, in the frame of the sensor, metres, [3]."""
+    size: list[float]
+    """The length, width and height of the box, metres, [3]."""
+    yaw_deg: float
+    """The rotation of the box about the z axis, counterclockwise from x, degrees."""
+
+
+def detect(
+    sweep: Scan | ArrayLike,
+    model: str | os.PathLike[str] = "street-128",
+    *,
+    rings: ArrayLike | None = None,
+    precision: str = "f32",
+    min_points: int = 20,
+    min_confidence: float = 0.0,
+) -> list[Detection]:
+    """Find the objects of known classes in a sweep, like `edgepuck detect`.
+
+    Args:
+        sweep: A scan, or points of shape [n, 3] in the frame of the sensor, metres, z up; further
+            columns are ignored.
+        model: `street-128`, or the path of a model of clusters.
+        rings: The ring of each point, from below, [n]. A scan has its own.
+        precision: The precision of the network: f32, f32-fc16, f16 or i8.
+        min_points: The smallest number of points of an object.
+        min_confidence: The smallest confidence of an object.
+
+    Raises:
+        Error: The model cannot be read, or the points have a wrong shape.
+
+    >>> import edgepuck as ep
+    >>> found = detect(ep.Scenes("street", seed=1)[0].scan)
+    >>> all(0 < one.confidence <= 1 for one in found)
+    True
+    """
+    if isinstance(sweep, Scan):
+        rings = sweep.ring if rings is None else rings
+        sweep = sweep.in_sensor_frame()
+    least = whole("min_points", min_points, 1, 2**32)
+    found = _edgepuck.detect(points_of(sweep), rings_of(rings), place(model), precision, least)
+    detections = [Detection(**one) for one in found]
+    return [one for one in detections if one.confidence >= min_confidence]

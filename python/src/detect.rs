@@ -1,0 +1,41 @@
+use crate::arrays::points;
+use crate::error::{raised, raised_with_causes};
+use edgepuck_program::detect::{Detector, Object};
+use edgepuck_segment::OrientedBox;
+use formats::Scan;
+use infer_cpu::Options;
+use numpy::{PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::path::Path;
+
+/// Find the objects of known classes in a sweep, `[n, 3]` from the sensor.
+#[pyfunction]
+pub fn detect<'py>(
+    py: Python<'py>,
+    cloud: PyReadonlyArray2<'py, f32>,
+    rings: Option<PyReadonlyArray1<'py, u16>>,
+    model: &str,
+    precision: &str,
+    min_points: usize,
+) -> PyResult<Vec<Bound<'py, PyDict>>> {
+    let options = Options { precision: precision.parse().map_err(raised)?, ..Options::default() };
+    let ring = rings.map(|rings| rings.as_array().to_vec());
+    let scan = Scan { positions: points(&cloud)?, ring, ..Scan::default() };
+    let found = py.detach(|| Detector::open(Path::new(model), &options, min_points)?.detect(&scan));
+    let objects = found.map_err(raised_with_causes)?.objects;
+    objects.iter().map(|object| told(py, object)).collect()
+}
+
+fn told<'py>(py: Python<'py>, object: &Object) -> PyResult<Bound<'py, PyDict>> {
+    let OrientedBox { centre_m, size_m, yaw_rad } = object.place;
+    let told = PyDict::new(py);
+    told.set_item("label", &object.class)?;
+    told.set_item("confidence", object.confidence)?;
+    told.set_item("points", object.n_points)?;
+    told.set_item("cluster", object.cluster)?;
+    told.set_item("centre", centre_m)?;
+    told.set_item("size", size_m)?;
+    told.set_item("yaw_deg", yaw_rad.to_degrees())?;
+    Ok(told)
+}
