@@ -25,7 +25,7 @@ class Detection:
     points: int
     """The number of its points."""
     cluster: int
-    """The number of its cluster, as of `segment`."""
+    """The number of its cluster, as of `segment` with the same `min_points`."""
     centre: list[float]
     """The centre of the box around its points, in the frame of the sensor, metres, [3]."""
     size: list[float]

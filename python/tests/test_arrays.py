@@ -238,7 +238,7 @@ def test_a_batch_has_the_answers_of_its_clouds(cube: tuple) -> None:
 def test_objects_of_a_street_are_detected_where_they_stand() -> None:
     scene = ep.Scenes("street", seed=1)[0]
     found = ep.detect(scene.scan)
-    clusters = ep.segment(scene.scan)
+    clusters = ep.segment(scene.scan, min_points=20)
     for one in found:
         points = scene.scan.positions[clusters == one.cluster]
         assert len(points) == one.points >= 20

@@ -93,7 +93,8 @@ fn a_drive_that_cannot_be_made_is_refused_and_leaves_nothing() {
     refused("walls.toml --sensor vlp16 --out a.pcap", 1, "VLP-32C");
     refused("absent.toml --out a.pcap", 1, "absent.toml");
     folder.write("taken.pcap/file", "");
-    refused("walls.toml --seconds 0.1 --out taken.pcap", 1, "taken.pcap");
+    refused("walls.toml --seconds 0.1 --out taken.pcap", 2, "taken.pcap: it exists already");
+    refused("walls.toml --seconds 0.1 --overwrite --out taken.pcap", 1, "taken.pcap");
     for name in ["a.pcap", "a.tum", "a.truth.jsonl", "taken.tum"] {
         assert!(!folder.at(name).exists(), "{name}");
     }

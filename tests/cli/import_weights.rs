@@ -31,7 +31,7 @@ fn read(path: &Path) -> (Tensors, ModelCard) {
 }
 
 fn words(checkpoint: &Path, flags: &str) -> String {
-    format!("import-weights {} --out m.safetensors {flags}", checkpoint.display())
+    format!("import-weights {} --overwrite --out m.safetensors {flags}", checkpoint.display())
 }
 
 impl Folder {

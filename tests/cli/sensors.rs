@@ -88,7 +88,7 @@ fn rosettes_tables_and_many_revolutions_make_scenes_and_datasets() {
     };
     let n_points = |sensor: &str| {
         folder.write("scene.toml", scene(sensor));
-        folder.succeeds("scan scene.toml --adapter cpu --out scan.npz");
+        folder.succeeds("scan scene.toml --adapter cpu --overwrite --out scan.npz");
         folder.scan("scan.npz").len()
     };
     let avia = "profile = \"avia\"\nposition_m = [0, 0, 0]\nyaw_deg = 0\n";
@@ -142,7 +142,7 @@ fn scans_of_other_times_have_other_noise() {
                  [[sensor]]\nprofile = \"ld19\"\nposition_m = [0, 0, 0]\nyaw_deg = 0\n{start}\n"
             ),
         );
-        folder.succeeds("scan scene.toml --adapter cpu --out scan.npz");
+        folder.succeeds("scan scene.toml --adapter cpu --overwrite --out scan.npz");
         folder.scan("scan.npz").positions
     };
     let first = scan("");
