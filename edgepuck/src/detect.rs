@@ -8,7 +8,9 @@ use formats::{Scan, atomic};
 use infer_cpu::{Classifier, Options, Precision};
 use serde_json::{Value, json};
 
-use crate::segment::{SweepArgs, tint};
+use crate::flags::need_extension;
+use crate::points::SweepArgs;
+use crate::segment::tint;
 use crate::{Outcome, Usage, preview};
 
 const BUNDLED: &str = "street-128";
@@ -22,7 +24,7 @@ pub(crate) struct DetectArgs {
     #[arg(long, default_value = BUNDLED, value_name = "MODEL")]
     model: PathBuf,
 
-    /// JSON file for the objects; a picture is written beside it, with the extension .png
+    /// JSON file (.json) for the objects; a picture is written beside it, with the extension .png
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 
@@ -36,6 +38,7 @@ pub(crate) struct DetectArgs {
 }
 
 pub(crate) fn run(args: &DetectArgs) -> anyhow::Result<Outcome> {
+    need_extension("--out", &args.out, "json")?;
     let scan = args.input.read()?;
     let options = Options { precision: args.precision, ..Options::default() };
     let mut detector = Detector::open(&args.model, &options, args.min_points)?;

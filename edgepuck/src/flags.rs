@@ -24,6 +24,14 @@ pub fn need_folder_of_meshes(meshes: Option<&Path>) -> Result<(), Usage> {
     }
 }
 
+/// Checks that the name of the file to write has the extension `expected`.
+pub fn need_extension(flag: &str, file: &Path, expected: &str) -> Result<(), Usage> {
+    if file.extension().is_some_and(|found| found.eq_ignore_ascii_case(expected)) {
+        return Ok(());
+    }
+    Err(Usage(format!("{flag}: expected a name with .{expected}, found {}", file.display())))
+}
+
 /// Parses a finite number above 0.
 pub fn positive(word: &str) -> Result<f64, String> {
     match word.parse::<f64>() {

@@ -24,6 +24,7 @@ pub mod gen_shapes;
 mod import_weights;
 mod merge_dataset;
 mod overwrite;
+mod points;
 mod preview;
 mod preview_scan;
 mod profile;

@@ -1,15 +1,20 @@
 //! `edgepuck preview`: a picture of a scan.
 
+use crate::flags::need_extension;
+use crate::points::PointsArgs;
 use crate::{Outcome, preview};
-use formats::scan_file::read_scan;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub struct Args {
-    /// Scan to draw, .npz or .ply; if it is in the folder clean/ of a dataset, its noisy version is
-    /// drawn below it
+    /// Points to draw: a scan (.npz, .ply, .csv), a capture (.pcap or .pcapng), of which the first
+    /// turn is drawn, or a cloud (.npy, .pcd, .xyz, .txt, .pts, .las, KITTI's or nuScenes' .bin). If
+    /// a scan is in the folder clean/ of a dataset, its noisy version is drawn below it
     #[arg(value_name = "SCAN")]
     scan: PathBuf,
+
+    #[command(flatten)]
+    points: PointsArgs,
 
     /// Second scan, drawn below the first
     #[arg(long, value_name = "SCAN")]
@@ -21,11 +26,10 @@ pub struct Args {
 }
 
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
-    let clean = read_scan(&args.scan)?;
-    let noisy = match &args.noisy {
-        Some(file) => Some(read_scan(file)?),
-        None => noisy_twin(&args.scan).map(|file| read_scan(&file)).transpose()?,
-    };
+    need_extension("--out", &args.out, "png")?;
+    let clean = args.points.read(&args.scan)?;
+    let noisy = args.noisy.clone().or_else(|| noisy_twin(&args.scan));
+    let noisy = noisy.map(|file| args.points.read(&file)).transpose()?;
     let title = args.scan.file_stem().unwrap_or_default().to_string_lossy();
     preview::draw(&clean, noisy.as_ref(), &title, &args.out)?;
     eprintln!("{} points: {}", clean.len(), args.out.display());

@@ -1,5 +1,6 @@
+use crate::Outcome;
+use crate::flags::need_extension;
 use crate::significant_digits::digits;
-use crate::{Outcome, Usage};
 use formats::atomic;
 use glam::DVec3;
 use sim_gpu::glam;
@@ -30,12 +31,7 @@ pub fn run(args: &ProfileArgs) -> anyhow::Result<Outcome> {
         }
         return Ok(Outcome::Success);
     };
-    if let Some(file) = args.beams.as_deref()
-        && file.extension().is_none_or(|extension| extension != "csv")
-    {
-        let found = file.display();
-        return Err(Usage(format!("--beams: expected a name with .csv, found {found}")).into());
-    }
+    args.beams.iter().try_for_each(|file| need_extension("--beams", file, "csv"))?;
     let sensor = SensorProfile::resolve(name)?;
     let pattern = sensor.pattern();
     print!("{}", described(&sensor, &pattern));

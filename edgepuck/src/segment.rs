@@ -1,36 +1,12 @@
+use crate::points::SweepArgs;
 use crate::{Outcome, Usage, preview};
 use edgepuck_segment::{Label, Segmentation, Segmenter, Settings, Sweep};
-use formats::cloud_file::{read_cloud, read_intensities, write_cloud};
-use formats::scan_file::read_scan;
-use formats::{FormatError, Scan, Senders, atomic, ouster, velodyne};
+use formats::cloud_file::write_cloud;
+use formats::{FormatError, Scan, atomic};
 use plotters::style::{Color, HSLColor, RGBColor};
-use std::borrow::Cow;
 use std::io::Write;
-use std::net::IpAddr;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-
-/// The input of `segment` and `detect`.
-#[derive(clap::Args)]
-pub struct SweepArgs {
-    /// Sweep in metres, z up: a scan (.npz or .ply, with its rings if it has them); a capture
-    /// (.pcap or .pcapng), of which the first turn is used, of a VLP-16 or VLP-32C, or with
-    /// --metadata of an Ouster; or a cloud in any format that infer-cpu reads
-    #[arg(value_name = "SWEEP")]
-    pub sweep: PathBuf,
-
-    /// Metadata (JSON) of the Ouster OS0, OS1 or OS2 whose packets are in the capture SWEEP
-    #[arg(long, value_name = "FILE")]
-    metadata: Option<PathBuf>,
-
-    /// Address of the sensor whose packets are used [default: the first sensor of the capture]
-    #[arg(long, value_name = "ADDRESS")]
-    from: Option<IpAddr>,
-
-    /// Position of the sensor in the sweep, in metres [default: 0 0 0]
-    #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true)]
-    sensor: Option<Vec<f64>>,
-}
 
 #[derive(clap::Args)]
 pub struct SegmentArgs {
@@ -78,67 +54,6 @@ pub fn run(args: &SegmentArgs) -> anyhow::Result<Outcome> {
         args.out.display()
     );
     Ok(Outcome::Success)
-}
-
-impl SweepArgs {
-    /// The points relative to the sensor, and their rings if the file is a scan with rings.
-    pub fn read(&self) -> Result<Scan, FormatError> {
-        let sensor = self.sensor_m();
-        let from_sensor =
-            |point: &[f64; 3]| [0, 1, 2].map(|axis| (point[axis] - sensor[axis]) as f32);
-        if let Some(mut scan) = self.read_capture()? {
-            for point in &mut scan.positions {
-                *point = from_sensor(&point.map(f64::from));
-            }
-            return Ok(scan);
-        }
-        let positions = read_cloud(&self.sweep)?.iter().map(from_sensor).collect();
-        // A cloud that is not a scan has no rings.
-        let ring = read_scan(&self.sweep).ok().and_then(|scan| scan.ring);
-        Ok(Scan { positions, ring, ..Scan::default() })
-    }
-
-    /// The sweep as in its file, with all attributes of the points.
-    pub fn read_whole(&self) -> Result<Scan, FormatError> {
-        if let Some(scan) = self.read_capture()? {
-            return Ok(scan);
-        }
-        if let Ok(scan) = read_scan(&self.sweep) {
-            return Ok(scan);
-        }
-        let positions = read_cloud(&self.sweep)?;
-        let positions = positions.iter().map(|point| point.map(|x| x as f32)).collect();
-        let intensity = read_intensities(&self.sweep)?;
-        Ok(Scan { positions, intensity, ..Scan::default() })
-    }
-
-    pub fn sensor_m(&self) -> [f64; 3] {
-        let given = self.sensor.as_deref().and_then(|xyz| <[f64; 3]>::try_from(xyz).ok());
-        given.unwrap_or_default()
-    }
-
-    /// The first turn of a sensor, if the sweep is a capture.
-    fn read_capture(&self) -> Result<Option<Scan>, FormatError> {
-        let is = |end: &str| self.sweep.extension().is_some_and(|it| it.eq_ignore_ascii_case(end));
-        let mut senders = Senders::new(self.from);
-        let scan = match &self.metadata {
-            Some(file) => {
-                let metadata = ouster::Metadata::read(file)?;
-                ouster::read_frame(&self.sweep, &metadata, &mut senders)?
-            }
-            None if is("pcap") || is("pcapng") => velodyne::read_turn(&self.sweep, &mut senders)?,
-            None => return Ok(None),
-        };
-        if let Some(warning) = senders.warning() {
-            eprintln!("warning: {}: {warning}", self.sweep.display());
-        }
-        Ok(Some(scan))
-    }
-
-    /// The title of a picture of the sweep.
-    pub fn title(&self) -> Cow<'_, str> {
-        self.sweep.file_stem().unwrap_or_default().to_string_lossy()
-    }
 }
 
 /// The colour of a label: grey for the ground, light grey for points in no cluster, and for

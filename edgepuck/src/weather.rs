@@ -1,5 +1,5 @@
 use crate::brightness::BrightnessArgs;
-use crate::segment::SweepArgs;
+use crate::points::SweepArgs;
 use crate::{Outcome, Usage};
 use formats::Scan;
 use formats::hash::Hashing;

@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use crate::error::FormatError;
-use crate::pcap;
+use crate::pcap::{self, Counts};
 use crate::returns::Return;
 use crate::scan::Scan;
 
@@ -88,17 +88,16 @@ impl Display for Senders {
     }
 }
 
-/// Passes each UDP packet of the sensor in a capture to `take` until it breaks; returns the number
-/// of UDP packets. `is_data` is for [`Senders::takes`].
+/// Passes each UDP packet of the sensor in a capture to `take` until it breaks. `is_data` is for
+/// [`Senders::takes`].
 pub(crate) fn each_packet<E: Display>(
     path: &Path,
     senders: &mut Senders,
     is_data: impl Fn(&[u8]) -> bool,
     mut take: impl FnMut(&[u8]) -> Result<ControlFlow<()>, E>,
-) -> Result<usize, FormatError> {
-    let (mut n_packets, mut flaw) = (0, None);
-    pcap::read(path, |packet| {
-        n_packets += 1;
+) -> Result<Counts, FormatError> {
+    let mut flaw = None;
+    let counts = pcap::read(path, |packet| {
         if !senders.takes(packet.source, || is_data(&packet.payload)) {
             return ControlFlow::Continue(());
         }
@@ -108,9 +107,10 @@ pub(crate) fn each_packet<E: Display>(
         })
     })?;
     match flaw {
-        None => Ok(n_packets),
+        None => Ok(counts),
         Some(cause) => {
-            Err(FormatError::malformed(path, format!("UDP packet {}", n_packets - 1), cause))
+            let number = counts.packets.saturating_sub(1);
+            Err(FormatError::malformed(path, format!("UDP packet {number}"), cause))
         }
     }
 }

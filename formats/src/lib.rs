@@ -5,7 +5,7 @@
 //!
 //! | feature | what it adds |
 //! | --- | --- |
-//! | `files` | `atomic` writes; clouds (`cloud_file`) as text, NPY and KITTI's `.bin` |
+//! | `files` | `atomic` writes; clouds (`cloud_file`) as text, NPY, KITTI's and nuScenes' `.bin` |
 //! | `npz`, `ply`, `pcd`, `las` | clouds in one more format each; `npz` `labelled` sets and sweeps too |
 //! | `cloud-files` | all of these |
 //! | `dataset` | scans, packed sets, sets of clusters and yanx27's layout, written and read; tars of WebDataset, written |

@@ -11,6 +11,10 @@ use crate::error::FormatError;
 /// line of a point takes some hundred bytes.
 const LONGEST_LINE: u64 = 1 << 20;
 
+/// What some editors and programs write before UTF-8.
+pub(crate) const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
+
+/// The lines of a text, without the byte order mark that it may begin with.
 pub(crate) struct Lines<'a, R> {
     /// The rest of the file after the last line that was read.
     pub reader: &'a mut R,
@@ -54,6 +58,9 @@ impl<'a, R: BufRead> Lines<'a, R> {
         let mut limited = self.reader.by_ref().take(LONGEST_LINE);
         let read = limited.read_until(b'\n', &mut self.bytes);
         let n = read.map_err(|source| FormatError::io(self.name, source))? as u64;
+        if self.number == 1 && self.bytes.starts_with(BYTE_ORDER_MARK) {
+            self.bytes.drain(..BYTE_ORDER_MARK.len());
+        }
         if n == LONGEST_LINE && !self.bytes.ends_with(b"\n") {
             return Err(self.line().error(format!("longer than {LONGEST_LINE} bytes")));
         }

@@ -9,7 +9,7 @@ use std::io::{self, Read, Write};
 
 use crate::decoding::{excerpt, invalid};
 use crate::number::{ByteOrder, Number, NumberType};
-use crate::python_literal::{dictionary, string, tuple};
+use crate::python_literal::{dictionary, record, string, tuple};
 use crate::records;
 
 pub(crate) const MAGIC: &[u8] = b"\x93NUMPY";
@@ -21,7 +21,7 @@ const LONGEST_HEADER: u64 = 1 << 20;
 
 #[derive(Debug, PartialEq)]
 pub(crate) struct Header {
-    /// The type of an element, as in `<f4`; empty for a record.
+    /// The type of an element, as in `<f4`, or the list of a record's fields.
     pub descr: String,
     /// Whether the first index, not the last, runs fastest.
     pub is_fortran_order: bool,
@@ -42,12 +42,20 @@ impl Header {
 
     /// The type of an element, if it is a number.
     pub fn number(&self) -> Option<(NumberType, ByteOrder)> {
-        let order = match self.descr.get(..1)? {
-            ">" => ByteOrder::Big,
-            "<" | "|" => ByteOrder::Little,
-            _ => return None,
-        };
-        Some((NumberType::of_numpy(&self.descr[1..])?, order))
+        number(&self.descr)
+    }
+
+    /// The fields of a record that are single numbers, with their names, types and offsets, and the
+    /// size of the record, bytes.
+    pub fn record(&self) -> Option<(Vec<RecordField<'_>>, usize)> {
+        let (mut numbers, mut end) = (Vec::new(), 0usize);
+        for (name, kind, count) in record(&self.descr)? {
+            if let Some((number, order)) = number(kind).filter(|_| count == 1) {
+                numbers.push(RecordField { name, number, order, offset: end });
+            }
+            end = end.checked_add(size_of_element(kind)?.checked_mul(count)?)?;
+        }
+        Some((numbers, end))
     }
 
     /// As [`Header::number`], with an error for other types.
@@ -60,6 +68,31 @@ impl Header {
         };
         self.number().ok_or_else(not_numbers)
     }
+}
+
+/// A number in a record.
+pub(crate) struct RecordField<'a> {
+    pub name: &'a str,
+    pub number: NumberType,
+    pub order: ByteOrder,
+    pub offset: usize,
+}
+
+fn number(descr: &str) -> Option<(NumberType, ByteOrder)> {
+    let order = match descr.get(..1)? {
+        ">" => ByteOrder::Big,
+        "<" | "|" => ByteOrder::Little,
+        _ => return None,
+    };
+    Some((NumberType::of_numpy(&descr[1..])?, order))
+}
+
+/// Bytes of an element of any type but Python's objects.
+fn size_of_element(descr: &str) -> Option<usize> {
+    let kind = descr.trim_start_matches(['<', '>', '|']);
+    // A unit may follow: `M8[ns]`.
+    let size: usize = kind.get(1..)?.split('[').next()?.parse().ok()?;
+    if kind.starts_with('U') { size.checked_mul(4) } else { Some(size) }
 }
 
 /// The header of an array in C order, as NumPy writes it.
@@ -129,7 +162,7 @@ fn interpret(text: &str, n_bytes: usize) -> Option<Header> {
         _ => return None,
     };
     let shape = tuple(entry("shape")?)?;
-    let descr = string(descr).map(|(descr, _)| descr).unwrap_or_default().to_owned();
+    let descr = string(descr).map_or(descr, |(descr, _)| descr).to_owned();
     Some(Header { descr, is_fortran_order, shape, n_bytes })
 }
 
@@ -243,7 +276,7 @@ mod tests {
             ),
             (
                 "{'descr': [('x', '<f4'), ('y,}', '<f4')], 'fortran_order': False, 'shape': (2,), }",
-                "",
+                "[('x', '<f4'), ('y,}', '<f4')]",
                 false,
                 &[2],
             ),

@@ -4,17 +4,21 @@
 //! of 16 (<https://ietf-opsawg-wg.github.io/draft-ietf-opsawg-pcap/draft-ietf-opsawg-pcap.html>).
 //! This module writes these two headers itself, and those of the frames with `etherparse`. It reads
 //! the classic format and pcapng with `pcap-parser`. Packets that are longer than a frame come in
-//! fragments (RFC 791), which are joined.
+//! fragments (RFC 791, RFC 8200), which are joined.
 
 use std::borrow::Cow;
+use std::fmt::{self, Display};
 use std::fs::File;
-use std::io::{self, Write};
+use std::io::{self, Read, Write};
 use std::net::IpAddr;
 use std::ops::ControlFlow;
 use std::path::Path;
 
 use etherparse::defrag::IpDefragBuf;
-use etherparse::{Ipv4Slice, NetSlice, PacketBuilder, SlicedPacket, TransportSlice, UdpSlice};
+use etherparse::{
+    EtherType, IpNumber, Ipv6ExtensionSlice, NetSlice, PacketBuilder, SlicedPacket, TransportSlice,
+    UdpSlice,
+};
 use pcap_parser::traits::PcapNGPacketBlock;
 use pcap_parser::{Block, Linktype, PcapBlockOwned, PcapError, create_reader};
 
@@ -85,38 +89,91 @@ pub struct UdpPacket<'a> {
     pub payload: Cow<'a, [u8]>,
 }
 
+/// What a capture has.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// UDP packets that were passed on.
+    pub packets: u64,
+    /// UDP packets that lack a fragment.
+    pub incomplete: u64,
+    /// Frames that were cut by a snap length or have an unknown link type.
+    pub unread: u64,
+    /// The number of the first of these, from 0, and its flaw.
+    pub first_unread: Option<(usize, String)>,
+}
+
+/// What was not read, for the end of a sentence; nothing if all was.
+impl Display for Counts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.incomplete > 0 {
+            write!(f, ", beside {} without all fragments", self.incomplete)?;
+        }
+        if let Some((first, flaw)) = &self.first_unread {
+            let n = self.unread;
+            write!(f, ", beside {n} frames that cannot be read (the first, {first}: {flaw})")?;
+        }
+        Ok(())
+    }
+}
+
 /// Passes each UDP packet of the capture at `path`, pcap or pcapng, to `each` until it breaks.
-/// Other packets and invalid ones are skipped.
+/// Other packets and invalid ones are skipped. Counts what was read so far.
 ///
 /// # Errors
-/// A file that cannot be read, is not a capture of Ethernet frames, or ends within a frame. At the
-/// end of the file, a packet with missing fragments.
+/// A file that cannot be read, is not a capture, ends within a frame, or has no UDP packet but
+/// frames that were cut or have an unknown link type.
 pub fn read(
     path: &Path,
-    mut each: impl FnMut(&UdpPacket<'_>) -> ControlFlow<()>,
-) -> Result<(), FormatError> {
+    each: impl FnMut(&UdpPacket<'_>) -> ControlFlow<()>,
+) -> Result<Counts, FormatError> {
     let file = File::open(path).map_err(|source| FormatError::io(path, source))?;
-    let flaw = |part: String, cause: String| FormatError::malformed(path, part, cause);
-    let mut reader =
-        create_reader(CAPACITY, file).map_err(|error| flaw("header".to_owned(), words(&error)))?;
+    read_from(file, path, each)
+}
+
+/// As [`read`], from `capture`, which errors call `name`.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_from(
+    capture: impl Read + Send,
+    name: &Path,
+    mut each: impl FnMut(&UdpPacket<'_>) -> ControlFlow<()>,
+) -> Result<Counts, FormatError> {
+    let flaw = |part: String, cause: String| FormatError::malformed(name, part, cause);
+    let mut reader = create_reader(CAPACITY, capture)
+        .map_err(|error| flaw("header".to_owned(), words(&error)))?;
     let (mut interfaces, mut fragments, mut number) = (Vec::new(), Fragments::default(), 0);
+    let mut counts = Counts::default();
     loop {
         let part = || format!("frame {number}");
         match reader.next() {
             Ok((size, block)) => {
                 if let Some(frame) = Frame::in_block(&block, &mut interfaces) {
-                    let packet = frame.udp_packet(number, &mut fragments);
-                    let packet = packet.map_err(|cause| flaw(part(), cause))?;
-                    if packet.is_some_and(|packet| each(&packet).is_break()) {
-                        return Ok(());
+                    match frame.udp_packet(number, &mut fragments) {
+                        Ok(Some(packet)) => {
+                            counts.packets += 1;
+                            if each(&packet).is_break() {
+                                return Ok(counts);
+                            }
+                        }
+                        Ok(None) => {}
+                        Err(cause) => {
+                            counts.unread += 1;
+                            counts.first_unread.get_or_insert((number, cause));
+                        }
                     }
                     number += 1;
                 }
                 reader.consume(size);
             }
             Err(PcapError::Eof) => {
-                let Some(number) = fragments.first_unfinished() else { return Ok(()) };
-                return Err(flaw(format!("frame {number}"), FRAGMENT.to_owned()));
+                counts.incomplete = fragments.given_up + fragments.unfinished.len() as u64;
+                return match counts.first_unread {
+                    Some((first, cause)) if counts.packets == 0 => {
+                        Err(flaw(format!("frame {first}"), cause))
+                    }
+                    _ => Ok(counts),
+                };
             }
             Err(PcapError::Incomplete(_)) => {
                 reader.refill().map_err(|error| flaw(part(), words(&error)))?;
@@ -126,17 +183,36 @@ pub fn read(
     }
 }
 
+/// Whether the file at `path` is a capture by its extension or its first bytes.
+#[must_use]
+pub fn is_capture(path: &Path) -> bool {
+    /// Classic captures of micro- or nanoseconds in either byte order, and pcapng.
+    const SIGNS: [[u8; 4]; 5] = [
+        [0xa1, 0xb2, 0xc3, 0xd4],
+        [0xd4, 0xc3, 0xb2, 0xa1],
+        [0xa1, 0xb2, 0x3c, 0x4d],
+        [0x4d, 0x3c, 0xb2, 0xa1],
+        [0x0a, 0x0d, 0x0d, 0x0a],
+    ];
+    let is_named = |end: &str| path.extension().is_some_and(|it| it.eq_ignore_ascii_case(end));
+    let mut start = [0; 4];
+    let read = File::open(path).and_then(|mut file| file.read_exact(&mut start));
+    ["pcap", "pcapng", "cap"].into_iter().any(is_named) || (read.is_ok() && SIGNS.contains(&start))
+}
+
 #[derive(Clone, Copy)]
 struct Interface {
     link: Linktype,
     /// The start of its clock in seconds of Unix time, and ticks of that clock in a second.
-    clock: (u64, u64),
+    clock: (f64, f64),
 }
 
 struct Frame<'a> {
     link: Linktype,
     time_s: Option<f64>,
     bytes: &'a [u8],
+    /// Bytes of the frame on the wire.
+    size: u32,
 }
 
 impl<'a> Frame<'a> {
@@ -144,48 +220,89 @@ impl<'a> Frame<'a> {
     fn in_block(block: &'a PcapBlockOwned<'_>, interfaces: &mut Vec<Interface>) -> Option<Self> {
         match block {
             PcapBlockOwned::LegacyHeader(header) => {
-                let ticks =
-                    if header.is_nanosecond_precision() { 1_000_000_000 } else { 1_000_000 };
-                *interfaces = vec![Interface { link: header.network, clock: (0, ticks) }];
+                let ticks = if header.is_nanosecond_precision() { 1e9 } else { 1e6 };
+                *interfaces = vec![Interface { link: header.network, clock: (0.0, ticks) }];
             }
             PcapBlockOwned::NG(Block::SectionHeader(_)) => interfaces.clear(),
             PcapBlockOwned::NG(Block::InterfaceDescription(interface)) => {
-                let ticks = interface.ts_resolution().unwrap_or(1_000_000);
-                let start = u64::try_from(interface.if_tsoffset).unwrap_or_default();
-                interfaces.push(Interface { link: interface.linktype, clock: (start, ticks) });
+                // The highest bit tells powers of two from powers of ten (pcapng, if_tsresol).
+                let base: f64 = if interface.if_tsresol & 0x80 == 0 { 10.0 } else { 2.0 };
+                let ticks = base.powi(i32::from(interface.if_tsresol & 0x7f));
+                let clock = (interface.if_tsoffset as f64, ticks);
+                interfaces.push(Interface { link: interface.linktype, clock });
             }
             PcapBlockOwned::Legacy(packet) => {
                 let &Interface { link, clock: (_, ticks) } = interfaces.first()?;
-                let second = f64::from(packet.ts_usec) / ticks as f64;
-                let time_s = Some(f64::from(packet.ts_sec) + second);
-                return Some(Self { link, time_s, bytes: packet.data });
+                let time_s = Some(f64::from(packet.ts_sec) + f64::from(packet.ts_usec) / ticks);
+                return Some(Self { link, time_s, bytes: packet.data, size: packet.origlen });
             }
             PcapBlockOwned::NG(Block::EnhancedPacket(packet)) => {
                 let &Interface { link, clock } = interfaces.get(packet.if_id as usize)?;
                 let ticks = u64::from(packet.ts_high) << 32 | u64::from(packet.ts_low);
-                let time_s = Some(clock.0 as f64 + ticks as f64 / clock.1 as f64);
-                return Some(Self { link, time_s, bytes: packet.packet_data() });
+                let time_s = Some(clock.0 + ticks as f64 / clock.1);
+                let (bytes, size) = (packet.packet_data(), packet.origlen);
+                return Some(Self { link, time_s, bytes, size });
             }
             PcapBlockOwned::NG(Block::SimplePacket(packet)) => {
                 let link = interfaces.first()?.link;
-                return Some(Self { link, time_s: None, bytes: packet.packet_data() });
+                let (bytes, size) = (packet.packet_data(), packet.origlen);
+                return Some(Self { link, time_s: None, bytes, size });
             }
             PcapBlockOwned::NG(_) => {}
         }
         None
     }
 
+    /// The headers of the frame, or `None` if they are not those of IP.
+    ///
+    /// # Errors
+    /// A link type that is not known (<https://www.tcpdump.org/linktypes.html>).
+    fn sliced(&self) -> Result<Option<SlicedPacket<'a>>, String> {
+        // The upper half of the classic header's field has flags.
+        let (ether_type_at, size) = match self.link.0 & 0xffff {
+            1 => (Some(12), 14),
+            // Linux cooked, versions 1 and 2: what `tcpdump -i any` writes.
+            113 => (Some(14), 16),
+            276 => (Some(0), 20),
+            // BSD loopback: the address family, in either byte order, before the IP header.
+            0 | 108 => (None, 4),
+            // Raw IP.
+            12 | 14 | 101 | 228 | 229 => (None, 0),
+            found => {
+                return Err(format!(
+                    "expected Ethernet, Linux cooked, loopback or raw IP, found link type {found}"
+                ));
+            }
+        };
+        let Some((header, rest)) = self.bytes.split_at_checked(size) else { return Ok(None) };
+        Ok(match ether_type_at {
+            None => SlicedPacket::from_ip(rest).ok(),
+            Some(at) => {
+                let kind = EtherType(u16::from_be_bytes([header[at], header[at + 1]]));
+                SlicedPacket::from_ether_type(kind, rest).ok()
+            }
+        })
+    }
+
     /// The UDP packet that the frame holds or, as its last fragment, completes.
+    ///
+    /// # Errors
+    /// As [`Frame::sliced`]; a frame that was cut.
     fn udp_packet(
         &self,
         number: usize,
         fragments: &mut Fragments,
     ) -> Result<Option<UdpPacket<'a>>, String> {
-        if self.link != Linktype::ETHERNET {
-            let found = self.link.0;
-            return Err(format!("expected Ethernet (link type 1), found link type {found}"));
-        }
-        let Ok(packet) = SlicedPacket::from_ethernet(self.bytes) else { return Ok(None) };
+        let Some(packet) = self.sliced()? else {
+            let (size, found) = (self.size, self.bytes.len());
+            if (found as u64) < u64::from(size) {
+                return Err(format!(
+                    "expected {size} bytes, found {found}, since the capture has a snap length: \
+                     capture whole frames (`tcpdump -s 0`)"
+                ));
+            }
+            return Ok(None);
+        };
         let source = match &packet.net {
             Some(NetSlice::Ipv4(ip)) => ip.header().source_addr().into(),
             Some(NetSlice::Ipv6(ip)) => ip.header().source_addr().into(),
@@ -198,10 +315,7 @@ impl<'a> Frame<'a> {
             payload,
         };
         if packet.is_ip_payload_fragmented() {
-            let Some(NetSlice::Ipv4(fragment)) = &packet.net else {
-                return Err(FRAGMENT.to_owned());
-            };
-            let joined = fragments.join(fragment, number);
+            let joined = packet.net.as_ref().and_then(|net| fragments.join(net, number));
             let udp = joined.as_deref().and_then(|joined| UdpSlice::from_slice(joined).ok());
             return Ok(udp.map(|udp| packet_with(&udp, Cow::Owned(udp.payload().to_vec()))));
         }
@@ -214,8 +328,6 @@ impl<'a> Frame<'a> {
     }
 }
 
-const FRAGMENT: &str = "expected whole UDP packets, found a fragment of one";
-
 /// Packets that are joined at the same time: those of a few senders, of up to 64 KiB each.
 const AT_ONCE: usize = 16;
 
@@ -226,31 +338,48 @@ const REPEATS: usize = 60_000;
 #[derive(Default)]
 struct Fragments {
     unfinished: Vec<Unfinished>,
-    /// The first frame of the first packet that was discarded.
-    given_up: Option<usize>,
+    /// The number of packets that were discarded.
+    given_up: u64,
 }
 
 struct Unfinished {
     /// Source, destination and identification.
-    key: ([u8; 4], [u8; 4], u16),
+    key: (IpAddr, IpAddr, u32),
     /// The frame of its first fragment.
     number: usize,
     joined: IpDefragBuf,
 }
 
 impl Fragments {
-    /// The packet that `fragment` in frame `number` completes. Fragments of other protocols and
-    /// contradictory ones are skipped.
-    fn join(&mut self, fragment: &Ipv4Slice<'_>, number: usize) -> Option<Vec<u8>> {
-        let (header, payload) = (fragment.header(), fragment.payload());
-        if payload.ip_number != etherparse::IpNumber::UDP {
+    /// The packet that the fragment `ip` in frame `number` completes. Fragments of other protocols
+    /// and contradictory ones are skipped.
+    fn join(&mut self, ip: &NetSlice<'_>, number: usize) -> Option<Vec<u8>> {
+        let (key, offset, more, payload) = match ip {
+            NetSlice::Ipv4(ip) => {
+                let header = ip.header();
+                let [source, destination] = [header.source_addr(), header.destination_addr()];
+                let key = (source.into(), destination.into(), header.identification().into());
+                (key, header.fragments_offset(), header.more_fragments(), ip.payload())
+            }
+            NetSlice::Ipv6(ip) => {
+                let [source, destination] =
+                    [ip.header().source_addr(), ip.header().destination_addr()];
+                let part = ip.extensions().clone().into_iter().find_map(|header| match header {
+                    Ipv6ExtensionSlice::Fragment(part) => Some(part),
+                    _ => None,
+                })?;
+                let key = (source.into(), destination.into(), part.identification());
+                (key, part.fragment_offset(), part.more_fragments(), ip.payload())
+            }
+            NetSlice::Arp(_) => return None,
+        };
+        if payload.ip_number != IpNumber::UDP {
             return None;
         }
-        let key = (header.source(), header.destination(), header.identification());
         let full = self.unfinished.len() == AT_ONCE;
         if self.unfinished.first().is_some_and(|one| full || number - one.number > REPEATS) {
-            let oldest = self.unfinished.remove(0);
-            self.given_up.get_or_insert(oldest.number);
+            self.unfinished.remove(0);
+            self.given_up += 1;
         }
         let at = self.unfinished.iter().position(|one| one.key == key).unwrap_or_else(|| {
             let joined = IpDefragBuf::new(payload.ip_number, Vec::new(), Vec::new());
@@ -258,13 +387,8 @@ impl Fragments {
             self.unfinished.len() - 1
         });
         let joined = &mut self.unfinished[at].joined;
-        joined.add(header.fragments_offset(), header.more_fragments(), payload.payload).ok()?;
+        joined.add(offset, more, payload.payload).ok()?;
         joined.is_complete().then(|| self.unfinished.remove(at).joined.take_bufs().0)
-    }
-
-    /// The first frame of the first packet that was never completed.
-    fn first_unfinished(&self) -> Option<usize> {
-        self.given_up.or_else(|| self.unfinished.first().map(|one| one.number))
     }
 }
 

@@ -39,6 +39,32 @@ fn end_of_value(text: &str) -> Option<usize> {
     (depth == 0 && quote.is_none()).then_some(text.len())
 }
 
+/// The values in a list or tuple.
+fn items(text: &str, open: char, close: char) -> Option<Vec<&str>> {
+    let mut rest = text.trim().strip_prefix(open)?.strip_suffix(close)?.trim();
+    let mut items = Vec::new();
+    while !rest.is_empty() {
+        let end = end_of_value(rest)?;
+        items.push(rest[..end].trim());
+        rest = rest[end..].strip_prefix(',').unwrap_or_default().trim_start();
+    }
+    Some(items)
+}
+
+/// The fields of a NumPy record: the name, the type, and the number of values.
+pub(crate) fn record(text: &str) -> Option<Vec<(&str, &str, usize)>> {
+    let field = |field| {
+        let parts = items(field, '(', ')')?;
+        let [name, kind, shape @ ..] = &parts[..] else { return None };
+        // A title comes before its name: ('title', 'name').
+        let name = items(name, '(', ')').map_or(Some(*name), |pair| pair.get(1).copied())?;
+        let sizes = shape.first().map_or(Some(Vec::new()), |shape| tuple(shape))?;
+        let count = sizes.iter().try_fold(1usize, |product, &size| product.checked_mul(size))?;
+        Some((string(name)?.0, string(kind)?.0, count))
+    };
+    items(text, '[', ']')?.into_iter().map(field).collect()
+}
+
 /// A tuple of whole numbers; Python 2 wrote an `L` behind long ones.
 pub(crate) fn tuple(text: &str) -> Option<Vec<usize>> {
     let numbers = text.strip_prefix('(')?.strip_suffix(')')?.trim();
@@ -66,6 +92,15 @@ mod tests {
     }
 
     #[test]
+    fn a_record_lists_its_fields() {
+        let text = "[('x', '<f4'), (('height', 'z'), '>f8', (2, 3)), ('', '|V3')]";
+        assert_eq!(record(text), Some(vec![("x", "<f4", 1), ("z", ">f8", 6), ("", "|V3", 1)]));
+        for text in ["('x', '<f4')", "[('x')]", "[('x', [('y', '<f4')])]", "[('x', '<f4', 3)]"] {
+            assert_eq!(record(text), None, "{text}");
+        }
+    }
+
+    #[test]
     fn a_tuple_of_one_ends_in_a_comma() {
         assert_eq!(tuple("()"), Some(vec![]));
         assert_eq!(tuple("(7,)"), Some(vec![7]));
@@ -80,7 +115,7 @@ mod tests {
         #[test]
         fn no_text_makes_it_panic(text in "[{}\\[\\]()'\",: a-zé0-9]{0,60}") {
             for text in [format!("{{{text}}}"), text] {
-                let _ = (dictionary(&text), string(&text), tuple(&text));
+                let _ = (dictionary(&text), string(&text), tuple(&text), record(&text));
             }
         }
     }

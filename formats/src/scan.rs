@@ -130,7 +130,23 @@ pub enum ColumnSlot<'a> {
     Vector(&'a mut Option<Vec<[f32; 3]>>),
 }
 
+/// Beyond this, f32 resolves less than half a millimetre.
+const FARTHEST_SINGLE_M: f64 = 8192.0;
+
 impl Scan {
+    /// A scan of `points` without attributes, from an origin near them if they are far from 0.
+    #[must_use]
+    pub fn of_points(points: &[[f64; 3]]) -> Self {
+        let first = points.iter().find(|point| point.iter().all(|x| x.is_finite()));
+        let is_far = points.iter().flatten().any(|x| x.is_finite() && x.abs() > FARTHEST_SINGLE_M);
+        let origin = match first {
+            Some(first) if is_far => first.map(f64::round),
+            _ => [0.0; 3],
+        };
+        let place = |point: &[f64; 3]| [0, 1, 2].map(|axis| (point[axis] - origin[axis]) as f32);
+        Self { origin, positions: points.iter().map(place).collect(), ..Self::default() }
+    }
+
     /// The number of points.
     #[must_use]
     pub fn len(&self) -> usize {

@@ -5,7 +5,7 @@
 //! | TUM | time in seconds, x y z in metres, quaternion qx qy qz qw (<https://cvg.cit.tum.de/data/datasets/rgbd-dataset/file_formats>) |
 //! | KITTI | twelve numbers, a 3 x 4 matrix row by row, without a time |
 //!
-//! Blanks separate numbers. Empty lines and lines that begin with `#` are skipped.
+//! Blanks separate numbers. Empty lines, lines that begin with `#` and a byte order mark are skipped.
 
 use std::path::Path;
 
@@ -27,6 +27,7 @@ pub struct KeyedPose {
 pub fn read_trajectory(path: &Path, period_s: f64) -> Result<Vec<KeyedPose>, FormatError> {
     let io = |source| FormatError::io(path, source);
     let text = std::fs::read_to_string(path).map_err(io)?;
+    let text = text.trim_start_matches('\u{feff}');
     let flaw =
         |line: usize, cause: &str| Err(FormatError::malformed(path, format!("line {line}"), cause));
     let mut poses: Vec<KeyedPose> = Vec::new();
@@ -174,7 +175,7 @@ mod tests {
         let (sine, cosine) = (std::f64::consts::TAU / 10.0).sin_cos();
         let (sin_half, cos_half) = (std::f64::consts::TAU / 20.0).sin_cos();
         let tum = read(&format!(
-            "# t p q\n0 1 2 3 0.5 0.5 0.5 0.5\n\n0.1 0 0 0 0 0 1 0\n0.2 0 0 0 {sin_half} 0 0 {cos_half}\n"
+            "\u{feff}# t p q\n0 1 2 3 0.5 0.5 0.5 0.5\n\n0.1 0 0 0 0 0 1 0\n0.2 0 0 0 {sin_half} 0 0 {cos_half}\n"
         ));
         let kitti = read(&format!(
             "0 0 1 1 1 0 0 2 0 1 0 3\n-1 0 0 0 0 -1 0 0 0 0 1 0\n1 0 0 0 0 {cosine} {} 0 0 {sine} {cosine} 0\n",

@@ -10,6 +10,7 @@ use formats::returns::{Kind, Return};
 use formats::velodyne;
 use proptest::prelude::*;
 use serde_json::{Value, json};
+use test_support::{need, shared_data};
 
 use crate::velodyne::pcapng;
 
@@ -229,6 +230,58 @@ fn both_layouts_of_metadata_say_the_same() {
     assert_eq!(parse(&flat), parse(&self::flat(Profile::Legacy)));
 }
 
+/// By `default_data_format` and its neighbours in ouster-sdk's `types.cpp`.
+#[test]
+fn the_oldest_metadata_are_completed_as_by_ouster_sdk() {
+    let mut old = flat(Profile::Legacy);
+    old["lidar_mode"] = json!("512x20");
+    let mut stated = old.clone();
+    stated["data_format"] =
+        json!({ "columns_per_frame": 512, "columns_per_packet": 16, "pixels_per_column": 3 });
+    let object = old.as_object_mut().unwrap();
+    object.remove("data_format");
+    assert_eq!(parse(&old), parse(&stated));
+    let object = old.as_object_mut().unwrap();
+    object.remove("lidar_to_sensor_transform");
+    object.remove("lidar_origin_to_beam_origin_mm");
+    for (line, millimetres) in
+        [("OS-0-32", 27.67), ("OS-1-64", 15.806), ("OS-2-128", 13.762), ("other", 12.163)]
+    {
+        old["prod_line"] = json!(line);
+        stated["lidar_origin_to_beam_origin_mm"] = json!(millimetres);
+        stated["lidar_to_sensor_transform"] =
+            json!([-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 36.18, 0, 0, 0, 1]);
+        assert_eq!(parse(&old), parse(&stated), "{line}");
+    }
+    old["lidar_mode"] = json!("turbo");
+    let error = parse(&old).unwrap_err();
+    assert_eq!(error, "m.json: lidar_mode: expected a mode such as 1024x10, found \"turbo\"");
+
+    let path = need!(shared_data("bug_inputs/flat_nofmt.json"));
+    let metadata = Metadata::read(&path).unwrap();
+    assert_eq!((metadata.columns_per_frame(), metadata.columns_per_packet()), (1024, 16));
+    // Firmware 1.13: 16 columns of 64 pixels of 12 bytes, with 20 bytes around each column.
+    assert_eq!(Decoder::new(&metadata).packet_size(), 12_608);
+}
+
+#[test]
+fn beams_do_not_depend_on_the_profile_of_packets() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("m.json");
+    let mut metadata = flat(Profile::Single);
+    for (profile, unit_m) in
+        [("RNG19_RFL8_SIG16_NIR16_ZONE16", 0.001), ("FUSA_RNG15_RFL8_NIR8_DUAL", 0.008)]
+    {
+        metadata["data_format"]["udp_profile_lidar"] = json!(profile);
+        fs::write(&path, format!("\u{feff}{metadata}")).unwrap();
+        let beams = Metadata::read_beams(&path).unwrap();
+        assert_eq!(beams.beams_deg(), ROWS_DEG);
+        assert_eq!(beams.range_unit_m(), unit_m);
+        let error = Metadata::read(&path).unwrap_err().to_string();
+        assert!(error.contains(&format!("unknown lidar profile `{profile}`")), "{error}");
+    }
+}
+
 #[test]
 fn metadata_that_make_no_sense_are_named() {
     let said = |pointer: &str, value: Value| {
@@ -320,7 +373,9 @@ fn the_first_whole_frame_of_a_capture_is_read_also_from_fragments() {
     let metadata = parse(&flat(Profile::Dual)).unwrap();
     let read = |frames: &[Vec<u8>]| {
         fs::write(&path, pcapng(frames)).unwrap();
-        read_frame(&path, &metadata, &mut Senders::default()).map_err(|error| error.to_string())
+        read_frame(&path, &metadata, &mut Senders::default())
+            .map(|(scan, _)| scan)
+            .map_err(|error| error.to_string())
     };
     let scan = read(&capture(1480)).unwrap();
     assert_eq!(scan.len(), 32 * 3 * 2);
@@ -348,7 +403,8 @@ fn a_capture_without_a_whole_frame_is_named() {
     let path = folder.path().join("frames.pcapng");
     let read = |frames: &[Vec<u8>], metadata: &Value| {
         fs::write(&path, pcapng(frames)).unwrap();
-        let scan = read_frame(&path, &parse(metadata).unwrap(), &mut Senders::default());
+        let scan = read_frame(&path, &parse(metadata).unwrap(), &mut Senders::default())
+            .map(|(scan, _)| scan);
         scan.map_err(|error| error.to_string().split_once("pcapng: ").unwrap().1.to_owned())
     };
     let mut metadata = flat(Profile::Dual);
@@ -367,7 +423,8 @@ fn a_capture_without_a_whole_frame_is_named() {
     let mut fragments = capture(160);
     fragments.truncate(3);
     fragments.remove(1);
-    let expected = "frame 0: expected whole UDP packets, found a fragment of one";
+    let expected = "packets: expected a whole frame of 25 columns, found 0 at most among \
+                    1 UDP packets, beside 1 without all fragments";
     assert_eq!(read(&fragments, &metadata).unwrap_err(), expected);
 }
 

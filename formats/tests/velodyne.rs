@@ -1,7 +1,9 @@
 use std::fs;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use formats::hash::Hashing;
+use formats::pcap;
 use formats::velodyne::{Decoder, Header, Model, PacketError, count_returns, read_turn};
 use formats::vlp32c::{Returns, Revolution, write};
 use formats::{FormatError, Scan, Senders};
@@ -41,7 +43,8 @@ fn capture(folder: &Path, returns: Returns) -> PathBuf {
 fn a_turn_that_was_written_is_read_to_the_units_of_its_packets() {
     let folder = tempfile::tempdir().unwrap();
     for returns in Returns::ALL {
-        let scan = read_turn(&capture(folder.path(), returns), &mut Senders::default()).unwrap();
+        let (scan, _) =
+            read_turn(&capture(folder.path(), returns), &mut Senders::default()).unwrap();
         let path = folder.path().join("turn.pcap");
         assert_eq!(count_returns(&path).unwrap(), u64::from(REVOLUTION.n_beams), "{returns}");
         assert_eq!(scan.len(), REVOLUTION.n_beams as usize, "{returns}");
@@ -69,21 +72,133 @@ fn a_turn_that_was_written_is_read_to_the_units_of_its_packets() {
     }
 }
 
+/// Headers by <https://www.tcpdump.org/linktypes.html>.
 #[test]
-fn pcapng_and_vlan_change_nothing() {
+fn what_carries_the_packets_changes_nothing() {
     let folder = tempfile::tempdir().unwrap();
-    let classic = capture(folder.path(), Returns::Strongest);
-    let expected = read_turn(&classic, &mut Senders::default()).unwrap();
-    let frames = frames(&fs::read(&classic).unwrap());
-    let tagged: Vec<Vec<u8>> = frames
-        .iter()
-        .map(|frame| [&frame[..12], &[0x81, 0, 0, 7], &frame[12..]].concat())
-        .collect();
-    let path = folder.path().join("turn.pcapng");
-    for frames in [frames, tagged] {
-        fs::write(&path, pcapng(&frames)).unwrap();
-        assert_eq!(read_turn(&path, &mut Senders::default()).unwrap(), expected);
+    let file = capture(folder.path(), Returns::Strongest);
+    let expected = read_turn(&file, &mut Senders::default()).unwrap();
+    let frames = frames(&fs::read(&file).unwrap());
+    let path = folder.path().join("turn.pcap");
+    let inet = 2u32;
+    for (link, header, dropped) in [
+        (1, vec![], 0),
+        (1, [&frames[0][..12], &[0x81, 0, 0, 7, 8, 0]].concat(), 14),
+        (113, [&[0, 0, 0, 1, 0, 6][..], &[9; 8], &[8, 0]].concat(), 14),
+        (276, [&[8, 0, 0, 0, 0, 0, 0, 2, 0, 1, 0, 6][..], &[9; 8]].concat(), 14),
+        (0, inet.to_le_bytes().to_vec(), 14),
+        (0, inet.to_be_bytes().to_vec(), 14),
+        (108, inet.to_be_bytes().to_vec(), 14),
+        (12, vec![], 14),
+        (14, vec![], 14),
+        (101, vec![], 14),
+        (228, vec![], 14),
+        // A frame check sequence of four bytes, told by the flags.
+        (1 | 0x2400_0000, vec![], 0),
+    ] {
+        let carried: Vec<_> =
+            frames.iter().map(|frame| [&header, &frame[dropped..]].concat()).collect();
+        fs::write(&path, classic(link, &carried, 65_535)).unwrap();
+        let (scan, counts) = read_turn(&path, &mut Senders::default()).unwrap();
+        assert_eq!((scan.len(), &counts), (expected.0.len(), &expected.1), "{link}");
+        assert_eq!(scan.positions, expected.0.positions, "{link}");
+        fs::write(&path, pcapng_of(link as u16, &[], &carried)).unwrap();
+        assert_eq!(read_turn(&path, &mut Senders::default()).unwrap().0, scan, "{link}");
     }
+    let path = need!(shared_data("bug_inputs/linux_cooked.pcap"));
+    let mut packets = 0;
+    pcap::read(&path, |packet| {
+        assert_eq!((packet.port, packet.payload.len()), (2368, 1206));
+        packets += 1;
+        ControlFlow::Continue(())
+    })
+    .unwrap();
+    assert_eq!(packets, 400);
+}
+
+/// Options 9 and 14 of an interface (draft-ietf-opsawg-pcapng, 4.2). 3 << 29 ticks are 1.5 s at
+/// 2^-30 s.
+#[test]
+fn an_interface_tells_its_clock() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("clock.pcapng");
+    let frames = frames(&fs::read(capture(folder.path(), Returns::Strongest)).unwrap());
+    let option = |code: u16, value: &[u8]| {
+        let length = (value.len() as u16).to_le_bytes();
+        let padding = vec![0; value.len().next_multiple_of(4) - value.len()];
+        [&code.to_le_bytes()[..], &length, value, &padding].concat()
+    };
+    let offset = |seconds: i64| option(14, &seconds.to_le_bytes());
+    let ticks = (3u64 << 29) as f64;
+    for (options, expected) in [
+        (vec![], ticks * 1e-6),
+        (option(9, &[9]), ticks * 1e-9),
+        (option(9, &[0x9e]), 1.5),
+        (option(9, &[0x94]), 1536.0),
+        (option(9, &[0x80]), ticks),
+        ([option(9, &[0x9e]), offset(1_700_000_000)].concat(), 1_700_000_001.5),
+        ([option(9, &[0x9e]), offset(-100)].concat(), -98.5),
+    ] {
+        let mut file = pcapng_of(1, &options, &frames[..1]);
+        // The time of the only frame: after its block's kind, length and interface.
+        let at = file.len() - (frames[0].len().next_multiple_of(4) + 4) - 16;
+        file[at..at + 8].copy_from_slice(&[0, 0, 0, 0, 0, 0, 0, 0x60]);
+        let mut time_s = None;
+        fs::write(&path, file).unwrap();
+        pcap::read(&path, |packet| {
+            time_s = packet.time_s;
+            ControlFlow::Break(())
+        })
+        .unwrap();
+        let time_s = time_s.unwrap();
+        assert!((time_s - expected).abs() < 1e-9 * expected.abs(), "{options:?}: {time_s}");
+    }
+}
+
+#[test]
+fn what_a_capture_lacks_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.pcap");
+    let frames = frames(&fs::read(capture(folder.path(), Returns::Strongest)).unwrap());
+    let read = |bytes: Vec<u8>| {
+        fs::write(&path, bytes).unwrap();
+        let read = read_turn(&path, &mut Senders::default());
+        read.map_err(|error| error.to_string().split_off(path.as_os_str().len()))
+    };
+    let cut = "expected 1248 bytes, found 96, since the capture has a snap length: \
+               capture whole frames (`tcpdump -s 0`)";
+    let all = read(classic(1, &frames, 96)).unwrap_err();
+    assert_eq!(all, format!(": frame 0: {cut}"));
+    // A position packet of another sensor is short enough.
+    let mut short = frames[0].clone();
+    short.truncate(PROTOCOLS);
+    short[16..18].copy_from_slice(&28u16.to_be_bytes());
+    short[38..40].copy_from_slice(&8u16.to_be_bytes());
+    let mixed = [&[short], &frames[..2]].concat();
+    assert_eq!(
+        read(classic(1, &mixed, 96)).unwrap_err(),
+        format!(
+            ": packets: expected a turn of a VLP-16 or VLP-32C, found none among 1 UDP packets, \
+             beside 2 frames that cannot be read (the first, 1: {cut})"
+        )
+    );
+    let unknown = read(classic(105, &frames, 65_535)).unwrap_err();
+    let expected = "expected Ethernet, Linux cooked, loopback or raw IP, found link type 105";
+    assert_eq!(unknown, format!(": frame 0: {expected}"));
+
+    let whole = folder.path().join("turn.pcap");
+    assert!(pcap::is_capture(&whole) && !pcap::is_capture(folder.path()));
+    let unnamed = folder.path().join("unnamed");
+    fs::copy(&whole, &unnamed).unwrap();
+    assert!(pcap::is_capture(&unnamed));
+
+    // The flag that more fragments follow, in a frame after the turn.
+    let mut part = frames[0].clone();
+    part[20] = 0x20;
+    fs::write(&path, classic(1, &[frames[0].clone(), part], 65_535)).unwrap();
+    let counts = pcap::read(&path, |_| ControlFlow::Continue(())).unwrap();
+    assert_eq!((counts.packets, counts.incomplete), (1, 1));
+    assert_eq!(counts.to_string(), ", beside 1 without all fragments");
 }
 
 /// A second sensor of the model at another address, whose ranges are the first's plus 16.384 m, and
@@ -109,10 +224,10 @@ fn of_two_sensors_one_is_read() {
     }
     fs::write(&path, pcapng(&second)).unwrap();
     let expected = [&alone, &path].map(|path| read_turn(path, &mut Senders::default()).unwrap());
-    assert_ne!(expected[0], expected[1]);
+    assert_ne!(expected[0].0, expected[1].0);
     fs::write(&path, pcapng(&both)).unwrap();
     let mut senders = Senders::default();
-    assert_eq!(read_turn(&path, &mut senders).unwrap(), expected[0]);
+    assert_eq!(read_turn(&path, &mut senders).unwrap().0, expected[0].0);
     let n = both.len() as u64 / 3;
     let warning = format!(
         "expected packets of one sensor, found those of 192.168.1.201, which are used, and of \
@@ -120,7 +235,7 @@ fn of_two_sensors_one_is_read() {
     );
     assert_eq!((senders.warning(), senders.n_dropped()), (Some(warning), 2 * n - 1));
     let mut chosen = Senders::new(Some([10, 0, 0, 7].into()));
-    assert_eq!(read_turn(&path, &mut chosen).unwrap(), expected[1]);
+    assert_eq!(read_turn(&path, &mut chosen).unwrap().0, expected[1].0);
     assert_eq!(chosen.warning(), None);
     let error = read_turn(&path, &mut Senders::new(Some([10, 0, 0, 1].into()))).unwrap_err();
     let found = format!(
@@ -150,7 +265,7 @@ fn what_is_no_turn_is_named() {
     assert_eq!(error(&whole[..whole.len() - 1]), ": frame 150: the file ends within the frame");
     let found = error(&whole[..FILE + 70 * (FRAME + PROTOCOLS + 1206)]);
     let expected = ": packets: expected a turn of a VLP-16 or VLP-32C, found 167.2 degrees of one";
-    assert_eq!(found, expected);
+    assert_eq!(found, format!("{expected} among 70 UDP packets"));
     assert!(error(&whole[..FILE]).ends_with("found none among 0 UDP packets"));
     let second = FILE + 2 * FRAME + 2 * PROTOCOLS + 1206;
     let changed = |at: usize, byte: u8| {
@@ -166,11 +281,6 @@ fn what_is_no_turn_is_named() {
     assert_eq!(other, ": UDP packet 1: expected a packet of a vlp32c, found one of a vlp16");
     let folder_of_count = folder.path().join("x.pcap");
     assert!(count_returns(&folder_of_count).unwrap_err().to_string().contains("UDP packet 1"));
-    // The flag that more fragments follow.
-    let fragment = changed(second - PROTOCOLS + 14 + 6, 0x20);
-    assert_eq!(fragment, ": frame 1: expected whole UDP packets, found a fragment of one");
-    let link = changed(20, 113);
-    assert_eq!(link, ": frame 0: expected Ethernet (link type 1), found link type 113");
 }
 
 #[test]
@@ -241,17 +351,34 @@ fn frames(file: &[u8]) -> Vec<Vec<u8>> {
 /// The same as pcapng: a section, an Ethernet interface, and an enhanced packet block each
 /// (draft-ietf-opsawg-pcapng).
 pub fn pcapng(frames: &[Vec<u8>]) -> Vec<u8> {
+    pcapng_of(1, &[], frames)
+}
+
+fn pcapng_of(link: u16, options: &[u8], frames: &[Vec<u8>]) -> Vec<u8> {
     let block = |kind: u32, body: &[u8]| -> Vec<u8> {
         let length = (body.len() as u32 + 12).to_le_bytes();
         [&kind.to_le_bytes(), &length[..], body, &length].concat()
     };
     let section = [&0x1a2b_3c4d_u32.to_le_bytes()[..], &[1, 0, 0, 0], &[0xff; 8]].concat();
     let mut file = block(0x0a0d_0d0a, &section);
-    file.extend(block(1, &[1, 0, 0, 0, 0, 0, 4, 0]));
+    file.extend(block(1, &[&link.to_le_bytes(), &[0, 0, 0, 0, 4, 0][..], options].concat()));
     for frame in frames {
         let length = (frame.len() as u32).to_le_bytes();
         let padding = vec![0; frame.len().next_multiple_of(4) - frame.len()];
         file.extend(block(6, &[&[0; 12][..], &length, &length, frame, &padding].concat()));
+    }
+    file
+}
+
+/// A classic capture of `frames`, of which it has the first `most` bytes.
+fn classic(link: u32, frames: &[Vec<u8>], most: usize) -> Vec<u8> {
+    let words =
+        |words: &[u32]| words.iter().flat_map(|word| word.to_le_bytes()).collect::<Vec<_>>();
+    let mut file = words(&[0xa1b2_c3d4, 0x0004_0002, 0, 0, 65_535, link]);
+    for frame in frames {
+        let kept = frame.len().min(most);
+        file.extend(words(&[0, 0, kept as u32, frame.len() as u32]));
+        file.extend(&frame[..kept]);
     }
     file
 }

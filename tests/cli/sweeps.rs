@@ -1,8 +1,10 @@
 //! `gen-scenes`, `segment` and `detect`.
 
 use crate::Folder;
+use formats::cloud_file::write_cloud;
 use formats::labelled::read_labelled;
 use serde_json::Value;
+use test_support::{need, shared_data};
 
 #[test]
 fn scenes_are_scanned_cut_labelled_and_packed_alike_every_time() {
@@ -60,6 +62,73 @@ fn a_sweep_is_cut_and_its_clusters_are_named() {
 }
 
 #[test]
+fn every_command_reads_points_of_every_format() {
+    let folder = Folder::new();
+    // A box on the ground, 5 m from the sensor; all numbers fit f32.
+    let grid =
+        |n: i32| (-n..=n).flat_map(move |i| (-n..=n).map(move |k| [f64::from(i), f64::from(k)]));
+    let mut points: Vec<_> = grid(40).map(|[x, y]| [x * 0.25, y * 0.25, -1.5]).collect();
+    points.extend(grid(5).map(|[y, z]| [5.0, y * 0.125, z * 0.125 - 0.25]));
+    let names = ["a.npz", "a.ply", "a.npy", "a.pcd", "a.xyz", "a.pts", "a.csv", "a.las", "a.bin"];
+    for name in names {
+        write_cloud(&folder.at(name), &points).unwrap();
+        let said = folder.succeeds(&format!("segment {name} --out clusters --radius 0.3"));
+        assert!(said.contains(" 2 clusters"), "{name}: {said}");
+        folder.succeeds(&format!("detect {name} --out objects.json"));
+        let weather = "--fog 100 --reflectivity 0.5 --out fog.npz";
+        folder.succeeds(&format!("weather {name} {weather}"));
+        folder.succeeds(&format!("corrupt {name} --only crosstalk --severity 1 --out corrupted"));
+        let said = folder.succeeds(&format!("preview {name}"));
+        assert!(said.contains(&format!("{} points: scan.png", points.len())), "{said}");
+    }
+    let five: Vec<u8> = (0..)
+        .zip(&points)
+        .flat_map(|(i, &[x, y, z])| [x, y, z, 0.0, f64::from(i % 32)])
+        .flat_map(|number| (number as f32).to_le_bytes())
+        .collect();
+    folder.write("five.bin", &five);
+    folder.write("five", &five);
+    folder.refuses(
+        1,
+        &[
+            (
+                "segment five.bin --out out",
+                "look like rings of nuScenes: name the format by --format",
+            ),
+            ("detect five.bin --out out.json", "five.bin: format: the fifth numbers"),
+            ("preview five --out out.png", "five: extension: unknown cloud format ``"),
+        ],
+    );
+    for file in ["five.bin", "five"] {
+        folder.succeeds(&format!("segment {file} --format nuscenes --out clusters --radius 0.3"));
+    }
+
+    // UTM: in f32 the box would be in steps of half a metre.
+    let [east, north] = [691_000.0, 5_334_000.0];
+    let far: Vec<_> = points.iter().map(|[x, y, z]| [x + east, y + north, *z]).collect();
+    write_cloud(&folder.at("utm.las"), &far).unwrap();
+    let segment = "segment utm.las --out clusters --radius 0.3";
+    folder.refuses(1, &[(segment, "give the sensor's position by --sensor")]);
+    let said = folder.succeeds(&format!("{segment} --sensor {east} {north} 0"));
+    assert!(said.contains(" 2 clusters"), "{said}");
+    folder.succeeds("preview utm.las --out out.png");
+}
+
+#[test]
+fn captures_of_several_senders_and_interfaces_are_read() {
+    let inputs = need!(shared_data("bug_inputs"));
+    let folder = Folder::new();
+    let file = |name: &str| inputs.join(name).display().to_string();
+    let said = folder.succeeds(&format!("segment {} --out clusters", file("two_senders.pcap")));
+    assert!(said.contains("warning: ") && said.contains(" of other senders"), "{said}");
+    let chosen = |address| {
+        folder.succeeds(&format!("preview {} --from {address}", file("two_senders.pcap")))
+    };
+    assert_ne!(chosen("192.168.1.201"), chosen("192.168.1.202"));
+    folder.succeeds(&format!("detect {} --out a.json", file("linux_cooked.pcap")));
+}
+
+#[test]
 fn what_cannot_be_used_is_named_and_nothing_is_written() {
     let folder = Folder::new();
     folder.write("recipe.toml", "mount = { height_m = [1, 2] }\n[[sensor]]\nprofile = \"vlp99\"\n");
@@ -99,7 +168,20 @@ fn what_cannot_be_used_is_named_and_nothing_is_written() {
                 "segment no_capture.PCAP --metadata recipe.toml --out out",
                 "recipe.toml: metadata: expected value at line 1",
             ),
-            ("detect missing.npz --model nothing.safetensors --out out", "missing.npz"),
+            ("detect missing.npz --model nothing.safetensors --out out.json", "missing.npz"),
+        ],
+    );
+    folder.refuses(
+        2,
+        &[
+            (
+                "detect missing.npz --out out.png",
+                "--out: expected a name with .json, found out.png",
+            ),
+            (
+                "preview missing.npz --out out.html",
+                "--out: expected a name with .png, found out.html",
+            ),
         ],
     );
     assert!(!folder.at("out").exists(), "something was written");

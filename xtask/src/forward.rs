@@ -14,6 +14,9 @@ pub const EDGEPUCK: &str = "edgepuck";
 const WITHOUT_MODELS: &str = "gen-dataset gen gen-scenes gen-drive gen-shapes sample-surfaces scan \
      segment weather corrupt preview profile adapters merge-dataset";
 
+/// Commands that read points in any format.
+const READS_POINTS: &str = "segment weather corrupt preview";
+
 /// Runs the program of `package` with `words` in the caller's folder and gives
 /// the exit code that it ended with.
 pub fn run(package: &str, words: &[OsString]) -> anyhow::Result<u8> {
@@ -50,7 +53,14 @@ fn features(package: &str, words: &[OsString]) -> Vec<&'static str> {
     let writes_hdf5 =
         any(|word| word.starts_with("--layout")) && any(|word| word.contains("modelnet-h5"));
     let hdf5 = reads_hdf5 || writes_hdf5;
-    let features = [(simplifies, "simplify"), (hdf5, "hdf5"), (is_coloured, "textures")];
+    let reads_points =
+        words.first().is_some_and(|word| READS_POINTS.split(' ').any(|name| word == name));
+    let features = [
+        (simplifies, "simplify"),
+        (hdf5, "hdf5"),
+        (is_coloured, "textures"),
+        (reads_points, "las"),
+    ];
     features.into_iter().filter(|(is_needed, _)| *is_needed).map(|(_, name)| name).collect()
 }
 
@@ -73,6 +83,7 @@ mod tests {
     fn only_what_simplifies_is_built_with_the_feature() {
         let flags = ["gen-dataset", "--simplify=auto", "--layout", "modelnet-h5"];
         assert_eq!(features(EDGEPUCK, &flags.map(OsString::from)), ["simplify", "hdf5"]);
+        assert_eq!(features(EDGEPUCK, &["preview", "a.las"].map(OsString::from)), ["las"]);
         for (scene, expected) in [
             ("simplify = \"auto\"", true),
             ("[[object]]\n  simplify = 0.01 # metres", true),

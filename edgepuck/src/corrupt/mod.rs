@@ -6,7 +6,7 @@ mod plan;
 mod sweep;
 
 use crate::brightness::BrightnessArgs;
-use crate::segment::SweepArgs;
+use crate::points::{PlaceArgs, SweepArgs};
 use crate::{Outcome, Usage};
 use plan::{Entry, Plan};
 use sim_gpu::Sensor;
@@ -20,8 +20,12 @@ for each corruption and severity of ModelNet-C, such as jitter-1-test.npz, and c
 of the same views of the test meshes. `edgepuck corrupt --list` describes the corruptions, and
 names those that are left out.")]
 pub struct CorruptArgs {
+    /// Sweep, as for `edgepuck segment`, or a folder of meshes
+    #[arg(value_name = "SWEEP", required_unless_present = "list")]
+    sweep: Option<PathBuf>,
+
     #[command(flatten)]
-    input: Option<SweepArgs>,
+    place: PlaceArgs,
 
     /// Folder for the corrupted scans, or the packed sets, and corruptions.csv
     #[arg(long, value_name = "DIR", default_value = "data/corrupted")]
@@ -64,12 +68,13 @@ pub fn run(args: &CorruptArgs) -> anyhow::Result<Outcome> {
         print!("{}", listed(&plan));
         return Ok(Outcome::Success);
     }
-    let input = args.input.as_ref().expect("invariant: required without --list");
+    let sweep = args.sweep.clone().expect("invariant: required without --list");
+    let input = SweepArgs { sweep, place: args.place.clone() };
     let sensor = Sensor::resolve(&args.profile)?;
     if input.sweep.is_dir() {
         return objects::run(args, &input.sweep, &plan, &sensor);
     }
-    sweep::run(args, input, &plan, sensor.profile())
+    sweep::run(args, &input, &plan, sensor.profile())
 }
 
 fn listed(plan: &Plan) -> String {

@@ -1,7 +1,7 @@
 use super::plan::{Plan, chosen};
 use super::{CorruptArgs, Written, usage, write_list};
 use crate::Outcome;
-use crate::segment::SweepArgs;
+use crate::points::SweepArgs;
 use edgepuck_segment::{Label, Segmenter, Settings, Sweep};
 use formats::Scan;
 use formats::hash::Hashing;

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::error::FormatError;
+use crate::lines::BYTE_ORDER_MARK;
 use crate::npy;
 
 /// The number of first bytes that [`CloudFormat::of_content`] examines.
@@ -26,6 +27,8 @@ crate::named! {
         Csv = "csv",
         /// KITTI's raw little-endian f32: x, y, z, intensity.
         Kitti = "kitti",
+        /// nuScenes' raw little-endian f32: x, y, z, intensity, ring.
+        Nuscenes = "nuscenes",
         /// The ASPRS's format of airborne scans.
         Las = "las",
     }
@@ -39,13 +42,15 @@ impl CloudFormat {
     pub fn of_path(path: &Path) -> Result<Self, FormatError> {
         let refuse = |cause: String| Err(FormatError::malformed(path, "extension", cause));
         let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         match extension.as_str() {
             "ply" => Ok(Self::Ply),
             "npz" => Ok(Self::Npz),
             "npy" => Ok(Self::Npy),
             "pcd" => Ok(Self::Pcd),
-            "xyz" | "txt" | "asc" | "tsv" => Ok(Self::Text),
+            "xyz" | "txt" | "asc" | "tsv" | "pts" => Ok(Self::Text),
             "csv" => Ok(Self::Csv),
+            "bin" if stem.to_lowercase().ends_with(".pcd") => Ok(Self::Nuscenes),
             "bin" => Ok(Self::Kitti),
             "las" => Ok(Self::Las),
             "laz" => refuse(COMPRESSED_LAS.to_owned()),
@@ -63,7 +68,8 @@ impl CloudFormat {
     /// [`FormatError::Malformed`] for a mesh and for unknown binary data.
     pub fn of_content(start: &[u8], name: &Path) -> Result<Self, FormatError> {
         let refuse = |cause: &str| Err(FormatError::malformed(name, "format", cause));
-        let begins = |sign: &[u8]| start.starts_with(sign);
+        let text = start.strip_prefix(BYTE_ORDER_MARK).unwrap_or(start);
+        let begins = |sign: &[u8]| text.starts_with(sign);
         match () {
             () if begins(b"ply\n") || begins(b"ply\r") => Ok(Self::Ply),
             // An archive without entries begins with the end of its directory.
@@ -82,7 +88,7 @@ pub(super) const COMPRESSED_LAS: &str =
     "LAZ is compressed LAS: decompress it first (`laszip`, or `pdal translate in.laz out.las`)";
 const MESH: &str = "expected a cloud, found a mesh: scan it first";
 const UNKNOWN: &str = "the first bytes are of no known binary format; name the format";
-const EXTENSIONS: &str = "ply, npz, npy, pcd, xyz, txt, asc, tsv, csv, bin, las";
+const EXTENSIONS: &str = "ply, npz, npy, pcd, xyz, txt, asc, tsv, pts, csv, bin, las";
 
 #[cfg(test)]
 mod tests {
@@ -94,8 +100,9 @@ mod tests {
             ("a/b.PLY", CloudFormat::Ply),
             ("b.tar.npz", CloudFormat::Npz),
             ("000000.bin", CloudFormat::Kitti),
-            ("lidar.pcd.bin", CloudFormat::Kitti),
+            ("LIDAR.PCD.BIN", CloudFormat::Nuscenes),
             ("c.txt", CloudFormat::Text),
+            ("c.pts", CloudFormat::Text),
         ] {
             assert_eq!(CloudFormat::of_path(Path::new(name)).unwrap(), format);
         }
@@ -115,6 +122,7 @@ mod tests {
         let of = |start: &[u8]| CloudFormat::of_content(start, Path::new("-"));
         assert_eq!(of(b"plywood 1 2").unwrap(), CloudFormat::Text);
         assert_eq!(of(b"").unwrap(), CloudFormat::Text);
+        assert_eq!(of(b"\xef\xbb\xbfply\n").unwrap(), CloudFormat::Ply);
         let mesh = of(b"OFF\n8 6 12\n").unwrap_err().to_string();
         assert_eq!(mesh, "-: format: expected a cloud, found a mesh: scan it first");
         let raw = of(&[0, 0, 0x80, 0x3f]).unwrap_err().to_string();

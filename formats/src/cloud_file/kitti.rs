@@ -1,12 +1,13 @@
-//! Raw little-endian f32, the format of KITTI's scans: x, y, z and intensity of
-//! each point, without a header.
+//! Raw little-endian f32 without a header, the format of KITTI's scans (x, y, z and intensity of
+//! each point) and nuScenes' (the same and the ring).
 //!
-//! The name can state another number of columns: `NAME.f32x5.bin` has five, and
-//! nuScenes's `NAME.pcd.bin` has five as well (x, y, z, intensity, ring).
+//! The name can state another number of columns: `NAME.f32x6.bin` has six.
 
-use std::io::{BufRead, Write};
+use std::fs::File;
+use std::io::{BufRead, Read, Write};
 use std::path::Path;
 
+use super::CloudFormat;
 use crate::atomic;
 use crate::error::FormatError;
 use crate::number::{ByteOrder, NumberType};
@@ -17,28 +18,76 @@ const KITTI_COLUMNS: usize = 4;
 const NUSCENES_COLUMNS: usize = 5;
 const COLUMN_SIZE: usize = size_of::<f32>();
 
-pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
+/// What to do where the format may not be KITTI's.
+pub(super) const REMEDY: &str =
+    "name the format by --format: kitti has four f32 for each point, nuscenes five";
+
+pub(super) fn read(
+    reader: &mut impl BufRead,
+    format: CloudFormat,
+    name: &Path,
+) -> Result<Vec<[f64; 3]>, FormatError> {
     let mut points = Vec::new();
-    read_points(reader, name, |number| points.push([0, 1, 2].map(number)))?;
+    read_points(reader, columns(format, name), name, |number| points.push([0, 1, 2].map(number)))?;
     Ok(points)
 }
 
 /// The fourth number of every point, its intensity; `None` if the points have three.
 pub(super) fn read_intensities(
     reader: &mut impl BufRead,
+    format: CloudFormat,
     name: &Path,
 ) -> Result<Option<Vec<f32>>, FormatError> {
-    if columns(name) < KITTI_COLUMNS {
+    let columns = columns(format, name);
+    if columns < KITTI_COLUMNS {
         return Ok(None);
     }
     let mut intensities = Vec::new();
-    read_points(reader, name, |number| intensities.push(number(3) as f32))?;
+    read_points(reader, columns, name, |number| intensities.push(number(3) as f32))?;
     Ok(Some(intensities))
+}
+
+/// Checks that a file whose name alone makes it KITTI's has no fifth column of rings.
+pub(super) fn check_columns(file: &mut File, path: &Path) -> Result<(), FormatError> {
+    /// Bytes at the start of the file that are examined.
+    const EXAMINED: u64 = 1 << 16;
+    let mut start = Vec::new();
+    let size = file.metadata().map(|metadata| metadata.len());
+    let size = size.and_then(|size| {
+        file.take(EXAMINED).read_to_end(&mut start)?;
+        std::io::Seek::rewind(file)?;
+        Ok(size)
+    });
+    let size = size.map_err(|source| FormatError::io(path, source))?;
+    let five = size % (NUSCENES_COLUMNS * COLUMN_SIZE) as u64 == 0 && has_rings(&start);
+    if !five || stated_columns(path).is_some() {
+        return Ok(());
+    }
+    let cause = format!("the fifth numbers look like rings of nuScenes: {REMEDY}");
+    Err(FormatError::malformed(path, "format", cause))
+}
+
+/// Whether each fifth number is a small whole number, as the rings of nuScenes are, and others are
+/// not.
+fn has_rings(start: &[u8]) -> bool {
+    /// Fewer could be so by chance.
+    const FEWEST: usize = 5;
+    let points = start.as_chunks::<{ NUSCENES_COLUMNS * COLUMN_SIZE }>().0;
+    let number = |point: &[u8], at: usize| {
+        NumberType::F32.decode(&point[at * COLUMN_SIZE..], ByteOrder::Little)
+    };
+    let is_whole = |x: f64| x.fract() == 0.0;
+    let is_ring = |x: f64| is_whole(x) && (0.0..256.0).contains(&x);
+    points.len() >= FEWEST
+        && points.iter().all(|point| is_ring(number(point, 4)))
+        && points.iter().any(|point| number(point, 4) != number(&points[0], 4))
+        && points.iter().any(|point| (0..3).any(|axis| !is_whole(number(point, axis))))
 }
 
 /// Passes the numbers of every point, by their index, to `take`.
 fn read_points(
     reader: &mut impl BufRead,
+    columns: usize,
     name: &Path,
     mut take: impl FnMut(&dyn Fn(usize) -> f64),
 ) -> Result<(), FormatError> {
@@ -47,7 +96,6 @@ fn read_points(
         let cause = "expected points, found raw Velodyne packets: decode them first";
         return Err(FormatError::malformed(name, "format", cause));
     }
-    let columns = columns(name);
     let mut count = 0;
     let rest = records::read_to_end(reader, columns * COLUMN_SIZE, |record| {
         count += 1;
@@ -63,16 +111,17 @@ fn read_points(
     }
 }
 
-/// The number of columns by the file's name, at least three.
-fn columns(name: &Path) -> usize {
-    let name = name.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
-    let stem = name.strip_suffix(".bin").unwrap_or(&name);
-    let stated = stem.rsplit_once(".f32x").and_then(|(_, columns)| columns.parse().ok());
-    match stated {
-        Some(columns @ 3..=64) => columns,
-        _ if stem.ends_with(".pcd") => NUSCENES_COLUMNS,
-        _ => KITTI_COLUMNS,
-    }
+/// The number of columns, by the file's name if that states it.
+fn columns(format: CloudFormat, name: &Path) -> usize {
+    let of_format = if format == CloudFormat::Nuscenes { NUSCENES_COLUMNS } else { KITTI_COLUMNS };
+    stated_columns(name).unwrap_or(of_format)
+}
+
+/// The number of columns that the file's name states, at least three.
+fn stated_columns(name: &Path) -> Option<usize> {
+    let name = name.file_name()?.to_string_lossy().to_lowercase();
+    let columns = name.strip_suffix(".bin")?.rsplit_once(".f32x")?.1.parse().ok();
+    columns.filter(|columns| (3..=64).contains(columns))
 }
 
 /// Whether `start` begins with two blocks of a Velodyne data packet, which could be mistaken for
@@ -83,8 +132,12 @@ fn is_velodyne_packets(start: &[u8]) -> bool {
 }
 
 /// Writes `points` with intensity 0.
-pub(super) fn write(path: &Path, points: &[[f64; 3]]) -> Result<(), FormatError> {
-    let columns = columns(path);
+pub(super) fn write(
+    path: &Path,
+    format: CloudFormat,
+    points: &[[f64; 3]],
+) -> Result<(), FormatError> {
+    let columns = columns(format, path);
     if columns != KITTI_COLUMNS {
         let cause = format!("files of {columns} columns are read but not written");
         return Err(FormatError::malformed(path, "extension", cause));
@@ -109,16 +162,16 @@ mod tests {
     #[test]
     fn the_name_tells_the_columns() {
         for (name, expected) in [
-            ("000000.bin", 4),
-            ("a/frame.f32x5.bin", 5),
-            ("frame.F32X3.BIN", 3),
-            ("frame.f32x2.bin", 4),
-            ("frame.f32x99999999999999999999.bin", 4),
-            ("n015__LIDAR_TOP__1533.pcd.bin", 5),
-            ("-", 4),
-            ("", 4),
+            ("000000.bin", None),
+            ("a/frame.f32x5.bin", Some(5)),
+            ("frame.F32X3.BIN", Some(3)),
+            ("frame.f32x2.bin", None),
+            ("frame.f32x99999999999999999999.bin", None),
+            ("n015__LIDAR_TOP__1533.pcd.bin", None),
+            ("-", None),
+            ("", None),
         ] {
-            assert_eq!(columns(Path::new(name)), expected, "{name}");
+            assert_eq!(stated_columns(Path::new(name)), expected, "{name}");
         }
     }
 }

@@ -5,10 +5,11 @@
 //! | --- | --- | --- |
 //! | PLY | ASCII, binary of either byte order | binary, little-endian |
 //! | NPZ | `positions` (plus `origin`), else `points`, else the only array of points | `positions` |
-//! | NPY | `[n, 3]` or wider, any numbers, C or Fortran order | `[n, 3]` |
+//! | NPY | `[n, 3]` or wider, any numbers, C or Fortran order; records with `x`, `y`, `z` | `[n, 3]` |
 //! | PCD | ASCII, binary, LZF-compressed | binary |
-//! | XYZ, TXT, ASC, TSV, CSV | separated by blanks, tabs, commas or semicolons | blanks, in CSV commas |
+//! | XYZ, TXT, ASC, TSV, PTS, CSV | separated by blanks, tabs, commas or semicolons | blanks, in CSV commas |
 //! | KITTI `.bin` | f32, four for each point or as many as the name states | f32, intensity 0 |
+//! | nuScenes `.pcd.bin` | f32, five for each point | |
 //! | LAS | 1.0 to 1.4 | 1.2, in steps of 1 nm or more |
 //!
 //! NaN and infinities are kept; the caller decides how to treat them. Memory grows
@@ -29,6 +30,7 @@ mod npz;
 mod pcd;
 #[cfg(feature = "pcd")]
 mod pcd_header;
+mod plausible;
 #[cfg(feature = "ply")]
 mod ply;
 mod precision;
@@ -42,35 +44,68 @@ use crate::atomic;
 use crate::error::FormatError;
 use crate::records;
 pub use format::CloudFormat;
+pub use plausible::check_sweep;
 use precision::Precision;
 
 /// Reads the cloud at `path` in the format of its extension.
 ///
 /// # Errors
 /// An unknown extension, a format that this build does not include, a mesh, a
-/// file that cannot be read or is not of its extension's format. The error names
-/// the file and the line, element or key at fault.
+/// file that cannot be read or is not of its extension's format; raw floats that only the extension
+/// makes KITTI's, and that cannot be points of a sweep or have nuScenes' rings. The error names the
+/// file and the line, element or key at fault.
 pub fn read_cloud(path: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
-    let format = CloudFormat::of_path(path)?;
-    let file = File::open(path).map_err(|source| FormatError::io(path, source))?;
-    #[cfg(feature = "npz")]
-    if format == CloudFormat::Npz {
-        return npz::read(BufReader::new(file), path);
-    }
-    read_as(&mut BufReader::new(file), format, path)
+    read_cloud_as(path, None)
 }
 
-/// Reads the intensities of the points at `path`, unscaled, or returns `None` if its format is not
-/// KITTI's or has no intensities.
+/// As [`read_cloud`], in `format` if it is given.
 ///
 /// # Errors
 /// As [`read_cloud`].
-pub fn read_intensities(path: &Path) -> Result<Option<Vec<f32>>, FormatError> {
-    if CloudFormat::of_path(path)? != CloudFormat::Kitti {
-        return Ok(None);
+pub fn read_cloud_as(
+    path: &Path,
+    format: Option<CloudFormat>,
+) -> Result<Vec<[f64; 3]>, FormatError> {
+    let (mut file, found) = open(path, format)?;
+    match found {
+        #[cfg(feature = "npz")]
+        CloudFormat::Npz => npz::read(BufReader::new(file), path),
+        CloudFormat::Kitti if format.is_none() => {
+            kitti::check_columns(&mut file, path)?;
+            let points = kitti::read(&mut BufReader::new(file), found, path)?;
+            check_sweep(points.iter().copied(), path, kitti::REMEDY)?;
+            Ok(points)
+        }
+        _ => read_as(&mut BufReader::new(file), found, path),
     }
+}
+
+/// Reads the intensities of the points at `path`, unscaled, or returns `None` if its format is not
+/// KITTI's or nuScenes' or has no intensities.
+///
+/// # Errors
+/// As [`read_cloud`].
+pub fn read_intensities(
+    path: &Path,
+    format: Option<CloudFormat>,
+) -> Result<Option<Vec<f32>>, FormatError> {
+    let (file, format) = open(path, format)?;
+    match format {
+        CloudFormat::Kitti | CloudFormat::Nuscenes => {
+            kitti::read_intensities(&mut BufReader::new(file), format, path)
+        }
+        _ => Ok(None),
+    }
+}
+
+fn open(path: &Path, format: Option<CloudFormat>) -> Result<(File, CloudFormat), FormatError> {
+    if path.is_dir() {
+        let cause = "expected a file, found a folder: name the files in it";
+        return Err(FormatError::malformed(path, "name", cause));
+    }
+    let format = format.map_or_else(|| CloudFormat::of_path(path), Ok)?;
     let file = File::open(path).map_err(|source| FormatError::io(path, source))?;
-    kitti::read_intensities(&mut BufReader::new(file), path)
+    Ok((file, format))
 }
 
 /// Reads a cloud from `reader`, which errors call `name`.
@@ -103,7 +138,7 @@ fn read_as(
     match format {
         CloudFormat::Text | CloudFormat::Csv => text::read(reader, name),
         CloudFormat::Npy => npy::read(reader, name),
-        CloudFormat::Kitti => kitti::read(reader, name),
+        CloudFormat::Kitti | CloudFormat::Nuscenes => kitti::read(reader, format, name),
         #[cfg(feature = "ply")]
         CloudFormat::Ply => ply::read(reader, name),
         #[cfg(feature = "pcd")]
@@ -136,11 +171,12 @@ fn read_as(
 /// system.
 pub fn write_cloud(path: &Path, points: &[[f64; 3]]) -> Result<(), FormatError> {
     let precision = Precision::lossless(points);
-    match CloudFormat::of_path(path)? {
+    let format = CloudFormat::of_path(path)?;
+    match format {
         CloudFormat::Text => atomic::write(path, |writer| text::write(writer, points)),
         CloudFormat::Csv => atomic::write(path, |writer| text::write_csv(writer, points)),
         CloudFormat::Npy => atomic::write(path, |writer| npy::write(writer, points, precision)),
-        CloudFormat::Kitti => kitti::write(path, points),
+        CloudFormat::Kitti | CloudFormat::Nuscenes => kitti::write(path, format, points),
         #[cfg(feature = "ply")]
         CloudFormat::Ply => atomic::write(path, |writer| ply::write(writer, points, precision)),
         #[cfg(feature = "pcd")]

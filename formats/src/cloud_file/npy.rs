@@ -1,12 +1,13 @@
-//! NumPy's arrays as clouds: each row is a point, and the first three columns are x, y, z.
+//! NumPy's arrays as clouds: each row is a point, and the first three columns are x, y, z. Records
+//! have fields of these names.
 
 use std::io::{self, Read, Write};
 use std::path::Path;
 
 use super::precision::Precision;
-use crate::decoding::{error_in, invalid};
+use crate::decoding::{error_in, excerpt, invalid};
 use crate::error::FormatError;
-use crate::npy::{self, Header};
+use crate::npy::{self, Header, RecordField};
 use crate::number::{ByteOrder, NumberType};
 use crate::records;
 
@@ -16,7 +17,18 @@ pub(super) fn read(reader: &mut impl Read, name: &Path) -> Result<Vec<[f64; 3]>,
 }
 
 pub(super) fn holds_points(header: &Header) -> bool {
-    matches!(header.shape[..], [_, columns] if columns >= 3) && header.number().is_some()
+    let is_table = matches!(header.shape[..], [_, columns] if columns >= 3);
+    (is_table && header.number().is_some()) || axes(header).is_some()
+}
+
+/// The coordinates x, y and z of a record, and its size, bytes.
+fn axes(header: &Header) -> Option<([RecordField<'_>; 3], usize)> {
+    let (mut fields, size) = header.record()?;
+    let mut take = |axis: &str| {
+        let at = fields.iter().position(|field| field.name.eq_ignore_ascii_case(axis))?;
+        Some(fields.swap_remove(at))
+    };
+    Some(([take("x")?, take("y")?, take("z")?], size))
 }
 
 /// Most values of a point. A wider array of three rows is transposed.
@@ -27,6 +39,20 @@ pub(super) fn read_points(
     header: &Header,
     reader: &mut (impl Read + ?Sized),
 ) -> io::Result<Vec<[f64; 3]>> {
+    let mut points = Vec::new();
+    if let Some((axes, size)) = axes(header) {
+        let n = header.n_elements().unwrap_or(usize::MAX);
+        records::read(reader, size, n as u64, |record| {
+            let decode =
+                |axis: &RecordField<'_>| axis.number.decode(&record[axis.offset..], axis.order);
+            points.push(axes.each_ref().map(decode));
+        })?;
+        return Ok(points);
+    }
+    if header.descr.starts_with('[') {
+        let found = excerpt(&header.descr);
+        return Err(invalid(format!("expected records with numbers x, y and z, found {found}")));
+    }
     let (n, columns) = match header.shape[..] {
         [3, n] if n > WIDEST_POINT => {
             return Err(invalid(format!("expected shape [n, 3], found [3, {n}]: transpose it")));
@@ -41,7 +67,6 @@ pub(super) fn read_points(
     if header.is_fortran_order {
         return read_columns(reader, n as u64, number, order);
     }
-    let mut points = Vec::new();
     let size = number.size();
     records::read(reader, columns.saturating_mul(size), n as u64, |row| {
         points.push([0, 1, 2].map(|axis| number.decode(&row[axis * size..], order)));

@@ -18,11 +18,8 @@ use crate::records;
 
 pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
     let mut lines = Lines::new(reader, name);
-    let header = read_header(&mut lines, name)?;
-    let axes = ["x", "y", "z"].map(|axis| header.coordinate(axis));
-    let axes = axes.map(|axis| axis.map_err(|cause| FormatError::malformed(name, "FIELDS", cause)));
-    let [x, y, z] = axes;
-    let axes = [x?, y?, z?];
+    let mut header = read_header(&mut lines, name)?;
+    let axes = header.axes().map_err(|cause| FormatError::malformed(name, "FIELDS", cause))?;
     match header.encoding {
         Encoding::Ascii => read_ascii(&mut lines, header.n, axes),
         Encoding::Binary => {
@@ -33,7 +30,7 @@ pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3
             });
             read.map(|()| points).map_err(|error| error_in(name, "points", error))
         }
-        Encoding::Compressed => read_compressed(lines.reader, &header, axes)
+        Encoding::Compressed => read_compressed(lines.reader, &mut header)
             .map_err(|error| error_in(name, "points", error)),
     }
 }
@@ -63,17 +60,18 @@ fn read_ascii<R: BufRead>(
 }
 
 /// Reads compressed points, whose numbers are stored field by field.
-fn read_compressed(
-    reader: &mut impl Read,
-    header: &Header,
-    axes: [Coordinate; 3],
-) -> io::Result<Vec<[f64; 3]>> {
+fn read_compressed(reader: &mut impl Read, header: &mut Header) -> io::Result<Vec<[f64; 3]>> {
     let mut sizes = [0; 8];
     reader.read_exact(&mut sizes)?;
     let [compressed, uncompressed] =
         [0, 4].map(|at| NumberType::U32.decode(&sizes[at..], ByteOrder::Little) as u64);
-    let promised = header.n.checked_mul(header.point_size());
-    if promised != Some(uncompressed) {
+    let is_promised =
+        |header: &Header| header.n.checked_mul(header.point_size()) == Some(uncompressed);
+    if !is_promised(header) {
+        // The Point Cloud Library compresses no padding.
+        header.drop_padding();
+    }
+    if !is_promised(header) {
         let (n, size) = (header.n, header.point_size());
         return Err(invalid(format!(
             "expected {n} points of {size} bytes, found {uncompressed} bytes in all"
@@ -84,6 +82,7 @@ fn read_compressed(
         return Err(records::truncated(bytes.len() as u64, compressed));
     }
     let bytes = lzf::decompress(&bytes, uncompressed)?;
+    let axes = header.axes().map_err(invalid)?;
     let point = |i: u64| {
         axes.map(|axis| {
             let at = axis.offset * header.n + i * axis.number.size() as u64;

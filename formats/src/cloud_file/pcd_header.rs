@@ -56,7 +56,8 @@ pub(super) fn read_header<R: BufRead>(
         let mut words = content.split_ascii_whitespace();
         let Some(key) = words.next() else { continue };
         match key.to_ascii_uppercase().as_str() {
-            "FIELDS" => fields = words.map(Field::named).collect(),
+            // Files before version 0.7 call them columns.
+            "FIELDS" | "COLUMNS" => fields = words.map(Field::named).collect(),
             what @ ("SIZE" | "COUNT" | "TYPE") => {
                 let words: Vec<_> = words.collect();
                 if words.len() != fields.len() {
@@ -69,8 +70,8 @@ pub(super) fn read_header<R: BufRead>(
                 for (field, word) in fields.iter_mut().zip(words) {
                     match what {
                         "SIZE" => field.size = line.count(word)?,
-                        // The Point Cloud Library reads 0 as 1.
-                        "COUNT" => field.count = line.count(word)?.max(1),
+                        // Some writers pad with fields of count 0, which take no bytes.
+                        "COUNT" => field.count = line.count(word)?,
                         _ => field.kind = word.chars().next().unwrap_or_default(),
                     }
                 }
@@ -96,7 +97,18 @@ impl Header {
         self.fields.iter().fold(0, |sum: u64, field| sum.saturating_add(field.n_bytes()))
     }
 
-    pub fn coordinate(&self, axis: &str) -> Result<Coordinate, String> {
+    /// Drops the fields of padding, `_`.
+    pub fn drop_padding(&mut self) {
+        self.fields.retain(|field| field.name != "_");
+    }
+
+    /// The coordinates x, y and z.
+    pub fn axes(&self) -> Result<[Coordinate; 3], String> {
+        let [x, y, z] = ["x", "y", "z"].map(|axis| self.coordinate(axis));
+        Ok([x?, y?, z?])
+    }
+
+    fn coordinate(&self, axis: &str) -> Result<Coordinate, String> {
         let at = self.fields.iter().position(|field| field.name.eq_ignore_ascii_case(axis));
         let at = at.ok_or_else(|| {
             let names: Vec<_> = self.fields.iter().map(|field| field.name.as_str()).collect();
@@ -118,7 +130,8 @@ impl Header {
 
 impl Field {
     fn named(name: &str) -> Self {
-        Self { name: name.to_owned(), size: 0, kind: '?', count: 1 }
+        // The defaults of files before version 0.7.
+        Self { name: name.to_owned(), size: 4, kind: 'F', count: 1 }
     }
 
     fn n_bytes(&self) -> u64 {

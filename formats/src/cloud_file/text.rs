@@ -2,8 +2,8 @@
 //!
 //! Semicolons, commas, tabs or blanks separate columns: the first of these that the
 //! first line has. A first line of names states the columns of x, y and z; otherwise
-//! they are the first three. Text after a `#`, and a line
-//! that begins with `//`, is a comment.
+//! they are the first three. Text after a `#`, and a line that begins with `//`, is a comment. A
+//! line with nothing but a count is that of the points after it, as in Leica's `.pts`.
 
 use std::io::{self, BufRead, Write};
 use std::path::Path;
@@ -28,10 +28,23 @@ pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3
     let mut lines = Lines::new(reader, name);
     let mut layout: Option<Layout> = None;
     let mut points = Vec::new();
+    // The number of points that the counts so far promise.
+    let mut promised = None;
     while let Some(line) = lines.next()? {
         let content = without_comment(&line.text);
         if content.is_empty() {
             continue;
+        }
+        let found = points.len() as u64;
+        let is_complete = promised.is_some_and(|n| n == found);
+        if (layout.is_none() || is_complete)
+            && let Ok(n) = content.parse::<u64>()
+        {
+            promised = Some(found.saturating_add(n));
+            continue;
+        }
+        if is_complete {
+            return Err(line.error(format!("expected {found} points by the count, found more")));
         }
         match &layout {
             Some(layout) => points.push(layout.point(&line, content)?),
@@ -44,12 +57,16 @@ pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3
             }
         }
     }
-    Ok(points)
+    match promised {
+        Some(n) if n > points.len() as u64 => {
+            let cause = format!("the file ends after {} of {n}", points.len());
+            Err(FormatError::malformed(name, "points", cause))
+        }
+        _ => Ok(points),
+    }
 }
 
-/// A line without its comment and without a byte order mark.
 fn without_comment(line: &str) -> &str {
-    let line = line.strip_prefix('\u{feff}').unwrap_or(line);
     let content = line.split('#').next().unwrap_or_default().trim();
     if content.starts_with("//") { "" } else { content }
 }

@@ -6,6 +6,7 @@ use std::path::Path;
 use super::{Decoder, Header, Metadata, PacketError};
 use crate::capture::{Points, Senders, each_packet};
 use crate::error::FormatError;
+use crate::pcap::Counts;
 use crate::scan::Scan;
 
 /// Reads the first complete frame of the capture at `path`, pcap or pcapng: points in the sensor's
@@ -20,12 +21,12 @@ pub fn read_frame(
     path: &Path,
     metadata: &Metadata,
     senders: &mut Senders,
-) -> Result<Scan, FormatError> {
+) -> Result<(Scan, Counts), FormatError> {
     let decoder = Decoder::new(metadata);
     let (mut frame, mut most) = (Frame::default(), 0);
     let expected = usize::from(metadata.columns_per_frame - metadata.n_columns_unsent());
     let is_data = |payload: &[u8]| decoder.header(payload).is_ok();
-    let n_packets = each_packet(path, senders, is_data, |payload| {
+    let counts = each_packet(path, senders, is_data, |payload| {
         if payload.len() != decoder.packet_size() {
             return Ok(ControlFlow::Continue(()));
         }
@@ -39,13 +40,14 @@ pub fn read_frame(
         })
     })?;
     if most < expected {
+        let n = counts.packets;
         let cause = format!(
-            "expected a whole frame of {expected} columns, found {most} at most among \
-             {n_packets} UDP packets{senders}"
+            "expected a whole frame of {expected} columns, found {most} at most among {n} UDP \
+             packets{senders}{counts}"
         );
         return Err(FormatError::malformed(path, "packets", cause));
     }
-    Ok(frame.points.scan())
+    Ok((frame.points.scan(), counts))
 }
 
 #[derive(Default)]

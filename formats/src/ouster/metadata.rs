@@ -51,19 +51,37 @@ impl Metadata {
     /// # Errors
     /// A file that cannot be read; as [`Metadata::parse`].
     pub fn read(path: &Path) -> Result<Self, FormatError> {
-        let mut text = String::new();
-        let read =
-            File::open(path).and_then(|file| file.take(LONGEST + 1).read_to_string(&mut text));
-        read.map_err(|source| FormatError::io(path, source))?;
-        Self::parse(&text, path)
+        Self::parse_as(&text_of(path)?, path, profile)
+    }
+
+    /// As [`Metadata::read`], for the beams alone: packets may have any profile.
+    ///
+    /// # Errors
+    /// As [`Metadata::read`].
+    pub fn read_beams(path: &Path) -> Result<Self, FormatError> {
+        let nearest = |value: &Value| {
+            let is_coarse = value.as_str().is_some_and(|name| name.contains("RNG15"));
+            Ok(if is_coarse { Profile::LowRate } else { Profile::Single })
+        };
+        Self::parse_as(&text_of(path)?, path, nearest)
     }
 
     /// Parses `text`, which errors attribute to `path`. It knows both layouts: the nested one, and
-    /// the flat one of older firmware and programs.
+    /// the flat one of older firmware and programs. What the oldest do not state is as ouster-sdk
+    /// has it (`default_data_format` and others in `types.cpp`).
     ///
     /// # Errors
     /// Text that is not JSON; a required field that is missing or invalid.
     pub fn parse(text: &str, path: &Path) -> Result<Self, FormatError> {
+        Self::parse_as(text, path, profile)
+    }
+
+    fn parse_as(
+        text: &str,
+        path: &Path,
+        profile: impl Fn(&Value) -> Result<Profile, String>,
+    ) -> Result<Self, FormatError> {
+        let text = text.trim_start_matches('\u{feff}');
         if text.len() as u64 > LONGEST {
             let cause = format!("expected at most {LONGEST} bytes, found more");
             return Err(FormatError::malformed(path, "metadata", cause));
@@ -71,8 +89,14 @@ impl Metadata {
         let root: Value = serde_json::from_str(text)
             .map_err(|cause| FormatError::malformed(path, "metadata", cause))?;
         let fields = Fields { path, root: &root, is_nested: root.get("beam_intrinsics").is_some() };
-        let columns_per_frame = fields.get(FORMAT, "columns_per_frame", |v| whole(v, 1..=4096))?;
-        let rows = fields.get(FORMAT, "pixels_per_column", |v| whole(v, 1..=256))?;
+        let has_format = root.pointer(FORMAT[usize::from(fields.is_nested)]).is_some();
+        let format = |name: &str, range, default: &dyn Fn() -> Result<u16, FormatError>| {
+            if has_format { fields.get(FORMAT, name, |v| whole(v, range)) } else { default() }
+        };
+        let columns_of_mode = || fields.get(CONFIG, "lidar_mode", |v| mode(v).map(|[n, _]| n));
+        let columns_per_frame = format("columns_per_frame", 1..=4096, &columns_of_mode)?;
+        let listed = || fields.get(BEAMS, "beam_altitude_angles", n_rows);
+        let rows = format("pixels_per_column", 1..=256, &listed)?;
         let altitudes = fields.get(BEAMS, "beam_altitude_angles", |v| numbers(v, rows, 90.0))?;
         let azimuths = fields.get(BEAMS, "beam_azimuth_angles", |v| numbers(v, rows, 360.0))?;
         Ok(Self {
@@ -80,14 +104,16 @@ impl Metadata {
             profile: fields.optional(FORMAT, "udp_profile_lidar", profile)?.unwrap_or_default(),
             is_fusa: fields.optional(FORMAT, "header_type", is_fusa)?.unwrap_or_default(),
             columns_per_frame,
-            columns_per_packet: fields.get(FORMAT, "columns_per_packet", |v| whole(v, 1..=64))?,
+            columns_per_packet: format("columns_per_packet", 1..=64, &|| Ok(16))?,
             column_window: fields
                 .optional(FORMAT, "column_window", |v| window(v, columns_per_frame))?
                 .unwrap_or([0, columns_per_frame - 1]),
             rate_hz: fields.get(CONFIG, "lidar_mode", |v| rate_hz(v, columns_per_frame))?,
             beams_deg: altitudes.into_iter().zip(azimuths).map(|(p, a)| [p, a]).collect(),
             origin_m: fields.origin_m()?,
-            lidar_to_sensor: fields.get(LIDAR, "lidar_to_sensor_transform", rigid)?,
+            lidar_to_sensor: fields
+                .optional(LIDAR, "lidar_to_sensor_transform", rigid)?
+                .unwrap_or(LIDAR_TO_SENSOR),
         })
     }
 }
@@ -150,6 +176,11 @@ const FORMAT: Section = ["/data_format", "/lidar_data_format"];
 const BEAMS: Section = ["", "/beam_intrinsics"];
 const LIDAR: Section = ["", "/lidar_intrinsics"];
 const CONFIG: Section = ["", "/config_params"];
+const PRODUCT: Section = ["", "/sensor_info"];
+
+/// The transform of sensors that do not state it: half a turn, and up by 36.18 mm.
+const LIDAR_TO_SENSOR: [[f64; 4]; 3] =
+    [[-1.0, 0.0, 0.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 36.18 * 1e-3]];
 
 struct Fields<'a> {
     path: &'a Path,
@@ -184,19 +215,34 @@ impl Fields<'_> {
         FormatError::malformed(self.path, pointer[1..].replace('/', "."), cause)
     }
 
-    /// The origin of the beams. Older firmware has only the distance from the axis.
+    /// The origin of the beams. Older firmware has only the distance from the axis, or none.
     fn origin_m(&self) -> Result<[f64; 2], FormatError> {
         let of_transform = |v: &Value| rows(v).map(|[x, _, z]| [x[3], z[3]]);
         if let Some(origin) = self.optional(BEAMS, "beam_to_lidar_transform", of_transform)? {
             return Ok(origin);
         }
         let name = "lidar_origin_to_beam_origin_mm";
-        self.get(BEAMS, name, |v| number(v, FARTHEST_MM).map(|x| [x * 1e-3, 0.0]))
+        let found = self.optional(BEAMS, name, |v| number(v, FARTHEST_MM))?;
+        let of_line = |line: &Value| match line.as_str().and_then(|line| line.get(..4)) {
+            Some("OS-0") => 27.67,
+            Some("OS-1") => 15.806,
+            Some("OS-2") => 13.762,
+            _ => 12.163,
+        };
+        let by_line = self.optional(PRODUCT, "prod_line", |line| Ok(of_line(line)))?;
+        let mm = found.or(by_line).unwrap_or(of_line(&Value::Null));
+        Ok([mm * 1e-3, 0.0])
     }
 }
 
 /// The largest distance between parts of a sensor, millimetres.
 const FARTHEST_MM: f64 = 1e4;
+
+fn text_of(path: &Path) -> Result<String, FormatError> {
+    let mut text = String::new();
+    let read = File::open(path).and_then(|file| file.take(LONGEST + 1).read_to_string(&mut text));
+    read.map(|_| text).map_err(|source| FormatError::io(path, source))
+}
 
 fn whole(value: &Value, range: RangeInclusive<u16>) -> Result<u16, String> {
     let found = value.as_u64().and_then(|n| u16::try_from(n).ok()).filter(|n| range.contains(n));
@@ -241,13 +287,28 @@ fn window(value: &Value, columns: u16) -> Result<[u16; 2], String> {
     Ok([column(0)?, column(1)?])
 }
 
-/// The turns per second of a mode such as 1024x10.
+/// The turns per second of a mode with these columns per turn.
 fn rate_hz(value: &Value, columns: u16) -> Result<f64, String> {
-    let rate = value.as_str().and_then(|mode| mode.strip_prefix(&format!("{columns}x")));
-    let rate = rate.and_then(|rate| rate.parse().ok()).filter(|rate: &u8| (1..=100).contains(rate));
-    let found =
-        rate.ok_or_else(|| format!("expected a mode such as {columns}x10, found {}", shown(value)));
-    found.map(f64::from)
+    match mode(value) {
+        Ok([found, rate]) if found == columns => Ok(rate.into()),
+        _ => Err(format!("expected a mode such as {columns}x10, found {}", shown(value))),
+    }
+}
+
+/// The columns per turn and the turns per second of a mode such as 1024x10.
+fn mode(value: &Value) -> Result<[u16; 2], String> {
+    let found = value.as_str().and_then(|mode| {
+        let (columns, rate) = mode.split_once('x')?;
+        let [columns, rate] = [columns.parse().ok()?, rate.parse().ok()?];
+        ((1..=4096).contains(&columns) && (1..=100).contains(&rate)).then_some([columns, rate])
+    });
+    found.ok_or_else(|| format!("expected a mode such as 1024x10, found {}", shown(value)))
+}
+
+fn n_rows(value: &Value) -> Result<u16, String> {
+    let n = value.as_array().map_or(0, Vec::len);
+    let fits = u16::try_from(n).ok().filter(|n| (1..=256).contains(n));
+    fits.ok_or_else(|| format!("expected a list of 1 to 256 values, found {}", shown(value)))
 }
 
 /// The upper three rows of a transform, converted from millimetres to metres.

@@ -39,16 +39,19 @@ pub(super) struct Property {
 }
 
 impl Element {
-    /// Whether it has a property of this name.
+    /// Whether it has a property of this name, in upper or lower case.
     #[must_use]
     pub fn has(&self, name: &str) -> bool {
-        self.properties.iter().any(|property| property.name == name)
+        self.place(name).is_some()
     }
 
-    /// The index of the property `name`, which must be a number.
+    fn place(&self, name: &str) -> Option<usize> {
+        self.properties.iter().position(|property| property.name.eq_ignore_ascii_case(name))
+    }
+
+    /// The index of the property `name`, in upper or lower case, which must be a number.
     pub fn scalar(&self, name: &str) -> Result<usize, String> {
-        let at = self.properties.iter().position(|property| property.name == name);
-        match at {
+        match self.place(name) {
             None => Err(format!("property {name} is missing")),
             Some(at) if self.properties[at].length.is_some() => {
                 Err(format!("expected a number as property {name}, found a list"))

@@ -7,6 +7,7 @@ use super::packet::{TURN, advance};
 use super::{Decoder, Header, Model, PacketError};
 use crate::capture::{Points, Senders, each_packet};
 use crate::error::FormatError;
+use crate::pcap::Counts;
 use crate::returns::Kind;
 use crate::scan::Scan;
 use crate::vlp32c::packet::PAYLOAD_SIZE;
@@ -42,20 +43,24 @@ pub fn count_returns(path: &Path) -> Result<u64, FormatError> {
 /// # Errors
 /// A file that is not such a capture or has no complete turn; a packet that cannot be decoded,
 /// with its number.
-pub fn read_turn(path: &Path, senders: &mut Senders) -> Result<Scan, FormatError> {
+pub fn read_turn(path: &Path, senders: &mut Senders) -> Result<(Scan, Counts), FormatError> {
     let mut turn = Turn::default();
     let is_data = |payload: &[u8]| Header::parse(payload).is_ok();
-    let n_packets = each_packet(path, senders, is_data, |payload| turn.take(payload))?;
+    let counts = each_packet(path, senders, is_data, |payload| turn.take(payload))?;
     // Rounding may lose a unit.
     if turn.end() < f64::from(TURN) - 1.0 {
         let found = match turn.decoder {
-            None => format!("none among {n_packets} UDP packets{senders}"),
+            None => "none".to_owned(),
             Some(_) => format!("{:.1} degrees of one", turn.end() * AZIMUTH_UNIT_DEG),
         };
-        let cause = format!("expected a turn of a VLP-16 or VLP-32C, found {found}");
+        let n = counts.packets;
+        let cause = format!(
+            "expected a turn of a VLP-16 or VLP-32C, found {found} among {n} UDP \
+             packets{senders}{counts}"
+        );
         return Err(FormatError::malformed(path, "packets", cause));
     }
-    Ok(turn.points.scan())
+    Ok((turn.points.scan(), counts))
 }
 
 #[derive(Default)]

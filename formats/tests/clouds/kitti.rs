@@ -1,3 +1,9 @@
+use std::fs;
+use std::path::Path;
+
+use formats::cloud_file::{CloudFormat, read_cloud, read_cloud_as};
+use test_support::{need, shared_data};
+
 use super::{error, read};
 
 fn floats(numbers: &[f32]) -> Vec<u8> {
@@ -20,6 +26,49 @@ fn what_is_not_finite_is_passed_on() {
     let points = read("a.bin", floats(&[f32::NAN, f32::INFINITY, 1e-45, 0.0]));
     assert!(points[0][0].is_nan());
     assert_eq!(points[0][1..], [f64::INFINITY, f64::from(1e-45f32)]);
+}
+
+#[test]
+fn what_only_its_name_makes_kittis_must_make_sense() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("frame.bin");
+    let read = |format: Option<CloudFormat>, points: &[&[f32]]| {
+        fs::write(&path, floats(&points.concat())).unwrap();
+        let read = read_cloud_as(&path, format).map(|points| points.len());
+        read.map_err(|error| error.to_string().split_once("frame.bin: ").unwrap().1.to_owned())
+    };
+    let remedy = "name the format by --format: kitti has four f32 for each point, nuscenes five";
+    let five: Vec<_> = (0..100u8)
+        .map(|i| (0.37 * f32::from(i), f32::from(i % 32)))
+        .map(|(x, ring)| [x, -x, 0.1 + x, 7.0, ring])
+        .collect();
+    let five: Vec<_> = five.iter().map(|point| &point[..]).collect();
+    let four: Vec<_> = five.iter().map(|point| &point[..4]).collect();
+    let rings = format!("format: the fifth numbers look like rings of nuScenes: {remedy}");
+    assert_eq!(read(None, &five), Err(rings.clone()));
+    assert_eq!(read(Some(CloudFormat::Nuscenes), &five), Ok(100));
+    assert_eq!(read(Some(CloudFormat::Kitti), &five), Ok(125));
+    assert_eq!(read(None, &four), Ok(100));
+    let lost = [f32::NAN, f32::NAN, f32::NAN, 0.0];
+    assert_eq!(read(None, &[&[1.0, 2.0, 3.0, 0.0], &lost]), Ok(2));
+    for (wrong, found) in [
+        ([1.0, f32::NAN, 3.0, 0.0], "[1.0, NaN, 3.0]"),
+        ([0.0, 1e5, 0.0, 0.0], "[0.0, 100000.0, 0.0]"),
+    ] {
+        let expected = format!("point 1: expected metres from the sensor, found {found}: {remedy}");
+        assert_eq!(read(None, &[&lost, &wrong]), Err(expected));
+        assert_eq!(read(Some(CloudFormat::Kitti), &[&lost, &wrong]), Ok(2));
+    }
+    let folder = folder.path().display().to_string();
+    let error = read_cloud(Path::new(&folder)).unwrap_err().to_string();
+    assert_eq!(
+        error,
+        format!("{folder}: name: expected a file, found a folder: name the files in it")
+    );
+    let path = need!(shared_data("bug_inputs/nus100.bin"));
+    let error = read_cloud(&path).unwrap_err().to_string();
+    assert!(error.ends_with(&rings), "{error}");
+    assert_eq!(read_cloud_as(&path, Some(CloudFormat::Nuscenes)).unwrap().len(), 100);
 }
 
 #[test]

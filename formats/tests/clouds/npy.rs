@@ -1,6 +1,8 @@
 use super::{MANY, error, read};
 use crate::numpy::npy;
+use formats::cloud_file::read_cloud;
 use proptest::prelude::*;
+use test_support::{need, shared_data};
 
 fn c_order(descr: &str, shape: &str, data: &[u8]) -> Vec<[f64; 3]> {
     read("a.npy", npy(descr, "False", shape, data))
@@ -42,6 +44,50 @@ fn columns_beyond_the_third_are_passed_over() {
     let points = read("a.npy", npy("|u1", "True", "(2, 4)", &data));
     assert_eq!(points, [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]);
     assert!(c_order("<f4", "(0, 3)", &[]).is_empty());
+}
+
+/// Types by `numpy.lib.format`, with the padding of `numpy.dtype(..., align=True)`.
+#[test]
+fn records_have_their_coordinates_by_name() {
+    let record = |types: &str, shape: &str, data: &[u8]| {
+        let quoted = npy("*", "False", shape, data);
+        // The header's list has no quotes around it.
+        let text = String::from_utf8_lossy(&quoted[10..10 + quoted[8] as usize]).into_owned();
+        let text = text.replace("'*'", types);
+        let length = (text.len() as u16).to_le_bytes();
+        [&quoted[..8], &length, text.as_bytes(), data].concat()
+    };
+    let types = "[('i', '|u1'), ('', '|V3'), ('Z', '>f8'), ('tag', '<U2'), (('east', 'x'), '<f4'), \
+                 ('s', '<i2', (2,)), ('y', '<i2')]";
+    let point = |x: f32, y: i16, z: f64| {
+        [&[9; 4][..], &z.to_be_bytes(), &[9; 8], &x.to_le_bytes(), &[9; 4], &y.to_le_bytes()]
+            .concat()
+    };
+    let data = [point(1.0, 2, 3.0), point(4.0, 5, 6.0)].concat();
+    for shape in ["(2,)", "(1, 2)"] {
+        let points = read("a.npy", record(types, shape, &data));
+        assert_eq!(points, [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]);
+    }
+    assert_eq!(
+        read("a.npz", crate::numpy::npz(&[("a", record(types, "(2,)", &data))]))[1],
+        [4.0, 5.0, 6.0]
+    );
+    let refuse = |types: &str| error("a.npy", record(types, "(1,)", &[0; 12]));
+    let expected =
+        |found| format!("array: expected records with numbers x, y and z, found {found}");
+    for types in [
+        "[('x', '<f4'), ('y', '<f4')]",
+        "[('x', '|O'), ('y', '<f4'), ('z', '<f4')]",
+        "[('x', '<f4', (2,)), ('y', '<f4'), ('z', '<f4')]",
+    ] {
+        assert_eq!(refuse(types), expected(types));
+    }
+    let xyz = "[('x', '<f4'), ('y', '<f4'), ('z', '<f4')]";
+    let cut = error("a.npy", record(xyz, &format!("({MANY},)"), &[0; 20]));
+    assert_eq!(cut, format!("array: the file ends after 1 of {MANY}"));
+    let path = need!(shared_data("bug_inputs/struct.npy"));
+    let points = read_cloud(&path).unwrap();
+    assert!(points.len() == 150 && points[0].iter().all(|x| x.abs() < 100.0), "{:?}", points[0]);
 }
 
 #[test]

@@ -1,4 +1,6 @@
 use super::{MANY, error, read};
+use formats::cloud_file::read_cloud;
+use test_support::{need, shared_data};
 
 const HEADER: &str = "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\n";
 
@@ -27,6 +29,46 @@ fn binary_points_are_read_whatever_lies_between() {
     };
     let data = [point(1e-300, -2, 0.5), point(4.0, 5, 6.0)].concat();
     assert_eq!(read("a.pcd", pcd(header, &data)), [[0.5, -2.0, 1e-300], [6.0, 5.0, 4.0]]);
+}
+
+#[test]
+fn older_headers_and_padding_are_read_as_the_point_cloud_library_does() {
+    let data = [1.0f32, 2.0, 3.0].map(f32::to_le_bytes).concat();
+    let old = "COLUMNS x y z\nPOINTS 1\nDATA binary\n";
+    assert_eq!(
+        read(
+            "a.pcd",
+            ["# .PCD v.5\n", old]
+                .concat()
+                .into_bytes()
+                .into_iter()
+                .chain(data.clone())
+                .collect::<Vec<_>>()
+        ),
+        [[1.0, 2.0, 3.0]]
+    );
+    let marked = [b"\xef\xbb\xbf", HEADER.as_bytes(), old.as_bytes(), &data].concat();
+    assert_eq!(read("a.pcd", marked), [[1.0, 2.0, 3.0]]);
+    let padded = "FIELDS x _ y _ z\nSIZE 4 1 4 1 4\nTYPE F U F U F\nCOUNT 1 0 1 2 1\nPOINTS 1\n";
+    let point = [&data[..8], &[9; 2], &data[8..]].concat();
+    assert_eq!(read("a.pcd", pcd(&format!("{padded}DATA binary\n"), &point)), [[1.0, 2.0, 3.0]]);
+    let ascii = pcd(&format!("{padded}DATA ascii\n"), b"1 2 9 9 3\n");
+    assert_eq!(read("a.pcd", ascii), [[1.0, 2.0, 3.0]]);
+    // Compressed padding is dropped, or kept by other programs.
+    for numbers in [&data, &point] {
+        let size = numbers.len() as u32;
+        let sizes = [size + 1, size].map(u32::to_le_bytes).concat();
+        let literals = [&sizes[..], &[size as u8 - 1], numbers].concat();
+        let file = pcd(&format!("{padded}DATA binary_compressed\n"), &literals);
+        assert_eq!(read("a.pcd", file), [[1.0, 2.0, 3.0]]);
+    }
+    let no_x = pcd("FIELDS x y z\nCOUNT 0 1 1\nPOINTS 1\nDATA ascii\n", b"1 2\n");
+    assert_eq!(error("a.pcd", no_x), "FIELDS: expected one number as x, found 0 of type F4");
+    let path = need!(shared_data("bug_inputs/padding_count0.pcd"));
+    let points = read_cloud(&path).unwrap();
+    assert_eq!(points.len(), 200);
+    // Its fields after `z` are constant, and its coordinates within a room.
+    assert!(points.iter().flatten().all(|x| x.abs() < 100.0), "{points:?}");
 }
 
 fn compressed(n: &str, compressed: &[u8], uncompressed: u32) -> Vec<u8> {

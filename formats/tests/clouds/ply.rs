@@ -19,6 +19,16 @@ fn text_is_read_by_its_properties() {
     assert_eq!(read("a.ply", ply("ascii", BUSY, data)), POINTS);
     let crlf = String::from_utf8(ply("ascii", BUSY, data)).unwrap().replace('\n', "\r\n");
     assert_eq!(read("a.ply", crlf), POINTS);
+    let marked = [b"\xef\xbb\xbf", &ply("ascii", BUSY, data)[..]].concat();
+    assert_eq!(read("a.ply", marked), POINTS);
+    let upper = ["float z", "short y", "float x"];
+    let upper = upper.iter().fold(BUSY.replace("double z", "float Z"), |header, name| {
+        header.replace(
+            name,
+            &format!("{}{}", &name[..name.len() - 1], name[name.len() - 1..].to_uppercase()),
+        )
+    });
+    assert_eq!(read("a.ply", ply("ascii", &upper, data)), POINTS);
 }
 
 #[test]

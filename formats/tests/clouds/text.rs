@@ -1,4 +1,6 @@
 use super::{error, read};
+use formats::cloud_file::read_cloud;
+use test_support::{need, shared_data};
 
 const POINTS: [[f64; 3]; 2] = [[1.0, -2.5, 3e-7], [4.0, 5.0, 6.0]];
 
@@ -35,6 +37,26 @@ fn comments_are_passed_over() {
     let text = "# x y z\n//X Y Z\n\n1 -2.5 3e-7 # the first\n   # another\n4 5 6\n";
     assert_eq!(read("a.xyz", text), POINTS);
     assert_eq!(read("a.xyz", b"# caf\xe9\n1 -2.5 3e-7\n4 5 6\n"), POINTS);
+}
+
+#[test]
+fn a_count_before_the_points_is_checked() {
+    for text in ["2\n1 -2.5 3e-7 -5 0 0 0\n4 5 6 -5 0 0 0\n", "\u{feff}1\n1 -2.5 3e-7\n1\n4 5 6\n"]
+    {
+        assert_eq!(read("a.pts", text), POINTS, "{text}");
+    }
+    assert!(read("a.pts", "0\n").is_empty());
+    for (text, message) in [
+        ("3\n1 2 3\n4 5 6\n", "points: the file ends after 2 of 3"),
+        ("1\n1 2 3\n4 5 6\n", "line 3: expected 1 points by the count, found more"),
+        ("2\n1 2 3\n4\n", "line 3: expected 3 columns, found 1"),
+        ("-2\n1 2 3\n", "line 1: expected x, y and z, found 1 column(s)"),
+    ] {
+        assert_eq!(error("a.pts", text), message);
+    }
+    let path = need!(shared_data("bug_inputs/pts.pts"));
+    let points = read_cloud(&path).unwrap();
+    assert_eq!((points.len(), points[0]), (150, [17.204596, -0.666995, 7.418099]));
 }
 
 #[test]

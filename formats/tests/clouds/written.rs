@@ -1,7 +1,7 @@
 use std::fs;
 use std::path::Path;
 
-use formats::cloud_file::{CloudFormat, read_cloud, read_cloud_from, write_cloud};
+use formats::cloud_file::{CloudFormat, read_cloud, read_cloud_as, read_cloud_from, write_cloud};
 use proptest::prelude::*;
 
 const LOSSLESS: [&str; 5] = ["ply", "npz", "npy", "xyz", "csv"];
@@ -18,7 +18,7 @@ fn there_and_back(extension: &str, points: &[[f64; 3]]) -> Vec<[f64; 3]> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("cloud").with_extension(extension);
     write_cloud(&path, points).unwrap();
-    let named = read_cloud(&path).unwrap();
+    let named = read_cloud_as(&path, CloudFormat::of_path(&path).ok()).unwrap();
     let format = CloudFormat::of_path(&path).unwrap();
     let told = Some(format).filter(|&format| format == CloudFormat::Kitti);
     let file = fs::File::open(&path).unwrap();

@@ -10,7 +10,7 @@ use crate::sampler::{SamplerKind, SamplerSpec};
 use crate::{Classifier, Options, Precision, UpAxis};
 use anyhow::Context;
 use formats::FormatError;
-use formats::cloud_file::CloudFormat;
+use formats::cloud_file::{CloudFormat, read_cloud_as};
 use formats::model_card::{ModelCard, Normalization};
 use formats::outcome::joined_causes;
 
@@ -44,7 +44,7 @@ are file and error.
 After a failure, the program continues with the next file, and exits with 1 at the
 end.
 
-Formats, by file extension: PLY, NPZ, NPY, PCD, XYZ, CSV, KITTI's .bin, LAS.")]
+Formats, by file extension: PLY, NPZ, NPY, PCD, XYZ, PTS, CSV, KITTI's .bin, LAS.")]
 pub struct ClassifyArgs {
     /// Files of clouds; `-` reads one cloud from standard input
     #[arg(value_name = "FILES", required_unless_present = "files_from")]
@@ -55,8 +55,8 @@ pub struct ClassifyArgs {
     #[arg(long, value_name = "LIST", conflicts_with = "files")]
     files_from: Option<PathBuf>,
 
-    /// Format of all clouds: ply, npz, npy, pcd, xyz, csv, kitti, las [default: detected from the
-    /// file extension, or from the first bytes of standard input]
+    /// Format of all clouds: ply, npz, npy, pcd, xyz, csv, kitti, nuscenes, las [default: detected
+    /// from the file extension, or from the first bytes of standard input]
     #[arg(long)]
     format: Option<CloudFormat>,
 
@@ -126,7 +126,7 @@ pub fn run(args: &ClassifyArgs) -> anyhow::Result<Outcome> {
     let mut session = Session { classifier, precision: args.precision, style, failed: false };
     match &args.files_from {
         Some(list) => {
-            for_each_name(list, |name| session.answer(name, input::read_file(name, args.format)))?
+            for_each_name(list, |name| session.answer(name, read_cloud_as(name, args.format)))?
         }
         None => {
             for name in &args.files {

@@ -1,11 +1,10 @@
 //! Clouds from files and from standard input.
 
-use std::fs::File;
 use std::io::stdin;
 use std::path::Path;
 
 use formats::FormatError;
-use formats::cloud_file::{CloudFormat, read_cloud, read_cloud_from};
+use formats::cloud_file::{CloudFormat, read_cloud_as, read_cloud_from};
 
 use super::Usage;
 
@@ -17,24 +16,7 @@ pub fn read(name: &Path, format: Option<CloudFormat>) -> Result<Vec<[f64; 3]>, F
     if name.as_os_str() == STANDARD_INPUT {
         return read_cloud_from(stdin().lock(), format, Path::new("standard input"));
     }
-    read_file(name, format)
-}
-
-pub fn read_file(path: &Path, format: Option<CloudFormat>) -> Result<Vec<[f64; 3]>, FormatError> {
-    if path.is_dir() {
-        return Err(FormatError::malformed(
-            path,
-            "name",
-            "expected a file, found a folder: name the files in it",
-        ));
-    }
-    match format {
-        None => read_cloud(path),
-        Some(_) => {
-            let file = File::open(path).map_err(|source| FormatError::io(path, source))?;
-            read_cloud_from(file, format, path)
-        }
-    }
+    read_cloud_as(name, format)
 }
 
 /// Checks that standard input, which holds one cloud, is named at most once.

@@ -39,8 +39,8 @@ pub struct SampleArgs {
     #[arg(long)]
     drop_invalid: bool,
 
-    /// Format of the input: ply, npz, npy, pcd, xyz, csv, kitti, las [default: detected from the
-    /// file extension, or from the first bytes of standard input]
+    /// Format of the input: ply, npz, npy, pcd, xyz, csv, kitti, nuscenes, las [default: detected
+    /// from the file extension, or from the first bytes of standard input]
     #[arg(long)]
     format: Option<CloudFormat>,
 

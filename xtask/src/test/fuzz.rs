@@ -9,7 +9,7 @@ use std::process::Command;
 use std::thread::available_parallelism;
 use xtask::workspace::{cargo, root};
 
-const TARGETS: [&str; 6] = ["off", "mesh", "clouds", "model", "packets", "live"];
+const TARGETS: [&str; 7] = ["off", "mesh", "clouds", "model", "packets", "captures", "live"];
 
 /// The target is named, so that build scripts are compiled without the flags below.
 const TRIPLE: &str = "x86_64-unknown-linux-gnu";

@@ -1,0 +1,122 @@
+//! The reader of points of all commands: scans, clouds and captures.
+
+use std::borrow::Cow;
+use std::net::IpAddr;
+use std::path::{Path, PathBuf};
+
+use formats::cloud_file::{CloudFormat, check_sweep, read_cloud_as, read_intensities};
+use formats::scan_file::read_scan;
+use formats::{FormatError, Scan, Senders, ouster, pcap, velodyne};
+
+/// How a file of points is read.
+#[derive(Clone, clap::Args)]
+pub struct PointsArgs {
+    /// Format of the points: ply, npz, npy, pcd, xyz, csv, kitti, nuscenes, las [default: by the
+    /// extension, or a capture by its first bytes]
+    #[arg(long)]
+    format: Option<CloudFormat>,
+
+    /// Metadata (JSON) of the Ouster OS0, OS1 or OS2 whose packets are in the capture
+    #[arg(long, value_name = "FILE")]
+    metadata: Option<PathBuf>,
+
+    /// Address of the sensor whose packets are used [default: the first sensor of the capture]
+    #[arg(long, value_name = "ADDRESS")]
+    from: Option<IpAddr>,
+}
+
+/// How a sweep is read.
+#[derive(Clone, clap::Args)]
+pub struct PlaceArgs {
+    #[command(flatten)]
+    points: PointsArgs,
+
+    /// Position of the sensor in the sweep, in metres [default: 0 0 0]
+    #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true)]
+    sensor: Option<Vec<f64>>,
+}
+
+/// The input of `segment`, `detect`, `weather` and `corrupt`.
+#[derive(clap::Args)]
+pub struct SweepArgs {
+    /// Sweep in metres, z up: a scan (.npz or .ply, with its rings if it has them); a capture
+    /// (.pcap or .pcapng), of which the first turn is used, of a VLP-16 or VLP-32C, or with
+    /// --metadata of an Ouster; or a cloud: .npy, .pcd, .xyz, .txt, .pts, .csv, .las, KITTI's or
+    /// nuScenes' .bin
+    #[arg(value_name = "SWEEP")]
+    pub sweep: PathBuf,
+
+    #[command(flatten)]
+    pub place: PlaceArgs,
+}
+
+impl PointsArgs {
+    /// The points in `file`, with all attributes that the program knows of its format; of a
+    /// capture the first turn. Prints a warning if packets of the capture were not read.
+    pub fn read(&self, file: &Path) -> Result<Scan, FormatError> {
+        if self.metadata.is_some() || (self.format.is_none() && pcap::is_capture(file)) {
+            return self.read_capture(file);
+        }
+        let cloud = read_cloud_as(file, self.format)?;
+        let Scan { origin, positions, .. } = Scan::of_points(&cloud);
+        // A cloud that is not a scan has no attributes.
+        let scan = read_scan(file).ok().filter(|scan| scan.len() == cloud.len());
+        Ok(match scan {
+            Some(scan) if origin == [0.0; 3] || scan.origin != [0.0; 3] => scan,
+            Some(scan) => Scan { origin, positions, ..scan },
+            None => {
+                let intensity = read_intensities(file, self.format)?;
+                Scan { origin, positions, intensity, ..Scan::default() }
+            }
+        })
+    }
+
+    fn read_capture(&self, file: &Path) -> Result<Scan, FormatError> {
+        let mut senders = Senders::new(self.from);
+        let (scan, counts) = match &self.metadata {
+            Some(path) => ouster::read_frame(file, &ouster::Metadata::read(path)?, &mut senders)?,
+            None => velodyne::read_turn(file, &mut senders)?,
+        };
+        if let Some(warning) = senders.warning() {
+            eprintln!("warning: {}: {warning}", file.display());
+        }
+        if counts.first_unread.is_some() {
+            eprintln!("warning: {}: {} UDP packets{counts}", file.display(), counts.packets);
+        }
+        Ok(scan)
+    }
+}
+
+impl SweepArgs {
+    /// The points relative to the sensor, with their attributes.
+    pub fn read(&self) -> Result<Scan, FormatError> {
+        let scan = self.read_whole()?;
+        let positions = self.from_sensor(&scan).map(|point| point.map(|x| x as f32)).collect();
+        Ok(Scan { origin: [0.0; 3], positions, ..scan })
+    }
+
+    /// The sweep as in its file.
+    pub fn read_whole(&self) -> Result<Scan, FormatError> {
+        let scan = self.place.points.read(&self.sweep)?;
+        let remedy = "give the sensor's position by --sensor, or the format by --format";
+        check_sweep(self.from_sensor(&scan), &self.sweep, remedy)?;
+        Ok(scan)
+    }
+
+    pub fn sensor_m(&self) -> [f64; 3] {
+        let given = self.place.sensor.as_deref().and_then(|xyz| <[f64; 3]>::try_from(xyz).ok());
+        given.unwrap_or_default()
+    }
+
+    fn from_sensor<'a>(&self, scan: &'a Scan) -> impl Iterator<Item = [f64; 3]> + use<'a> {
+        let (sensor, origin) = (self.sensor_m(), scan.origin);
+        scan.positions.iter().map(move |point| {
+            [0, 1, 2].map(|axis| f64::from(point[axis]) + origin[axis] - sensor[axis])
+        })
+    }
+
+    /// The title of a picture of the sweep.
+    pub fn title(&self) -> Cow<'_, str> {
+        self.sweep.file_stem().unwrap_or_default().to_string_lossy()
+    }
+}
