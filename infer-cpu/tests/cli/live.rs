@@ -312,6 +312,31 @@ fn what_cannot_be_listened_to_is_named() {
     refused("--udp 2368 --multicast 10.0.0.1", 1, "error: UDP 0.0.0.0:2368: ");
 }
 
+/// A whole frame has 16 bytes of times and lengths, and 1248 of its own.
+#[test]
+fn what_a_capture_lacks_is_told() {
+    let folder = folder();
+    let whole = std::fs::read(folder.path("drive.pcap")).unwrap();
+    let (header, frames) = whole.split_at(24);
+    // A snap length of 96 bytes.
+    let cut = frames.chunks(1264).flat_map(|frame| {
+        [&frame[..8], &96u32.to_le_bytes(), &frame[12..16], &frame[16..112]].concat()
+    });
+    folder.write("cut.pcap", [header, &cut.collect::<Vec<_>>()].concat());
+    folder.run(&format!("{LIVE} --pcap cut.pcap")).assert_refused(
+        1,
+        "error: cut.pcap: frame 0: expected 1248 bytes, found 96, since the capture has a snap length",
+    );
+    // The flag that more fragments follow, in the last frame.
+    let mut lost = whole.clone();
+    let flags = lost.len() - 1248 + 20;
+    lost[flags] = 0x20;
+    folder.write("lost.pcap", lost);
+    let ran = folder.run(&format!("{LIVE} --pcap lost.pcap --stats"));
+    assert_eq!(ran.code, 0, "{}", ran.err);
+    assert!(ran.err.contains("753 packets, beside 1 without all fragments; 0 lost"), "{}", ran.err);
+}
+
 #[test]
 fn a_reader_that_goes_away_ends_the_program_without_a_word() {
     let folder = folder();

@@ -191,12 +191,16 @@ pub fn run(args: &LiveArgs) -> anyhow::Result<Outcome> {
     if args.stats {
         report::print(&pipeline, &read);
     }
+    if !args.stats && read.capture.first_unread.is_some() {
+        eprintln!("warning: {} UDP packets{}", read.n_packets, read.capture);
+    }
     if pipeline.counts().packets == 0 {
         let cause = format!(
-            "expected packets of {}, found none among {} UDP packets{}",
+            "expected packets of {}, found none among {} UDP packets{}{}",
             if args.metadata.is_some() { "the Ouster" } else { "a VLP-16 or VLP-32C" },
             read.n_packets,
-            read.senders
+            read.senders,
+            read.capture
         );
         // A service may be stopped before its sensor is switched on.
         if args.udp.is_none() {

@@ -27,9 +27,10 @@ pub fn print(pipeline: &Pipeline, read: &Read) {
         counts.clusters as f64 / n_turns
     );
     eprintln!(
-        "{} packets; {} lost, {} late, {} duplicate, {} foreign, {} from other addresses, {} overrun, \
+        "{} packets{}; {} lost, {} late, {} duplicate, {} foreign, {} from other addresses, {} overrun, \
          {} restarts",
         counts.packets,
+        read.capture,
         counts.lost,
         counts.late,
         counts.duplicated,

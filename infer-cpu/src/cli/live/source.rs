@@ -79,6 +79,8 @@ pub struct Read {
     pub n_packets: u64,
     /// Their senders.
     pub senders: Senders,
+    /// What else a capture had.
+    pub capture: pcap::Counts,
     /// Packets that were dropped because the queue was full.
     pub n_overrun: u64,
 }
@@ -240,7 +242,7 @@ fn replay(
     take: &mut impl FnMut(Tick<'_>) -> bool,
 ) -> anyhow::Result<Read> {
     let (mut read, start, mut first_s) = (Read::default(), Instant::now(), None);
-    pcap::read(file, |packet| {
+    let capture = pcap::read(file, |packet| {
         read.n_packets += 1;
         if !sensor.sent(&packet.payload, packet.source) {
             return ControlFlow::Continue(());
@@ -258,6 +260,5 @@ fn replay(
             false => ControlFlow::Break(()),
         }
     })?;
-    read.senders = sensor.senders;
-    Ok(read)
+    Ok(Read { senders: sensor.senders, capture, ..read })
 }
