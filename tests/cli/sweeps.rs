@@ -120,7 +120,10 @@ fn captures_of_several_senders_and_interfaces_are_read() {
     let folder = Folder::new();
     let file = |name: &str| inputs.join(name).display().to_string();
     let said = folder.succeeds(&format!("segment {} --out clusters", file("two_senders.pcap")));
-    assert!(said.contains("warning: ") && said.contains(" of other senders"), "{said}");
+    assert!(
+        said.contains("warning: ") && said.contains("--from ADDRESS chooses another"),
+        "{said}"
+    );
     let chosen = |address| {
         folder.succeeds(&format!("preview {} --from {address}", file("two_senders.pcap")))
     };
