@@ -91,7 +91,7 @@ impl SweepArgs {
     /// The points relative to the sensor, with their attributes.
     pub fn read(&self) -> Result<Scan, FormatError> {
         let scan = self.read_whole()?;
-        let positions = self.from_sensor(&scan).map(|point| point.map(|x| x as f32)).collect();
+        let positions = self.relative(&scan).map(|point| point.map(|x| x as f32)).collect();
         Ok(Scan { origin: [0.0; 3], positions, ..scan })
     }
 
@@ -99,7 +99,7 @@ impl SweepArgs {
     pub fn read_whole(&self) -> Result<Scan, FormatError> {
         let scan = self.place.points.read(&self.sweep)?;
         let remedy = "give the sensor's position by --sensor, or the format by --format";
-        check_sweep(self.from_sensor(&scan), &self.sweep, remedy)?;
+        check_sweep(self.relative(&scan), &self.sweep, remedy)?;
         Ok(scan)
     }
 
@@ -108,7 +108,8 @@ impl SweepArgs {
         given.unwrap_or_default()
     }
 
-    fn from_sensor<'a>(&self, scan: &'a Scan) -> impl Iterator<Item = [f64; 3]> + use<'a> {
+    /// The points from the sensor, metres.
+    fn relative<'a>(&self, scan: &'a Scan) -> impl Iterator<Item = [f64; 3]> + use<'a> {
         let (sensor, origin) = (self.sensor_m(), scan.origin);
         scan.positions.iter().map(move |point| {
             [0, 1, 2].map(|axis| f64::from(point[axis]) + origin[axis] - sensor[axis])
