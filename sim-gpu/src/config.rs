@@ -46,7 +46,8 @@ pub enum ConfigError {
         invalid: InvalidValue,
     },
     /// A sensor's name is neither built in nor a file.
-    #[error("expected the path of a TOML profile or one of the sensors {known}, found \"{name}\"")]
+    #[error("expected the path of a TOML profile or one of the sensors {known}, found \"{name}\"{}",
+        did_you_mean(name, known.split(", ")))]
     UnknownSensor {
         /// The name that was asked for.
         name: String,
@@ -92,10 +93,28 @@ pub fn read<T: DeserializeOwned>(file: &Path) -> Result<T, ConfigError> {
 
 /// Parses `text`, which is in `file`.
 pub fn parse<T: DeserializeOwned>(text: &str, file: &Path) -> Result<T, ConfigError> {
-    toml::from_str(text).map_err(|error| ConfigError::Syntax {
-        file: file.to_owned(),
-        message: error.to_string().trim_end().to_owned(),
+    toml::from_str(text).map_err(|error| {
+        let message = error.to_string();
+        let message = format!("{}{}", message.trim_end(), suggestion(error.message()));
+        ConfigError::Syntax { file: file.to_owned(), message }
     })
+}
+
+/// The likely word, where serde says "unknown field `nois`, expected one of `noise`, `dropout`".
+fn suggestion(message: &str) -> String {
+    let mut words = message.split('`').skip(1).step_by(2);
+    let is_unknown = message.starts_with("unknown field") || message.starts_with("unknown variant");
+    let word = words.next().filter(|_| is_unknown);
+    word.map(|word| did_you_mean(word, words)).unwrap_or_default()
+}
+
+/// `; did you mean "noise"?` if one of `known` is close to `word`, and nothing otherwise.
+pub(crate) fn did_you_mean<'a>(word: &str, known: impl Iterator<Item = &'a str>) -> String {
+    // As clap and git: at most a third of the word is wrong.
+    let distance = |known: &&str| strsim::damerau_levenshtein(word, known);
+    let closest = known.min_by_key(distance);
+    let closest = closest.filter(|known| 3 * distance(known) <= word.chars().count());
+    closest.map(|known| format!("; did you mean \"{known}\"?")).unwrap_or_default()
 }
 
 /// Checks that `value`, if there is one, is neither infinite nor NaN: TOML can express both.

@@ -88,7 +88,7 @@ fn run_all(args: &Args, summary: &mut Summary) {
             targets::run(&mut summary, install);
             let with_pytorch = args.peers == peers::Which::All;
             let wheel = python::run(&mut summary, wheel, with_pytorch);
-            docs::run_blocks(&mut summary, &wheel, &programs);
+            docs::run_blocks(&mut summary, &wheel);
             summary
         });
         peers::run(summary, packages, &programs);

@@ -20,7 +20,7 @@ use edgepuck_shapes as shapes;
 use formats::hash::Hashing;
 use settings::Settings;
 use shard::Shard;
-use signal_hook::consts::SIGTERM;
+use signal_hook::consts::{SIGINT, SIGTERM};
 use sim_gpu::{Caster, Tally};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -143,7 +143,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     };
     made.or_else(|error| match error.downcast_ref() {
         Some(DatasetError::Interrupted { .. }) => {
-            eprintln!("{}: {error}", out.display());
+            eprintln!("{}: {error}; --resume continues it", out.display());
             Ok(Outcome::Interrupted)
         }
         _ => Err(error),
@@ -153,10 +153,12 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
 fn make_files(plan: &Plan, caster: &Caster, verbose: bool) -> anyhow::Result<Outcome> {
     let started = Instant::now();
     let progress = Progress::default();
-    // Once all meshes are scanned, SIGTERM ends the program immediately.
-    let is_scanned = Arc::clone(&progress.is_scanned);
-    signal_hook::flag::register_conditional_default(SIGTERM, is_scanned)?;
-    signal_hook::flag::register(SIGTERM, Arc::clone(&progress.stop))?;
+    // Once all meshes are scanned, a signal ends the program immediately.
+    for signal in [SIGINT, SIGTERM] {
+        let is_scanned = Arc::clone(&progress.is_scanned);
+        signal_hook::flag::register_conditional_default(signal, is_scanned)?;
+    }
+    stop_on_signals(&progress)?;
     let manifest = bar::beside(&progress, || make(plan, caster, &progress))?;
     if progress.is_scanned.load(SeqCst) {
         report_failures(&manifest.failures);
@@ -165,6 +167,16 @@ fn make_files(plan: &Plan, caster: &Caster, verbose: bool) -> anyhow::Result<Out
         eprintln!("{}: the dataset is already complete.", plan.out.display());
     }
     end(plan.out, &manifest)
+}
+
+/// Lets SIGINT and SIGTERM stop the run. A second Ctrl-C ends the program immediately; schedulers may
+/// repeat SIGTERM.
+fn stop_on_signals(progress: &Progress) -> anyhow::Result<()> {
+    signal_hook::flag::register_conditional_default(SIGINT, Arc::clone(&progress.stop))?;
+    for signal in [SIGINT, SIGTERM] {
+        signal_hook::flag::register(signal, Arc::clone(&progress.stop))?;
+    }
+    Ok(())
 }
 
 /// Prints the meshes that failed, with the causes.

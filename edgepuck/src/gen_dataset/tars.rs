@@ -3,10 +3,8 @@
 use super::report_failures;
 use crate::{Outcome, shell};
 use edgepuck_dataset::{Cut, HandOver, Plan, Progress, Sample, TarRecord, Tars, make_tars};
-use signal_hook::consts::{SIGINT, SIGTERM};
 use sim_gpu::Caster;
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::SeqCst};
 use std::time::Duration;
 
@@ -35,11 +33,7 @@ pub struct TarArgs {
 
 pub fn run(args: &TarArgs, plan: &Plan, caster: &Caster) -> anyhow::Result<Outcome> {
     let progress = Progress::default();
-    // A second Ctrl-C ends the program immediately; schedulers may repeat SIGTERM.
-    signal_hook::flag::register_conditional_default(SIGINT, Arc::clone(&progress.stop))?;
-    for signal in [SIGINT, SIGTERM] {
-        signal_hook::flag::register(signal, Arc::clone(&progress.stop))?;
-    }
+    super::stop_on_signals(&progress)?;
     let command = args.on_shard.as_ref();
     let hand_over = command.map(|command| |tar: &Path| hand_over(command, tar, &progress.stop));
     let tars = Tars {

@@ -1,7 +1,7 @@
 //! A sensor and the beams that belong to it.
 
 use super::Error;
-use crate::config::InvalidValue;
+use crate::config::{InvalidValue, did_you_mean};
 use crate::effects::{Effects, Footprint};
 use crate::packets;
 use crate::sensor::{BeamPattern, SensorProfile, builtin_names};
@@ -41,7 +41,10 @@ impl Sensor {
     pub fn named(name: &str) -> Result<Self, Error> {
         let unknown = || {
             let known = Self::names().collect::<Vec<_>>().join(", ");
-            InvalidValue::new("sensor", format!("expected one of {known}, found \"{name}\""))
+            InvalidValue::new("sensor", {
+                let meant = did_you_mean(name, Self::names());
+                format!("expected one of {known}, found \"{name}\"{meant}")
+            })
         };
         Ok(Self::from(SensorProfile::builtin(name).ok_or_else(unknown)?))
     }

@@ -169,3 +169,18 @@ fn the_scenes_of_effects_md_are_read() {
     // Half of the 10 degrees.
     assert!(pose.rotation.angle_between(DQuat::from_rotation_z(5f64.to_radians())) < 1e-12);
 }
+
+#[test]
+fn a_misspelt_word_is_told_with_the_likely_one() {
+    for (wrong, meant) in [
+        ("[effects]\nnois = { sigma_m = 0.1 }\n", "did you mean \"noise\"?"),
+        ("[[object]]\nmesh = \"a.obj\"\nreflectivty = 0.5\n", "did you mean \"reflectivity\"?"),
+    ] {
+        let error = parse(&format!("{OBJECT}{SENSOR}{wrong}")).unwrap_err().to_string();
+        assert!(error.contains(meant), "{error}");
+    }
+    let error = parse(&format!("{OBJECT}{}", SENSOR.replace("vlp16", "vlp61"))).unwrap_err();
+    assert!(error.to_string().contains("did you mean \"vlp16\"?"), "{error}");
+    let far = parse(&format!("{OBJECT}{SENSOR}[effects]\nxyz = 1\n")).unwrap_err().to_string();
+    assert!(!far.contains("did you mean"), "{far}");
+}

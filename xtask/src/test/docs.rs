@@ -1,33 +1,39 @@
 //! Runs the code blocks of the documentation in `docs`.
 
-use super::peers::Programs;
-use super::python::{Wheel, counts, path_behind, pytest};
+use super::meanwhile::nice;
+use super::python::{NATIVE, Wheel, counts, path_behind, pytest};
 use crate::summary::{Counts, Summary};
-use anyhow::{Context, anyhow, bail};
+use anyhow::{Context, anyhow};
 use std::path::Path;
 use std::process::Command;
 use xtask::venv::{self, cache_dir, succeeds};
-use xtask::workspace::root;
+use xtask::workspace::{cargo, executable, output, root};
 
 /// Debian's Python, whose PyTorch has 100 MB and needs no GPU; that of PyPI has 5 GB.
 const SYSTEM_PYTHON: &str = "/usr/bin/python3";
 
 /// Runs the code blocks of all pages, and the examples of the Python package with PyTorch, as a
-/// user who has installed the `wheel` and our `programs`.
-pub fn run_blocks(
-    summary: &mut Summary,
-    wheel: &Result<Wheel, String>,
-    programs: &anyhow::Result<Programs>,
-) {
+/// user who has installed the `wheel` and `infer-cpu`.
+pub fn run_blocks(summary: &mut Summary, wheel: &Result<Wheel, String>) {
     let name = "documentation's examples";
-    summary.step(name, |summary| match (wheel, programs) {
-        (Ok(wheel), Ok(programs)) => run_with(wheel, programs),
-        (Err(cause), _) => Ok(summary.skip(name, 1, cause)),
-        (_, Err(cause)) => bail!("{cause:#}"),
+    summary.step(name, |summary| match wheel {
+        Ok(wheel) => run_with(wheel),
+        Err(cause) => Ok(summary.skip(name, 1, cause)),
     });
 }
 
-fn run_with(wheel: &Wheel, programs: &Programs) -> anyhow::Result<Counts> {
+/// Builds `infer-cpu` for a release, and copies it to a folder outside of the checkout.
+fn install_infer_cpu(folder: &Path) -> anyhow::Result<()> {
+    // With the profile and the target of the wheel, most is built already.
+    let mut build = cargo(&["build", "--release", "--package", "infer-cpu", "--bin", "infer-cpu"]);
+    build.args(["--target", NATIVE, "--message-format", "json-render-diagnostics"]);
+    let program = executable(&output(&mut nice(&build))?, "infer-cpu")?;
+    std::fs::copy(&program, folder.join("infer-cpu"))
+        .with_context(|| program.display().to_string())?;
+    Ok(())
+}
+
+fn run_with(wheel: &Wheel) -> anyhow::Result<Counts> {
     let has_pytorch = succeeds(Command::new(SYSTEM_PYTHON).args(["-c", "import torch"])).is_ok();
     let base = if has_pytorch { Path::new(SYSTEM_PYTHON) } else { &wheel.tools };
     let folder = cache_dir().join("docs-venv");
@@ -41,8 +47,11 @@ fn run_with(wheel: &Wheel, programs: &Programs) -> anyhow::Result<Counts> {
     // `pip install edgepuck` in a block finds the wheel.
     let wheels = wheel.file.parent().context("invariant: a file is in a folder")?;
     tests.env("PIP_FIND_LINKS", wheels).env("PIP_NO_INDEX", "1");
-    let [(_, program), ..] = programs;
-    let folders = [Some(&*folder.join("bin")), program.parent()];
-    tests.env("PATH", path_behind(folders.into_iter().flatten())?);
-    counts(&mut tests)
+    let programs = std::env::temp_dir().join(format!("edgepuck-{}", std::process::id()));
+    std::fs::create_dir_all(&programs)?;
+    install_infer_cpu(&programs)?;
+    tests.env("PATH", path_behind([&*folder.join("bin"), &*programs])?);
+    let counted = counts(&mut tests);
+    std::fs::remove_dir_all(programs)?;
+    counted
 }

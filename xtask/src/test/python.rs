@@ -29,7 +29,7 @@ const PLATFORM: &str = "manylinux_2_28";
 const AARCH64: &str = "aarch64-unknown-linux-gnu";
 
 /// The target of the wheel for this processor.
-const NATIVE: &str =
+pub const NATIVE: &str =
     if cfg!(target_arch = "aarch64") { AARCH64 } else { "x86_64-unknown-linux-gnu" };
 
 pub struct Wheel {
