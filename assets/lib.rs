@@ -65,8 +65,9 @@ pub const TASK_SCRIPT: &str = include_str!("jobs/task.txt");
 /// recommends from.
 pub const TRADE_RECORD: &str = include_str!("reports/trade/trade.csv");
 
-/// The bundled default model, `edge-64`, as a model file's bytes.
-pub const EDGE_64: &[u8] = include_bytes!("weights/edge-64.safetensors");
-
-/// The bundled model for clusters of streets, `street-128`, as a model file's bytes.
-pub const STREET_128: &[u8] = include_bytes!("weights/street-128.safetensors");
+/// The bundled models: a model's name and the bytes of its file.
+pub const MODELS: [(&str, &[u8]); 3] = [
+    ("edge-64", include_bytes!("weights/edge-64.safetensors")),
+    ("street-128", include_bytes!("weights/street-128.safetensors")),
+    ("shapes-rotational-64", include_bytes!("weights/shapes-rotational-64.safetensors")),
+];

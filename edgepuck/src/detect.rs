@@ -13,15 +13,13 @@ use crate::points::SweepArgs;
 use crate::segment::tint;
 use crate::{Outcome, Usage, preview};
 
-const BUNDLED: &str = "street-128";
-
 #[derive(clap::Args)]
 pub(crate) struct DetectArgs {
     #[command(flatten)]
     input: SweepArgs,
 
     /// Model for clusters: street-128, or the path of a model file
-    #[arg(long, default_value = BUNDLED, value_name = "MODEL")]
+    #[arg(long, default_value = "street-128", value_name = "MODEL")]
     model: PathBuf,
 
     /// JSON file (.json) for the objects; a picture is written beside it, with the extension .png
@@ -87,13 +85,13 @@ pub struct Detections {
 }
 
 impl Detector {
-    /// A detector with the model at a path, or the bundled one, for clusters of at least
+    /// A detector with a bundled model or the one at a path, for clusters of at least
     /// `min_points` points.
     pub fn open(model: &Path, options: &Options, min_points: usize) -> anyhow::Result<Self> {
-        let classifier = match model == Path::new(BUNDLED) {
-            true => Classifier::from_bytes(edgepuck_assets::STREET_128, options)?,
-            false => Classifier::load(model, options)?,
-        };
+        let classifier = Classifier::load(model, options)?;
+        if let Some(warning) = classifier.unsuited_to_clusters() {
+            eprintln!("warning: {}: {warning}", model.display());
+        }
         let mut settings = Settings::default();
         settings.min_points = min_points;
         let segmenter = Segmenter::new(settings).map_err(|error| Usage(error.to_string()))?;

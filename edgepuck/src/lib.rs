@@ -6,7 +6,6 @@ mod advise;
 mod brightness;
 mod card;
 mod caster;
-mod checkout;
 pub mod cli;
 mod cluster;
 mod corrupt;

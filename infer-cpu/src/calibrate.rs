@@ -44,7 +44,7 @@ pub fn on_clouds<'a>(
     path: &Path,
     clouds: impl IntoIterator<Item = &'a [[f32; 3]]>,
 ) -> Result<BTreeMap<String, f32>, Error> {
-    on_clouds_of(&ModelSource::File(path.to_path_buf()), clouds)
+    on_clouds_of(&ModelSource::of(path)?, clouds)
 }
 
 fn on_clouds_of<'a>(
@@ -80,7 +80,7 @@ fn on_clouds_of<'a>(
 /// # Errors
 /// A file that is not a model.
 pub fn on_shapes(path: &Path) -> Result<BTreeMap<String, f32>, Error> {
-    on_shapes_of(&ModelSource::File(path.to_path_buf()))
+    on_shapes_of(&ModelSource::of(path)?)
 }
 
 pub fn on_shapes_of(model: &ModelSource) -> Result<BTreeMap<String, f32>, Error> {

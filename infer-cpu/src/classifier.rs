@@ -57,12 +57,26 @@ impl Classifier {
     /// A file that cannot be read or is not a model; options that the model or this machine does
     /// not support.
     pub fn load(path: &Path, options: &Options) -> Result<Self, Error> {
-        let source = ModelSource::File(path.to_path_buf());
+        let source = ModelSource::of(path)?;
         let source = match options.precision {
             Precision::F32 => source,
             _ => source.into_memory()?,
         };
         Self::from_source(source, options)
+    }
+
+    /// What to tell a user who asks this model for the classes of clusters of a scan: a model that
+    /// scales its clouds has learnt whole objects, without their sizes.
+    #[must_use]
+    pub fn unsuited_to_clusters(&self) -> Option<String> {
+        let found = self.card.normalization;
+        (!found.is_metric()).then(|| {
+            format!(
+                "expected a model of clusters in metres (normalization metric or metric-sight), found \
+                 one of whole objects ({found}), which takes cars for airplanes; `--model street-128` \
+                 is for clusters"
+            )
+        })
     }
 
     /// Loads a model from the bytes of a model file, for example from `include_bytes!`.

@@ -7,8 +7,7 @@
 //!
 //! use infer_cpu::{Classifier, Options, read_cloud};
 //!
-//! let model = Path::new("assets/weights/edge-64.safetensors"); // of a checkout
-//! let mut classifier = Classifier::load(model, &Options::default())?;
+//! let mut classifier = Classifier::load(Path::new("model.safetensors"), &Options::default())?;
 //! let cloud = read_cloud(Path::new("chair.ply"))?;
 //! let prediction = classifier.classify_f64(&cloud)?;
 //! println!("{} ({:.1} %)", prediction.answer(), 100.0 * prediction.confidence());
@@ -27,7 +26,8 @@
 //!
 //! # Features
 //! `npz`, `ply`, `pcd` and `las` read clouds of these formats. `evaluate` and `live` add what their
-//! names say, and `mcap` recordings. `cli` builds the program `infer-cpu`; a library's user leaves it
+//! names say, and `mcap` recordings. `bundled` embeds the models of `edgepuck_assets`, which
+//! [`Classifier::load`] then takes by their names. `cli` builds the program `infer-cpu`; a library's user leaves it
 //! out and names the formats: `infer-cpu = { version = "0.1", default-features = false, features =
 //! ["npz", "ply"] }`. Text, NPY and KITTI's `.bin` are always read.
 
@@ -78,7 +78,7 @@ pub mod sharing {
 #[doc(hidden)]
 pub mod model_file {
     pub use crate::dense::Dense;
-    pub use crate::network::{Network, TNet, read, read_bytes};
+    pub use crate::network::{Network, TNet, read, read_card};
 }
 
 pub use calibrate::on_clouds as activation_ranges;

@@ -9,7 +9,6 @@
 
 use std::collections::BTreeSet;
 use std::path::Path;
-use std::sync::Arc;
 
 use formats::FormatError;
 use formats::model_card::ModelCard;
@@ -77,21 +76,15 @@ pub enum Role {
 /// The widest layer: a sum of int8 products over that many inputs fits into 32 bits.
 const WIDEST: usize = 1 << 16;
 
-/// Reads the card and the network of the model file at `path`, in f32, with batch norms folded in.
+/// The card of the bundled model of this name, or of the model file at `path`.
+pub fn read_card(path: &Path) -> Result<ModelCard, FormatError> {
+    ModelSource::of(path)?.open().map(|(_, card)| card)
+}
+
+/// Reads the card and the network of the bundled model of this name, or of the model file at `path`,
+/// in f32, with batch norms folded in.
 pub fn read(path: &Path) -> Result<(ModelCard, Network<Dense, Dense>), FormatError> {
-    read_source(&ModelSource::File(path.to_path_buf()))
-}
-
-/// Does the same for the `bytes` of a model file, which errors call `name`.
-pub fn read_bytes(
-    name: &Path,
-    bytes: Arc<[u8]>,
-) -> Result<(ModelCard, Network<Dense, Dense>), FormatError> {
-    read_source(&ModelSource::Memory { name: name.to_path_buf(), bytes })
-}
-
-fn read_source(model: &ModelSource) -> Result<(ModelCard, Network<Dense, Dense>), FormatError> {
-    let (mut file, card) = model.open()?;
+    let (mut file, card) = ModelSource::of(path)?.open()?;
     let network = read_network(&mut file, &card, |dense, _| dense, |dense| dense)?;
     Ok((card, network))
 }

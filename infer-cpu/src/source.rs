@@ -19,6 +19,26 @@ pub enum ModelSource {
 }
 
 impl ModelSource {
+    /// The bundled model of this name, else the file at this path.
+    ///
+    /// # Errors
+    /// A word that is neither.
+    pub fn of(model: &Path) -> Result<Self, FormatError> {
+        #[cfg(feature = "bundled")]
+        {
+            use edgepuck_assets::MODELS;
+            if let Some((_, bytes)) = MODELS.iter().find(|(name, _)| model == Path::new(name)) {
+                return Ok(Self::Memory { name: model.to_path_buf(), bytes: Arc::from(*bytes) });
+            }
+            if model.extension().is_none() && !model.exists() {
+                let names = MODELS.map(|(name, _)| name).join(", ");
+                let cause = format!("expected a model file, or one of {names}");
+                return Err(FormatError::malformed(model, "name", cause));
+            }
+        }
+        Ok(Self::File(model.to_path_buf()))
+    }
+
     pub fn from_bytes(bytes: &[u8]) -> Self {
         Self::Memory { name: PathBuf::from("model in memory"), bytes: bytes.into() }
     }

@@ -55,7 +55,7 @@ pub struct LayerShape {
 /// # Errors
 /// A file that is not a model, as for [`crate::Classifier::load`].
 pub fn inspect(path: &Path) -> Result<Summary, Error> {
-    let (mut file, card) = ModelSource::File(path.to_path_buf()).open()?;
+    let (mut file, card) = ModelSource::of(path)?.open()?;
     let n_stored = file.shapes().values().map(|shape| shape.iter().product::<usize>()).sum();
     let network = read_network(&mut file, &card, |dense, _| shape_of(dense), shape_of)?;
     let Network { stn, edges, trunk, fstn, head, front, .. } = network;

@@ -8,10 +8,6 @@ use pyo3::types::PyDict;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
-/// The models that are part of the package.
-const BUNDLED: [(&str, &[u8]); 2] =
-    [("edge-64", edgepuck_assets::EDGE_64), ("street-128", edgepuck_assets::STREET_128)];
-
 /// A network, and how it computes: on the caller's thread.
 #[pyclass(module = "edgepuck._edgepuck", frozen)]
 pub struct Classifier {
@@ -38,15 +34,7 @@ impl Classifier {
         if let Some(points) = n_points {
             options.sampler.get_or_insert_default().points = points;
         }
-        let bundled = BUNDLED.iter().find(|(name, _)| *name == model);
-        if bundled.is_none() && !Path::new(model).exists() {
-            let names = BUNDLED.map(|(name, _)| name).join(", ");
-            return Err(raised(format!("{model}: expected a model file, or one of {names}")));
-        }
-        let loaded = py.detach(|| match bundled {
-            Some((_, bytes)) => infer_cpu::Classifier::from_bytes(bytes, &options),
-            None => infer_cpu::Classifier::load(Path::new(model), &options),
-        });
+        let loaded = py.detach(|| infer_cpu::Classifier::load(Path::new(model), &options));
         Ok(Self { classifier: Mutex::new(loaded.map_err(raised)?) })
     }
 

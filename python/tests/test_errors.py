@@ -25,7 +25,7 @@ SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0]]
         (lambda: ep.Mesh(SQUARE, [[0, 1, 2]], up="x"), "expected one of y, z"),
         (lambda: ep.Mesh(SQUARE, [[0, 1, 2]], normalize="no"), "unit-sphere"),
         (lambda: ep.Sensor("vlp99"), "vlp99"),
-        (lambda: ep.Classifier("edge-65"), "edge-65: expected a model file, or one of edge-64, street-128"),
+        (lambda: ep.Classifier("edge-65"), "edge-65: name: expected a model file, or one of edge-64, street-128"),
         (lambda: ep.Scenes("streets"), "expected a recipe's file, or one of"),
         (lambda: ep.Sensor("vlp32c").scan(ep.Mesh(*ep.box((1, 1, 1)))).save("x.pcd"), "x.pcd"),
         (lambda: ep.Classifier("edge-64", precision="i9"), "i9"),

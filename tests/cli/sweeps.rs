@@ -59,6 +59,9 @@ fn a_sweep_is_cut_and_its_clusters_are_named() {
         assert!(size[0] >= size[1] && size[0] < 30.0, "{object}");
     }
     assert!(folder.bytes("objects.png").starts_with(b"\x89PNG"));
+
+    let said = folder.succeeds(&format!("detect {sweep} --model edge-64 --out whole.json"));
+    assert!(said.contains("warning: edge-64: expected a model of clusters in metres"), "{said}");
 }
 
 #[test]

@@ -9,13 +9,13 @@ mod tests;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
+use formats::atomic;
 use formats::model_card::ModelCard;
-use formats::{FormatError, atomic};
 use infer_cpu::model_file;
 use prost::Message;
 
 use crate::overwrite::Overwrite;
-use crate::{Outcome, Usage, checkout};
+use crate::{Outcome, Usage};
 use graph::{Graph, Size};
 use pointnet::{Net, NetInputs};
 use proto::{ModelProto, OperatorSetIdProto, StringStringEntryProto, data_type};
@@ -52,7 +52,7 @@ Outputs:
 
 The card (classes, normalization, sampler, ...) is in the file's metadata_props.")]
 pub struct ExportOnnxArgs {
-    /// Model file, or the name of a bundled model: edge-64, or in a checkout any in assets/weights
+    /// Model file, or the name of a bundled model: edge-64, street-128 or shapes-rotational-64
     #[arg(value_name = "MODEL")]
     model: PathBuf,
 
@@ -75,9 +75,9 @@ pub struct ExportOnnxArgs {
 
 pub fn run(args: &ExportOnnxArgs) -> anyhow::Result<Outcome> {
     args.overwrite.check([&*args.out])?;
-    let path = find(&args.model);
-    let (card, net) = read(&path)?;
-    let n_points = args.critical_points.then(|| kept_points(args, &path, &card)).transpose()?;
+    let path = &args.model;
+    let (card, net) = model_file::read(path)?;
+    let n_points = args.critical_points.then(|| kept_points(args, path, &card)).transpose()?;
     let here = || format!("{} cannot be exported", path.display());
     let model = export(&net, &card, n_points).with_context(here)?;
     let size = model.encoded_len();
@@ -92,26 +92,6 @@ pub fn run(args: &ExportOnnxArgs) -> anyhow::Result<Outcome> {
     let (from, to) = (names(&graph.input), names(&graph.output));
     eprintln!("{}: {from} -> {to}, opset {OPSET}, {size} bytes", args.out.display());
     Ok(Outcome::Success)
-}
-
-/// The file `model` if it exists; otherwise the checkout's bundled model of this name.
-fn find(model: &Path) -> PathBuf {
-    let bundled = |root: PathBuf| {
-        let file = root.join("assets/weights").join(model).with_extension("safetensors");
-        file.is_file().then_some(file)
-    };
-    let found = if model.exists() { None } else { checkout::root().and_then(bundled) };
-    found.unwrap_or_else(|| model.to_path_buf())
-}
-
-const BUILTIN: &str = "edge-64";
-
-/// Reads the model file, or the model that is built into this program.
-fn read(path: &Path) -> Result<(ModelCard, Net), FormatError> {
-    if path == Path::new(BUILTIN) && !path.exists() {
-        return model_file::read_bytes(path, edgepuck_assets::EDGE_64.into());
-    }
-    model_file::read(path)
 }
 
 fn kept_points(args: &ExportOnnxArgs, path: &Path, card: &ModelCard) -> anyhow::Result<usize> {

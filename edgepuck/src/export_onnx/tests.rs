@@ -7,11 +7,15 @@ fn root() -> &'static Path {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
 }
 
+fn bundled(name: &str) -> PathBuf {
+    root().join("assets/weights").join(name).with_extension("safetensors")
+}
+
 /// Bundled models, and narrow ones: `tiny` with batch norms and T-Nets.
 fn models() -> Vec<PathBuf> {
-    let bundled = ["untrained-test", "pointnet-64", "pointnet-1024", "edge-64", "cpl-64"];
+    let wide = ["untrained-test", "pointnet-64", "pointnet-1024", "edge-64", "cpl-64"];
     let narrow = root().join("infer-cpu/tests/golden");
-    let mut models = bundled.map(|name| find(Path::new(name))).to_vec();
+    let mut models = wide.map(bundled).to_vec();
     models.extend(["tiny", "plain"].map(|name| narrow.join(name).with_extension("safetensors")));
     models
 }
@@ -62,7 +66,7 @@ fn every_value_is_made_once_before_it_is_used_and_every_constant_is_used() {
 
 #[test]
 fn weights_bear_pytorch_s_names_and_shapes_and_hold_the_norms() {
-    let graph = graph_of(&find(Path::new("pointnet-1024")), None);
+    let graph = graph_of(&bundled("pointnet-1024"), None);
     for (name, shape) in [
         ("feat.conv1.weight", &[64, 3, 1][..]),
         ("feat.stn.conv3.weight", &[1024, 128, 1]),
@@ -82,7 +86,7 @@ fn weights_bear_pytorch_s_names_and_shapes_and_hold_the_norms() {
 #[test]
 fn inputs_and_outputs_are_what_the_network_looks_at() {
     let names = |name: &str, n_points| {
-        let graph = graph_of(&find(Path::new(name)), n_points);
+        let graph = graph_of(&bundled(name), n_points);
         let names = |values: Vec<proto::ValueInfoProto>| {
             values.into_iter().map(|value| value.name).collect::<Vec<_>>().join(" ")
         };
@@ -96,7 +100,7 @@ fn inputs_and_outputs_are_what_the_network_looks_at() {
 
 #[test]
 fn the_file_states_its_opset_and_the_model_s_card() {
-    let model = exported(&find(Path::new("cpl-64")), Some(64));
+    let model = exported(&bundled("cpl-64"), Some(64));
     let read = ModelProto::decode(&model.encode_to_vec()[..]).unwrap();
     assert_eq!(read, model);
     assert_eq!((read.ir_version, read.opset_import[0].version), (8, 18));
@@ -109,7 +113,7 @@ fn the_file_states_its_opset_and_the_model_s_card() {
 
 #[test]
 fn what_onnx_cannot_choose_by_is_refused() {
-    let (card, mut net) = model_file::read(&find(Path::new("pointnet-1024"))).unwrap();
+    let (card, mut net) = model_file::read(&bundled("pointnet-1024")).unwrap();
     let refused = |net: &Net| export(net, &card, Some(16)).unwrap_err().to_string();
     (net.front, net.stn) = (None, None);
     assert!(refused(&net).contains("neither a front end"), "{}", refused(&net));
@@ -117,9 +121,8 @@ fn what_onnx_cannot_choose_by_is_refused() {
 
 #[test]
 fn the_default_model_is_exported_without_a_file() {
-    let (card, built_in) = read(Path::new(BUILTIN)).unwrap();
-    let (_, from_file) =
-        model_file::read(&root().join("assets/weights/edge-64.safetensors")).unwrap();
+    let (card, built_in) = model_file::read(Path::new("edge-64")).unwrap();
+    let (_, from_file) = model_file::read(&bundled("edge-64")).unwrap();
     let export = |net| export(net, &card, None).unwrap().encode_to_vec();
     assert!(export(&built_in) == export(&from_file));
 }

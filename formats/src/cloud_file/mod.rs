@@ -58,6 +58,36 @@ pub fn read_cloud(path: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
     read_cloud_as(path, None)
 }
 
+/// Whether the NPZ or PLY file at `path` holds a sensor's measurements beside the positions: ranges,
+/// or the numbers of beams or rings.
+#[must_use]
+pub fn is_scan(path: &Path) -> bool {
+    const KEYS: [&str; 3] = ["range", "beam", "ring"];
+    match CloudFormat::of_path(path) {
+        #[cfg(feature = "npz")]
+        Ok(CloudFormat::Npz) => crate::archive::NpzReader::open(path)
+            .is_ok_and(|npz| KEYS.iter().any(|key| npz.has(key))),
+        #[cfg(feature = "ply")]
+        Ok(CloudFormat::Ply) => File::open(path).is_ok_and(|file| {
+            let mut found = false;
+            // The error ends the reading after the header.
+            let choose = |_: usize, vertex: &crate::ply::Element| {
+                found = KEYS.iter().any(|key| vertex.has(key));
+                Err(String::new())
+            };
+            let _ = crate::ply::read_elements(
+                &mut BufReader::new(file),
+                path,
+                &["vertex"],
+                choose,
+                |_, _| {},
+            );
+            found
+        }),
+        _ => false,
+    }
+}
+
 /// As [`read_cloud`], in `format` if it is given.
 ///
 /// # Errors

@@ -6,14 +6,16 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use crate::kernel::KernelName;
+use crate::network::read_card;
 use crate::sampler::{SamplerKind, SamplerSpec};
 use crate::{Classifier, Options, Precision, UpAxis};
 use anyhow::Context;
 use formats::FormatError;
 use formats::cloud_file::{CloudFormat, read_cloud_as};
 use formats::model_card::{ModelCard, Normalization};
-use formats::outcome::joined_causes;
+use formats::outcome::{joined_causes, say};
 
+use super::default_model::{Kind, Kinds, SCANS};
 use super::input;
 use super::model::ModelArgs;
 use super::names;
@@ -30,6 +32,10 @@ Examples:
   infer-cpu classify --json --drop-invalid scan.pcd
   producer | infer-cpu classify --format ply -
   find scans -name '*.npz' | infer-cpu classify --json --files-from -
+
+Where no model is named, edge-64 classifies; but scans of gen-dataset, which show an
+object from one side, are for shapes-rotational-64 if it knows all classes of the
+data set, and the first other scan has a warning.
 
 One line is printed for each file: its name, the class and the confidence,
 separated by tabs. The class is `unknown` for an object that belongs to no known
@@ -120,10 +126,11 @@ pub struct ClassifyArgs {
 pub fn run(args: &ClassifyArgs) -> anyhow::Result<Outcome> {
     input::check_names(args.files.iter().map(PathBuf::as_path))?;
     let (model, card) = args.model.open()?;
-    let options = args.options(&model, &card)?;
-    let classifier = Classifier::load(&model, &options).map_err(of_setup)?;
+    let classifier = args.load(&model, &card)?;
+    let kinds = (!args.model.is_named()).then(Kinds::new).transpose()?;
     let style = if args.json { Style::Json } else { Style::Text };
-    let mut session = Session { classifier, precision: args.precision, style, failed: false };
+    let mut session =
+        Session { args, classifier, kinds, scans: None, told: Vec::new(), style, failed: false };
     match &args.files_from {
         Some(list) => {
             for_each_name(list, |name| session.answer(name, read_cloud_as(name, args.format)))?
@@ -137,18 +144,18 @@ pub fn run(args: &ClassifyArgs) -> anyhow::Result<Outcome> {
     Ok(if session.failed { Outcome::SomeFailed } else { Outcome::Success })
 }
 
-fn for_each_name(list: &Path, take: impl FnMut(&Path) -> io::Result<()>) -> anyhow::Result<()> {
+fn for_each_name(list: &Path, take: impl FnMut(&Path) -> anyhow::Result<()>) -> anyhow::Result<()> {
     if list.as_os_str() == "-" {
-        return Ok(names::for_each(stdin().lock(), take)?);
+        return names::for_each(stdin().lock(), take);
     }
     let file = File::open(list).with_context(|| list.display().to_string())?;
     names::for_each(BufReader::new(file), take).with_context(|| list.display().to_string())
 }
 
 impl ClassifyArgs {
-    fn options(&self, model: &Path, card: &ModelCard) -> anyhow::Result<Options> {
+    fn load(&self, model: &Path, card: &ModelCard) -> anyhow::Result<Classifier> {
         let trained = SamplerSpec::as_trained(model, card)?;
-        Ok(Options {
+        let options = Options {
             precision: self.precision,
             kernel: self.kernel,
             threads: n_threads(self.threads),
@@ -160,35 +167,76 @@ impl ClassifyArgs {
             vote_rotations: self.vote_rotations,
             up: self.up,
             ..Options::default()
-        })
+        };
+        Classifier::load(model, &options).map_err(of_setup)
     }
 }
 
 /// A loaded classifier, and whether a cloud has failed.
-struct Session {
+struct Session<'a> {
+    args: &'a ClassifyArgs,
     classifier: Classifier,
-    precision: Precision,
+    /// If the user named no model, the kinds of clouds, and the classifier of scans once there is
+    /// one.
+    kinds: Option<Kinds>,
+    scans: Option<Classifier>,
+    /// The kinds that the user was told of.
+    told: Vec<Kind>,
     style: Style,
     failed: bool,
 }
 
-impl Session {
+impl Session<'_> {
     /// Classifies the cloud `name`, if it could be `read`, and prints the result.
-    fn answer(&mut self, name: &Path, read: Result<Vec<[f64; 3]>, FormatError>) -> io::Result<()> {
+    fn answer(
+        &mut self,
+        name: &Path,
+        read: Result<Vec<[f64; 3]>, FormatError>,
+    ) -> anyhow::Result<()> {
         let points = match read {
             Ok(points) => points,
-            Err(error) => return self.fail(name, error.into()),
+            Err(error) => return Ok(self.fail(name, error.into())?),
+        };
+        let kind = self.kinds.as_mut().map_or(Kind::Other, |kinds| kinds.of(name));
+        self.tell(name, kind);
+        let classifier = match (kind, &mut self.scans) {
+            (Kind::KnownScan, Some(scans)) => scans,
+            (Kind::KnownScan, scans) => {
+                let model = Path::new(SCANS);
+                scans.insert(self.args.load(model, &read_card(model)?)?)
+            }
+            _ => &mut self.classifier,
         };
         let start = Instant::now();
-        match self.classifier.classify_f64(&points) {
+        match classifier.classify_f64(&points) {
             Ok(prediction) => {
-                self.style.classified(name, prediction, self.precision, start.elapsed())
+                self.style.classified(name, prediction, self.args.precision, start.elapsed())?;
             }
             Err(error) => {
                 let error = anyhow::Error::from(error).context(name.display().to_string());
-                self.fail(name, error)
+                self.fail(name, error)?;
             }
         }
+        Ok(())
+    }
+
+    /// Tells the user once that a cloud is not what the default model has learnt.
+    fn tell(&mut self, name: &Path, kind: Kind) {
+        if kind == Kind::Other || self.told.contains(&kind) {
+            return;
+        }
+        self.told.push(kind);
+        let name = name.display();
+        say(match kind {
+            Kind::KnownScan => format!(
+                "note: {name} is a scan of one side: {SCANS}, which learnt such scans of the same \
+                 classes, names it; --model chooses another"
+            ),
+            _ => format!(
+                "warning: {name} is a scan of one side, and edge-64 learnt whole objects: its answer \
+                 is often wrong; --model names a network that `edgepuck train` made of such scans"
+            ),
+        });
     }
 
     fn fail(&mut self, name: &Path, error: anyhow::Error) -> io::Result<()> {

@@ -22,7 +22,7 @@ Every tensor is read and checked. A MAC is one multiplication and one addition.
 The MACs of a point are needed for each point that the network sees. The bytes
 include weights, biases and scales, with batch norms folded in.")]
 pub struct InspectArgs {
-    /// Model file [default: $EDGEPUCK_MODEL, else the bundled weights]
+    /// Model file, or the name of a bundled model [default: $EDGEPUCK_MODEL, else edge-64]
     model: Option<PathBuf>,
 
     /// Print one JSON object
@@ -31,7 +31,7 @@ pub struct InspectArgs {
 }
 
 pub fn run(args: &InspectArgs) -> anyhow::Result<Outcome> {
-    let path = model::find(args.model.as_deref())?;
+    let path = model::find(args.model.as_deref());
     let summary = crate::inspect(&path)?;
     let sampler = SamplerSpec::as_trained(&path, &summary.card)?;
     let text = match args.json {

@@ -2,6 +2,7 @@
 
 mod bench;
 mod classify;
+mod default_model;
 mod input;
 mod inspect;
 #[cfg(feature = "mcap")]
@@ -43,7 +44,7 @@ pub fn run(command: &Command) -> anyhow::Result<Outcome> {
         #[cfg(feature = "mcap")]
         Command::Live(args) => live::run(args),
         Command::Bench(args) => {
-            bench::run(args, &model::find(args.model.as_deref())?).map(|()| Outcome::Success)
+            bench::run(args, &model::find(args.model.as_deref())).map(|()| Outcome::Success)
         }
     }
 }

@@ -362,7 +362,9 @@ impl Pipeline {
                 last_s: cluster.last_s,
                 latency_ms: latency.map(|latency| latency.as_secs_f64() * 1e3),
             });
-            latency.into_iter().for_each(|latency| self.stats.answered_after(latency));
+            latency
+                .into_iter()
+                .for_each(|latency| self.stats.answered_after(latency, cluster.turn));
         }
         self.waiting.points.clear();
         self.waiting.clusters.clear();

@@ -22,6 +22,8 @@ pub struct Stats {
     turn: [Duration; Stage::ALL.len()],
     stages: [Histogram<u64>; Stage::ALL.len()],
     latency: Histogram<u64>,
+    /// The longest time of the first turn, whose ground is known at its end.
+    first_turn: Option<Duration>,
 }
 
 /// The longest duration in a histogram, microseconds.
@@ -35,6 +37,7 @@ impl Stats {
             turn: [Duration::ZERO; Stage::ALL.len()],
             stages: Stage::ALL.map(|_| histogram()),
             latency: histogram(),
+            first_turn: None,
         }
     }
 
@@ -49,8 +52,11 @@ impl Stats {
         }
     }
 
-    pub(super) fn answered_after(&mut self, latency: Duration) {
-        self.latency.saturating_record(latency.as_micros() as u64);
+    pub(super) fn answered_after(&mut self, latency: Duration, turn: u64) {
+        match turn {
+            0 => self.first_turn = self.first_turn.max(Some(latency)),
+            _ => self.latency.saturating_record(latency.as_micros() as u64),
+        }
     }
 
     /// The number of measured turns.
@@ -71,8 +77,16 @@ impl Stats {
         self.stages[stage as usize].mean() / 1e3
     }
 
-    /// The quantile `share` (0 to 1) of the times from a cluster's last packet to its result,
-    /// milliseconds; `None` if packets did not arrive in real time.
+    /// The longest time from a cluster's last packet to its result in the first turn, milliseconds;
+    /// `None` if packets did not arrive in real time. The clusters of that turn wait for its end,
+    /// because the ground is that of the turn before.
+    #[must_use]
+    pub fn first_turn_ms(&self) -> Option<f64> {
+        self.first_turn.map(|latency| latency.as_secs_f64() * 1e3)
+    }
+
+    /// The quantile `share` (0 to 1) of the times from a cluster's last packet to its result in all
+    /// later turns, milliseconds; `None` if packets did not arrive in real time.
     #[must_use]
     pub fn latency_ms(&self, share: f64) -> Option<f64> {
         (!self.latency.is_empty()).then(|| self.latency.value_at_quantile(share) as f64 / 1e3)

@@ -6,10 +6,12 @@ use std::process::{Child, Command, Stdio};
 use std::thread;
 use std::time::Duration;
 
+use formats::model_card::{ModelCard, Normalization};
 use serde_json::Value;
 
-use crate::program::Folder;
+use crate::program::{Folder, card};
 use crate::street::{PACKET_S, PACKETS_PER_S, Thing, capture, capture_of, packets, street};
+use crate::tiny_model;
 
 pub const LIVE: &str = "live --model m.safetensors --threads 1";
 
@@ -34,9 +36,17 @@ const KEYS: [&str; 17] = [
     "latency_ms",
 ];
 
-/// A folder with a capture `drive.pcap` of one second from Unix time 1000 s on.
-pub fn folder() -> Folder {
+/// A folder with a model of clusters.
+pub fn model_folder() -> Folder {
     let folder = Folder::new();
+    let card = ModelCard { normalization: Normalization::Metric, ..card() };
+    tiny_model::write(&folder.path("m.safetensors"), &tiny_model::tensors(4), &card);
+    folder
+}
+
+/// The same, with a capture `drive.pcap` of one second from Unix time 1000 s on.
+pub fn folder() -> Folder {
+    let folder = model_folder();
     let sent = packets(&street(), 7, PACKETS_PER_S);
     let time_us = |i: usize| 1_000_000_000 + (i as f64 * PACKET_S * 1e6) as u64;
     let timed = sent.iter().enumerate().map(|(i, packet)| (time_us(i), &packet[..]));
@@ -187,8 +197,27 @@ fn the_stamps_of_a_sensor_rule_over_the_times_of_a_capture() {
 }
 
 #[test]
+fn a_model_of_whole_objects_is_told_of_and_a_bundled_model_is_taken_by_its_name() {
+    let folder = folder();
+    let cars = |line: &str| {
+        let ran = folder.run(&format!("live --pcap drive.pcap --threads 1 {line}"));
+        let n_cars = ran.json().iter().filter(|object| object["class"] == "car").count();
+        (ran.err, n_cars)
+    };
+    // Two of the three things are cars, for ten turns.
+    let (err, n_cars) = cars("");
+    assert_eq!((err.as_str(), n_cars >= 10), ("", true), "{n_cars}");
+    assert_eq!(cars("--model street-128"), (err, n_cars));
+    for model in ["edge-64", "shapes-rotational-64"] {
+        let (err, _) = cars(&format!("--model {model}"));
+        let start = format!("warning: {model}: expected a model of clusters in metres");
+        assert!(err.starts_with(&start) && err.lines().count() == 1, "{err}");
+    }
+}
+
+#[test]
 fn a_sensor_that_is_silent_is_told_of() {
-    let folder = Folder::new();
+    let folder = model_folder();
     let port = free_port();
     let mut child = listen(&folder, port, "");
     let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
@@ -225,7 +254,7 @@ pub fn terminate(child: &mut Child) -> (Option<i32>, String) {
 
 #[test]
 fn packets_over_the_network_are_answered_as_they_come_and_sigterm_ends_with_the_last_answers() {
-    let folder = Folder::new();
+    let folder = model_folder();
     let port = free_port();
     let mut child = listen(&folder, port, "--json --stats");
     let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
@@ -252,7 +281,7 @@ fn packets_over_the_network_are_answered_as_they_come_and_sigterm_ends_with_the_
 
 #[test]
 fn packets_from_other_addresses_are_not_looked_at() {
-    let folder = Folder::new();
+    let folder = model_folder();
     let port = free_port();
     let mut child = listen(&folder, port, "--from 127.0.0.9 --stats");
     let socket = UdpSocket::bind("127.0.0.1:0").unwrap();

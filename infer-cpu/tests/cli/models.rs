@@ -16,15 +16,72 @@ fn the_bundled_model_is_untrained_and_must_be_allowed() {
     fs::create_dir_all(folder.path("assets/weights")).unwrap();
     let name = "untrained-test.safetensors";
     fs::copy(assets.join(name), folder.path("assets/weights").join(name)).unwrap();
-    // Another folder may have a trained model, so this one is named.
     let named = format!("--model assets/weights/{name}");
     let ran = folder.run(&format!("classify {named} c.xyz"));
     ran.assert_refused(2, &format!("error: assets/weights/{name} is untrained: its weights"));
     assert!(ran.err.contains("--allow-untrained"));
     let ran = folder.run(&format!("classify {named} --allow-untrained c.xyz"));
     assert_eq!((ran.code, ran.err.as_str()), (0, ""));
-    let ran = folder.run("classify --allow-untrained c.xyz");
-    assert_eq!((ran.code, ran.err.as_str()), (0, ""));
+}
+
+/// The program is not in a checkout, as far as it knows.
+#[test]
+fn bundled_models_are_known_by_name_in_any_folder() {
+    let folder = Folder::with_cloud(20);
+    let (default, named) = (folder.run("classify c.xyz"), "classify --model edge-64 c.xyz");
+    assert_eq!((default.code, default.err.as_str()), (0, ""));
+    assert_eq!(folder.run(named).out, default.out);
+    let weights = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/weights");
+    for model in ["edge-64", "street-128", "shapes-rotational-64"] {
+        let file = weights.join(model).with_extension("safetensors");
+        fs::copy(file, folder.path("x.safetensors")).unwrap();
+        let line = |model: &str| format!("classify --model {model} --json --precision i8 c.xyz");
+        let logits = |model: &str| folder.run(&line(model)).json()[0]["logits"].clone();
+        assert_eq!(logits(model), logits("x.safetensors"));
+        assert_eq!(folder.run(&format!("inspect {model}")).code, 0);
+    }
+    let names = "expected a model file, or one of edge-64, street-128, shapes-rotational-64";
+    let refused = folder.run("classify --model edge-65 c.xyz");
+    refused.assert_refused(1, &format!("error: edge-65: name: {names}"));
+}
+
+/// A data set of gen-dataset, by its manifest, and a scan without one, by its rings.
+#[test]
+fn without_a_name_scans_go_to_the_model_of_scans_that_knows_their_classes() {
+    let folder = Folder::with_cloud(40);
+    let vertex = |[x, y, z]: [f64; 3]| format!("{x} {y} {z} 1\n");
+    let vertices: String = strip(40).into_iter().map(vertex).collect();
+    let header = "ply\nformat ascii 1.0\nelement vertex 40\nproperty float x\nproperty float y\n\
+                  property float z\nproperty ushort ring\nend_header\n";
+    folder.write("scan.ply", format!("{header}{vertices}"));
+    let place = |set: &str| format!("{set}/rotational/noisy/chair/test/c.xyz");
+    for (set, class) in [("known", "bowl"), ("other", "sofa")] {
+        fs::create_dir_all(folder.path(&place(set)).parent().unwrap()).unwrap();
+        fs::copy(folder.path("c.xyz"), folder.path(&place(set))).unwrap();
+        let meshes = format!(r#"[{{"class": "chair", "up": "z"}}, {{"class": "{class}"}}]"#);
+        let manifest = format!(r#"{{"tool": "edgepuck", "meshes": {meshes}}}"#);
+        folder.write(&format!("{set}/manifest.json"), manifest);
+    }
+    let logits = |line: &str| {
+        let ran = folder.run(&format!("classify --json {line}"));
+        let logits = ran.json().iter().map(|answer| answer["logits"].clone()).collect::<Vec<_>>();
+        (logits, ran.err)
+    };
+    let (known, other) = (place("known"), place("other"));
+    let (of_scans, _) = logits(&format!("--model shapes-rotational-64 {known}"));
+    let (of_objects, err) = logits(&format!("--model edge-64 {other} scan.ply"));
+    assert_eq!(err, "");
+    let note = format!("note: {known} is a scan of one side: shapes-rotational-64");
+    let warning = format!("warning: {other} is a scan of one side, and edge-64 learnt whole");
+    let (found, err) = logits(&format!("{known} {known}"));
+    assert_eq!(found, [of_scans.clone(), of_scans.clone()].concat());
+    assert!(err.starts_with(&note) && err.lines().count() == 1, "{err}");
+    let (found, err) = logits(&format!("{other} scan.ply c.xyz"));
+    assert_eq!(found[..2], of_objects);
+    assert!(err.starts_with(&warning) && err.lines().count() == 1, "{err}");
+    let (_, err) = logits("scan.ply");
+    assert!(err.starts_with("warning: scan.ply is a scan of one side"), "{err}");
+    assert_eq!(logits("c.xyz").1, "");
 }
 
 #[test]

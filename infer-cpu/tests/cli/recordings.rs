@@ -11,7 +11,7 @@ use std::time::Duration;
 use mcap::MessageStream;
 use mcap::read::Options;
 
-use crate::live::{LIVE, folder, free_port, listen, terminate};
+use crate::live::{LIVE, folder, free_port, listen, model_folder, terminate};
 use crate::program::Folder;
 use crate::street::{PACKET_S, packets, street};
 
@@ -95,7 +95,7 @@ fn recorded(folder: &Folder) -> Child {
 
 #[test]
 fn what_was_recorded_before_the_program_is_killed_can_be_read() {
-    let folder = Folder::new();
+    let folder = model_folder();
     let mut child = recorded(&folder);
     child.kill().unwrap();
     child.wait().unwrap();
@@ -104,7 +104,7 @@ fn what_was_recorded_before_the_program_is_killed_can_be_read() {
 
 #[test]
 fn sigterm_ends_a_recording_with_what_has_come() {
-    let folder = Folder::new();
+    let folder = model_folder();
     let mut child = recorded(&folder);
     let (code, err) = terminate(&mut child);
     assert_eq!((code, err.lines().count()), (Some(0), 1), "{err}");

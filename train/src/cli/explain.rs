@@ -4,8 +4,9 @@ use crate::explanation_drawing;
 use crate::lime::{Explanation, Lime, explain};
 use crate::random_baseline::RandomBaseline;
 use formats::atomic;
+use infer_cpu::model_file::read_card;
 use infer_cpu::sampler::{Resize, SamplerKind, SamplerSpec};
-use infer_cpu::{Classifier, ModelCard, Normalization, Options};
+use infer_cpu::{Classifier, Normalization, Options};
 
 use super::compare_points::read_finite;
 use super::{Usage, print};
@@ -56,7 +57,7 @@ pub fn run(args: &ExplainArgs) -> anyhow::Result<()> {
         Classifier::load(&args.model, &Options { sampler, normalization, ..Options::default() })
     };
     let mut points = Vec::new();
-    let normalization = match ModelCard::read(&args.model)?.normalization {
+    let normalization = match read_card(&args.model)?.normalization {
         // Clouds of any size are drawn in the same frame.
         Normalization::None => Normalization::UnitSphere,
         other => other,

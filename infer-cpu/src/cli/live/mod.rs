@@ -24,8 +24,8 @@ use notify::Notifier;
 use outputs::Outputs;
 use source::{Sensor, Source, Tick};
 
-/// The bundled weights for objects of streets.
-const MODELS: [&str; 1] = ["street-128.safetensors"];
+/// The bundled model for clusters of streets.
+const MODEL: &str = "street-128";
 
 /// A sensor that is silent for this long is told of: its turns take at most 0.2 s.
 const SILENCE: Duration = Duration::from_secs(5);
@@ -213,10 +213,13 @@ pub fn run(args: &LiveArgs) -> anyhow::Result<Outcome> {
 
 impl LiveArgs {
     fn pipeline(&self, live: &LiveOptions) -> anyhow::Result<Pipeline> {
-        let (model, _) = self.model.open_or(&MODELS)?;
+        let (model, _) = self.model.open_or(MODEL)?;
         let threads = n_threads(self.threads);
         let options = Options { precision: self.precision, threads, ..Options::default() };
         let classifier = Classifier::load(&model, &options).map_err(of_setup)?;
+        if let Some(warning) = classifier.unsuited_to_clusters() {
+            eprintln!("warning: {}: {warning}", model.display());
+        }
         Ok(Pipeline::new(classifier, live)?)
     }
 

@@ -19,6 +19,12 @@ pub fn print(pipeline: &Pipeline, read: &Read) {
     {
         eprintln!("{:<22} {:>8} {p50:>8.3} {p90:>8.3} {p99:>8.3}", "latency, ms", "");
     }
+    if let Some(most) = stats.first_turn_ms() {
+        eprintln!(
+            "latency of the first turn, whose objects wait for its end, left out above: {most:.3} ms \
+             at most"
+        );
+    }
     let n_turns = stats.n_turns().max(1) as f64;
     eprintln!(
         "{} turns of {:.0} points and {:.1} clusters on average",

@@ -30,7 +30,7 @@ use sim_gpu::internals::bvh::Builder;
 use sim_gpu::internals::caster::OpenCaster;
 use sim_gpu::internals::gpu::{AdapterKind, list_adapters};
 use sim_gpu::internals::mesh::TriangleMesh;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 use xtask::workspace::root;
 
@@ -138,7 +138,7 @@ fn meshes(args: &GpuArgs, size: &Size) -> Result<Vec<BenchMesh>> {
 /// Ranges, points and classes of scans, on every adapter and on the CPU:
 /// `shaders/{trace,traverse,intersect}.wgsl`.
 fn scans(args: &GpuArgs, meshes: &[BenchMesh], size: &Size, backends: &[Backend]) -> Result<Found> {
-    let mut classifier = Classifier::from_bytes(edgepuck_assets::EDGE_64, &Options::default())?;
+    let mut classifier = Classifier::load(Path::new("edge-64"), &Options::default())?;
     let others = &backends[1..];
     let all = devices::compare(meshes, size.views, (&backends[0], others), &mut classifier)?;
     atomic::write_bytes(&args.out.join("devices.csv"), devices::csv(&all)?)?;
