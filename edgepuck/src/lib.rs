@@ -23,7 +23,7 @@ pub mod gen_shapes;
 mod import_weights;
 mod merge_dataset;
 mod overwrite;
-mod points;
+pub mod points;
 mod preview;
 mod preview_scan;
 mod profile;

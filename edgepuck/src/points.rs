@@ -14,15 +14,15 @@ pub struct PointsArgs {
     /// Format of the points: ply, npz, npy, pcd, xyz, csv, kitti, nuscenes, las [default: by the
     /// extension, or a capture by its first bytes]
     #[arg(long)]
-    format: Option<CloudFormat>,
+    pub format: Option<CloudFormat>,
 
     /// Metadata (JSON) of the Ouster OS0, OS1 or OS2 whose packets are in the capture
     #[arg(long, value_name = "FILE")]
-    metadata: Option<PathBuf>,
+    pub metadata: Option<PathBuf>,
 
     /// Address of the sensor whose packets are used [default: the first sensor of the capture]
     #[arg(long, value_name = "ADDRESS")]
-    from: Option<IpAddr>,
+    pub from: Option<IpAddr>,
 }
 
 /// How a sweep is read.
@@ -46,6 +46,7 @@ pub struct SweepArgs {
     #[arg(value_name = "SWEEP")]
     pub sweep: PathBuf,
 
+    /// How it is read.
     #[command(flatten)]
     pub place: PlaceArgs,
 }
@@ -103,6 +104,7 @@ impl SweepArgs {
         Ok(scan)
     }
 
+    /// The position of the sensor, metres.
     pub fn sensor_m(&self) -> [f64; 3] {
         let given = self.place.sensor.as_deref().and_then(|xyz| <[f64; 3]>::try_from(xyz).ok());
         given.unwrap_or_default()

@@ -314,6 +314,32 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
+    fn no_capture_makes_the_reader_panic(
+        link in prop::sample::select(vec![0u16, 1, 101, 113, 276]), is_classic in any::<bool>(),
+        frames in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..80), 0..4),
+        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..6),
+    ) {
+        let udp = [8, 0, 0x45, 0, 0, 30, 0, 1, 0x20, 0, 64, 17, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 9, 9];
+        let frames: Vec<_> =
+            frames.iter().map(|rest| [&[0; 12], &udp[..], &rest[..]].concat()).collect();
+        let mut capture = match is_classic {
+            true => classic(link.into(), &frames, 60),
+            false => pcapng_of(link, &[9, 0, 1, 0, 0x9e, 0, 0, 0], &frames),
+        };
+        for (at, value) in changes {
+            let at = at.index(capture.len());
+            capture[at] = value;
+        }
+        let mut n = 0;
+        let counts = pcap::read_from(&capture[..], Path::new("-"), |packet| {
+            n += 1;
+            assert!(packet.time_s.is_none_or(f64::is_finite));
+            ControlFlow::Continue(())
+        });
+        prop_assert!(counts.is_err() || counts.is_ok_and(|counts| counts.packets == n));
+    }
+
+    #[test]
     fn no_payload_makes_the_decoder_panic(
         bytes in prop::collection::vec(any::<u8>(), 1206), flags in any::<bool>(), model in 0usize..2,
     ) {

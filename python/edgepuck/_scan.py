@@ -91,6 +91,29 @@ class Scan:
         from_sensor = self.positions + (self.origin - self.pose[:3, 3])
         return np.ascontiguousarray(from_sensor @ self.pose[:3, :3], dtype=np.float32)
 
+    @staticmethod
+    def read(
+        path: str | os.PathLike[str],
+        *,
+        format: str | None = None,
+        metadata: str | os.PathLike[str] | None = None,
+        sender: str | None = None,
+    ) -> Scan:
+        """Read the points in a file like `edgepuck preview`: a scan, a cloud, or the first turn of a
+        capture.
+
+        Args:
+            path: The file.
+            format: The format, if the name of the file does not tell it, such as `nuscenes`.
+            metadata: The metadata of the Ouster whose packets are in the capture.
+            sender: The address of the sensor in the capture, by default that of the first sensor.
+
+        Raises:
+            Error: The file cannot be read.
+        """
+        described = None if metadata is None else os.fspath(metadata)
+        return scan_of(_edgepuck.read_points(os.fspath(path), format, described, sender))
+
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a file with the extension .npz, .ply or .csv, like `edgepuck scan`.
 

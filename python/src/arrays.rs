@@ -1,6 +1,7 @@
 //! Rust's lists as NumPy arrays, without a copy, and arrays as lists.
 
 use crate::error::raised;
+use edgepuck_program::points::PointsArgs;
 use formats::Scan;
 use formats::hash::Hashing;
 use formats::scan::{Attribute, ColumnSlot};
@@ -51,6 +52,23 @@ pub fn scan(py: Python<'_>, mut scan: Scan) -> PyResult<Bound<'_, PyDict>> {
         }
     }
     Ok(columns)
+}
+
+/// The columns of the points in a file, which [`PointsArgs::read`] reads.
+#[pyfunction]
+pub fn read_points<'py>(
+    py: Python<'py>,
+    path: PathBuf,
+    format: Option<&str>,
+    metadata: Option<PathBuf>,
+    sender: Option<&str>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let format = format.map(str::parse).transpose().map_err(raised)?;
+    let from = sender.map(str::parse).transpose();
+    let from =
+        from.map_err(|_| raised(format!("sender: expected an address, found {sender:?}")))?;
+    let read = py.detach(|| PointsArgs { format, metadata, from }.read(&path));
+    scan(py, read.map_err(raised)?)
 }
 
 /// A scan of the `columns` of [`scan`].

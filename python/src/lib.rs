@@ -20,7 +20,7 @@ mod sensor;
 #[pyo3::pymodule]
 mod _edgepuck {
     #[pymodule_export]
-    use super::arrays::save_scan;
+    use super::arrays::{read_points, save_scan};
     #[pymodule_export]
     use super::classifier::Classifier;
     #[pymodule_export]

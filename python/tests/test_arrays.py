@@ -214,11 +214,31 @@ def test_a_scan_is_saved_as_its_extension_says(cube: tuple, tmp_path: Path) -> N
     saved = np.load(tmp_path / "a.npz")
     np.testing.assert_array_equal(saved["positions"], scan.positions)
     np.testing.assert_array_equal(saved["ring"].ravel(), scan.ring)
+    read = ep.Scan.read(tmp_path / "a.npz")
+    np.testing.assert_array_equal(read.positions, scan.positions)
+    np.testing.assert_array_equal(read.ring, scan.ring)
     assert f"element vertex {len(scan)}" in (tmp_path / "a.ply").read_bytes()[:400].decode("latin-1")
     lines = (tmp_path / "a.csv").read_text().splitlines()
     assert len(lines) == len(scan) + 1 and lines[0].startswith("x,y,z")
     first = np.array(lines[1].split(",")[:3], dtype=np.float32)
     np.testing.assert_array_equal(first, scan.positions[0])
+
+
+def test_points_are_read_in_the_format_that_their_name_or_the_caller_tells(tmp_path: Path) -> None:
+    points = np.random.default_rng(0).normal(size=(50, 5)).astype(np.float32)
+    points[:, 4] = np.arange(50) % 32
+    points.tofile(tmp_path / "a.bin")
+    with pytest.raises(ep.Error, match="look like rings of nuScenes"):
+        ep.Scan.read(tmp_path / "a.bin")
+    read = ep.Scan.read(tmp_path / "a.bin", format="nuscenes")
+    np.testing.assert_array_equal(read.positions, points[:, :3])
+    np.testing.assert_array_equal(read.intensity, points[:, 3])
+    np.save(tmp_path / "a.npy", points)
+    np.testing.assert_array_equal(ep.Scan.read(tmp_path / "a.npy").positions, points[:, :3])
+    with pytest.raises(ep.Error, match="unknown cloud format `kity`"):
+        ep.Scan.read(tmp_path / "a.bin", format="kity")
+    with pytest.raises(ep.Error, match="sender: expected an address"):
+        ep.Scan.read(tmp_path / "a.bin", sender="me")
 
 
 def test_a_batch_has_the_answers_of_its_clouds(cube: tuple) -> None:

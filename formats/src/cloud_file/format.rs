@@ -55,6 +55,7 @@ impl CloudFormat {
             "las" => Ok(Self::Las),
             "laz" => refuse(COMPRESSED_LAS.to_owned()),
             "off" | "obj" | "stl" => refuse(MESH.to_owned()),
+            "pcap" | "pcapng" | "cap" => refuse(CAPTURE.to_owned()),
             _ => {
                 refuse(format!("unknown cloud format `{extension}`, expected one of {EXTENSIONS}"))
             }
@@ -87,6 +88,8 @@ impl CloudFormat {
 pub(super) const COMPRESSED_LAS: &str =
     "LAZ is compressed LAS: decompress it first (`laszip`, or `pdal translate in.laz out.las`)";
 const MESH: &str = "expected a cloud, found a mesh: scan it first";
+const CAPTURE: &str =
+    "expected a cloud, found a capture: `edgepuck segment` cuts its first turn into clouds";
 const UNKNOWN: &str = "the first bytes are of no known binary format; name the format";
 const EXTENSIONS: &str = "ply, npz, npy, pcd, xyz, txt, asc, tsv, pts, csv, bin, las";
 

@@ -19,8 +19,8 @@ const NUSCENES_COLUMNS: usize = 5;
 const COLUMN_SIZE: usize = size_of::<f32>();
 
 /// What to do where the format may not be KITTI's.
-pub(super) const REMEDY: &str =
-    "name the format by --format: kitti has four f32 for each point, nuscenes five";
+pub(super) const REMEDY: &str = "name the format by --format: kitti has four f32 for each point, nuscenes five; a file called \
+     NAME.f32x6.bin has six";
 
 pub(super) fn read(
     reader: &mut impl BufRead,
@@ -47,7 +47,8 @@ pub(super) fn read_intensities(
     Ok(Some(intensities))
 }
 
-/// Checks that a file whose name alone makes it KITTI's has no fifth column of rings.
+/// Checks that a file whose name alone makes it KITTI's has no fifth column of rings, and that its
+/// intensities are not coordinates.
 pub(super) fn check_columns(file: &mut File, path: &Path) -> Result<(), FormatError> {
     /// Bytes at the start of the file that are examined.
     const EXAMINED: u64 = 1 << 16;
@@ -59,12 +60,28 @@ pub(super) fn check_columns(file: &mut File, path: &Path) -> Result<(), FormatEr
         Ok(size)
     });
     let size = size.map_err(|source| FormatError::io(path, source))?;
-    let five = size % (NUSCENES_COLUMNS * COLUMN_SIZE) as u64 == 0 && has_rings(&start);
-    if !five || stated_columns(path).is_some() {
+    let seem = if size % (NUSCENES_COLUMNS * COLUMN_SIZE) as u64 == 0 && has_rings(&start) {
+        "the fifth numbers look like rings of nuScenes"
+    } else if has_negative_intensities(&start) {
+        "the fourth numbers are negative, as intensities are not"
+    } else {
         return Ok(());
+    };
+    match stated_columns(path) {
+        None if !is_velodyne_packets(&start) => {
+            Err(FormatError::malformed(path, "format", format!("{seem}: {REMEDY}")))
+        }
+        _ => Ok(()),
     }
-    let cause = format!("the fifth numbers look like rings of nuScenes: {REMEDY}");
-    Err(FormatError::malformed(path, "format", cause))
+}
+
+/// Whether a tenth of the fourth numbers, at least, is below 0: of coordinates around a sensor, half
+/// is.
+fn has_negative_intensities(start: &[u8]) -> bool {
+    let points = start.as_chunks::<{ KITTI_COLUMNS * COLUMN_SIZE }>().0;
+    let intensity = |point: &[u8]| NumberType::F32.decode(&point[12..], ByteOrder::Little);
+    let negative = points.iter().filter(|point| intensity(&point[..]) < 0.0).count();
+    negative > points.len() / 10
 }
 
 /// Whether each fifth number is a small whole number, as the rings of nuScenes are, and others are

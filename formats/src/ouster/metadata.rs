@@ -89,7 +89,9 @@ impl Metadata {
         let root: Value = serde_json::from_str(text)
             .map_err(|cause| FormatError::malformed(path, "metadata", cause))?;
         let fields = Fields { path, root: &root, is_nested: root.get("beam_intrinsics").is_some() };
-        let has_format = root.pointer(FORMAT[usize::from(fields.is_nested)]).is_some();
+        let has_format = root
+            .pointer(FORMAT[usize::from(fields.is_nested)])
+            .is_some_and(|format| !format.is_null());
         let format = |name: &str, range, default: &dyn Fn() -> Result<u16, FormatError>| {
             if has_format { fields.get(FORMAT, name, |v| whole(v, range)) } else { default() }
         };

@@ -37,7 +37,8 @@ fn what_only_its_name_makes_kittis_must_make_sense() {
         let read = read_cloud_as(&path, format).map(|points| points.len());
         read.map_err(|error| error.to_string().split_once("frame.bin: ").unwrap().1.to_owned())
     };
-    let remedy = "name the format by --format: kitti has four f32 for each point, nuscenes five";
+    let remedy = "name the format by --format: kitti has four f32 for each point, nuscenes five; \
+                  a file called NAME.f32x6.bin has six";
     let five: Vec<_> = (0..100u8)
         .map(|i| (0.37 * f32::from(i), f32::from(i % 32)))
         .map(|(x, ring)| [x, -x, 0.1 + x, 7.0, ring])
@@ -49,6 +50,9 @@ fn what_only_its_name_makes_kittis_must_make_sense() {
     assert_eq!(read(Some(CloudFormat::Nuscenes), &five), Ok(100));
     assert_eq!(read(Some(CloudFormat::Kitti), &five), Ok(125));
     assert_eq!(read(None, &four), Ok(100));
+    let three: Vec<_> = five.iter().map(|point| &point[..3]).collect();
+    let negative = "format: the fourth numbers are negative, as intensities are not";
+    assert_eq!(read(None, &three), Err(format!("{negative}: {remedy}")));
     let lost = [f32::NAN, f32::NAN, f32::NAN, 0.0];
     assert_eq!(read(None, &[&[1.0, 2.0, 3.0, 0.0], &lost]), Ok(2));
     for (wrong, found) in [

@@ -211,8 +211,9 @@ impl Turn {
     }
 }
 
-/// Creates a new file, or opens an existing device or pipe.
+/// Creates a new file and missing folders, or opens an existing device or pipe.
 fn open(file: &Path) -> io::Result<File> {
+    file.parent().map_or(Ok(()), fs::create_dir_all)?;
     match File::create_new(file) {
         Err(error) if error.kind() != ErrorKind::AlreadyExists => Err(error),
         Err(_) if file.metadata()?.is_file() => {
