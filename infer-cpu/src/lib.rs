@@ -78,7 +78,7 @@ pub mod sharing {
 #[doc(hidden)]
 pub mod model_file {
     pub use crate::dense::Dense;
-    pub use crate::network::{Network, TNet, read, read_card};
+    pub use crate::network::{Network, TNet, open, read};
 }
 
 pub use calibrate::on_clouds as activation_ranges;

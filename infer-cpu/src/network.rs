@@ -76,15 +76,16 @@ pub enum Role {
 /// The widest layer: a sum of int8 products over that many inputs fits into 32 bits.
 const WIDEST: usize = 1 << 16;
 
-/// The card of the bundled model of this name, or of the model file at `path`.
-pub fn read_card(path: &Path) -> Result<ModelCard, FormatError> {
-    ModelSource::of(path)?.open().map(|(_, card)| card)
+/// Opens the tensors and reads the card of the bundled model of this name, or of the model file at
+/// `path`.
+pub fn open(path: &Path) -> Result<(WeightsFile, ModelCard), FormatError> {
+    ModelSource::of(path)?.open()
 }
 
 /// Reads the card and the network of the bundled model of this name, or of the model file at `path`,
 /// in f32, with batch norms folded in.
 pub fn read(path: &Path) -> Result<(ModelCard, Network<Dense, Dense>), FormatError> {
-    let (mut file, card) = ModelSource::of(path)?.open()?;
+    let (mut file, card) = open(path)?;
     let network = read_network(&mut file, &card, |dense, _| dense, |dense| dense)?;
     Ok((card, network))
 }

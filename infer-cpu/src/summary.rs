@@ -6,9 +6,8 @@ use formats::model_card::ModelCard;
 
 use crate::dense::Dense;
 use crate::error::Error;
-use crate::network::{Network, TNet, read_network};
+use crate::network::{Network, TNet, open, read_network};
 use crate::precision::Precision;
-use crate::source::ModelSource;
 
 /// The network of a model file, layer by layer.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,7 +54,7 @@ pub struct LayerShape {
 /// # Errors
 /// A file that is not a model, as for [`crate::Classifier::load`].
 pub fn inspect(path: &Path) -> Result<Summary, Error> {
-    let (mut file, card) = ModelSource::of(path)?.open()?;
+    let (mut file, card) = open(path)?;
     let n_stored = file.shapes().values().map(|shape| shape.iter().product::<usize>()).sum();
     let network = read_network(&mut file, &card, |dense, _| shape_of(dense), shape_of)?;
     let Network { stn, edges, trunk, fstn, head, front, .. } = network;

@@ -31,6 +31,27 @@ fn bad_meshes_are_named_and_the_others_go_on() {
 }
 
 #[test]
+fn each_command_has_the_same_names_of_models() {
+    let folder = Folder::new();
+    folder.write("c.xyz", "0 0 0\n1 0 0\n0 1 0\n0 0 1\n");
+    let cause = "edge-65: name: expected a model file, or one of edge-64, street-128, shapes-ro";
+    for words in [
+        "classify c.xyz --model edge-65",
+        "inspect edge-65",
+        "bench --model edge-65",
+        "sample c.xyz d.xyz --sampler cpl --model edge-65",
+        "live --udp 0 --model edge-65",
+        "detect c.xyz --out o.json --model edge-65",
+        "eval --data c.xyz --model edge-65",
+        "explain --cloud c.xyz --points 2 --model edge-65",
+        "export-onnx edge-65 --out m.onnx",
+    ] {
+        folder.refuses(1, &[(words, cause)]);
+    }
+    assert!(folder.succeeds("inspect street-128").contains("two-wheeler"));
+}
+
+#[test]
 fn a_mesh_of_zero_area_is_scanned_to_nothing() {
     let folder = Folder::new();
     folder.write("m/flat/a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n");

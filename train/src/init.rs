@@ -38,8 +38,7 @@ pub fn start(
     card: &ModelCard,
     clouds: &Clouds,
 ) -> Result<(), Error> {
-    let mut file = WeightsFile::open(path)?;
-    let model = ModelCard::from_metadata(path, &file.metadata())?;
+    let (mut file, model) = infer_cpu::model_file::open(path)?;
     check_card(path, card, &model)?;
     let mut reader = Reader { file: &mut file, used: BTreeSet::new() };
     let is_known = !model.classes.is_empty() && card.classes.starts_with(&model.classes);

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use crate::kernel::KernelName;
-use crate::network::read_card;
+use crate::network::open;
 use crate::sampler::{SamplerKind, SamplerSpec};
 use crate::{Classifier, Options, Precision, UpAxis};
 use anyhow::Context;
@@ -203,7 +203,7 @@ impl Session<'_> {
             (Kind::KnownScan, Some(scans)) => scans,
             (Kind::KnownScan, scans) => {
                 let model = Path::new(SCANS);
-                scans.insert(self.args.load(model, &read_card(model)?)?)
+                scans.insert(self.args.load(model, &open(model)?.1)?)
             }
             _ => &mut self.classifier,
         };

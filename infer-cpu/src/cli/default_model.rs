@@ -9,7 +9,7 @@ use formats::cloud_file::is_scan;
 use serde::Deserialize;
 
 use crate::ModelCard;
-use crate::network::read_card;
+use crate::network::open;
 
 /// The bundled model of scans, which show an object from one side.
 pub const SCANS: &str = "shapes-rotational-64";
@@ -46,7 +46,7 @@ pub struct Kinds {
 
 impl Kinds {
     pub fn new() -> Result<Self, FormatError> {
-        Ok(Self { card: read_card(Path::new(SCANS))?, set: None })
+        Ok(Self { card: open(Path::new(SCANS))?.1, set: None })
     }
 
     /// The kind of the cloud in `file`, by its data set or its columns.

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use formats::model_card::ModelCard;
 
 use super::Usage;
-use crate::network::read_card;
+use crate::network::open;
 
 /// The environment variable that names a model if `--model` does not.
 const VARIABLE: &str = "EDGEPUCK_MODEL";
@@ -41,7 +41,7 @@ impl ModelArgs {
     /// Opens the model, or the bundled one of the name `default`.
     pub fn open_or(&self, default: &str) -> anyhow::Result<(PathBuf, ModelCard)> {
         let path = find_or(self.model.as_deref(), default);
-        let card = read_card(&path)?;
+        let (_, card) = open(&path)?;
         if !card.trained && !self.allow_untrained {
             return Err(Usage(format!(
                 "{} is untrained: its weights and its answers are random; name a trained \

@@ -23,8 +23,8 @@ prints a table: the shares of right answers, with 95 % intervals, by class, labe
 number of points, sensor and file. An object whose label is not a class of the model is a
 negative; the right answer to it is `unknown`.")]
 pub struct EvalArgs {
-    /// The model file
-    #[arg(long, value_name = "FILE")]
+    /// The model file, or the name of a bundled model
+    #[arg(long, value_name = "MODEL")]
     model: PathBuf,
     /// Labelled clouds: a packed NPZ file, NPZ files of clusters (repeat the flag), or data with a
     /// test part in any form that `train --data` accepts

@@ -4,7 +4,6 @@ use crate::explanation_drawing;
 use crate::lime::{Explanation, Lime, explain};
 use crate::random_baseline::RandomBaseline;
 use formats::atomic;
-use infer_cpu::model_file::read_card;
 use infer_cpu::sampler::{Resize, SamplerKind, SamplerSpec};
 use infer_cpu::{Classifier, Normalization, Options};
 
@@ -14,8 +13,8 @@ use super::{Usage, print};
 /// Flags of `explain`.
 #[derive(clap::Args, Debug)]
 pub struct ExplainArgs {
-    /// The model file
-    #[arg(long, value_name = "FILE")]
+    /// The model file, or the name of a bundled model
+    #[arg(long, value_name = "MODEL")]
     model: PathBuf,
     /// The cloud file: PLY, NPZ, NPY, PCD, text, KITTI or LAS
     #[arg(long, value_name = "FILE")]
@@ -57,7 +56,7 @@ pub fn run(args: &ExplainArgs) -> anyhow::Result<()> {
         Classifier::load(&args.model, &Options { sampler, normalization, ..Options::default() })
     };
     let mut points = Vec::new();
-    let normalization = match read_card(&args.model)?.normalization {
+    let normalization = match infer_cpu::model_file::open(&args.model)?.1.normalization {
         // Clouds of any size are drawn in the same frame.
         Normalization::None => Normalization::UnitSphere,
         other => other,

@@ -24,7 +24,7 @@ pub struct TrainArgs {
     /// Recipe (TOML), which the flags below override [default: the settings of the baseline]
     #[arg(long, value_name = "TOML")]
     recipe: Option<PathBuf>,
-    /// Model file from whose weights training starts. Its layers must be those of the recipe. The
+    /// Model file, or bundled model, from whose weights training starts. Its layers must be those of the recipe. The
     /// last layer is taken only if the model's classes are the first classes of the data; the
     /// weights of further classes start from random numbers [default: random numbers]
     #[arg(long, value_name = "MODEL")]

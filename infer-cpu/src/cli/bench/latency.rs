@@ -7,7 +7,7 @@ use std::iter::repeat_n;
 use std::path::Path;
 use std::time::Instant;
 
-use crate::network::read_card;
+use crate::network::open;
 use crate::{Classifier, ClassifierTeam, Options, Precision, TNets};
 use anyhow::Context;
 use formats::rng::StreamKey;
@@ -87,7 +87,7 @@ pub fn run(args: &BenchArgs, model: &Path) -> anyhow::Result<()> {
             ("p99 ms", format!("{:.3}", row.p99_ms)),
         ]
     };
-    let card = read_card(model)?;
+    let (_, card) = open(model)?;
     let untrained = if card.trained { "" } else { ", untrained: its weights are random" };
     writeln!(stdout(), "{}{untrained}", record.model)?;
     table::print(4, &record.rows.iter().map(cells).collect::<Vec<_>>())?;
