@@ -65,8 +65,10 @@ fn a_recording_replaces_no_file_and_one_of_nothing_is_not_left() {
     );
     assert_eq!(fs::read(folder.path("precious.mcap")).unwrap(), b"an hour of driving");
     folder
-        .run(&format!("{LIVE} --pcap drive.pcap --mcap no/folder.mcap"))
-        .assert_refused(1, "error: no/folder.mcap: ");
+        .run(&format!("{LIVE} --pcap drive.pcap --mcap precious.mcap/a.mcap"))
+        .assert_refused(1, "error: precious.mcap/a.mcap: ");
+    assert_eq!(folder.run(&format!("{LIVE} --pcap drive.pcap --mcap new/a.mcap")).code, 0);
+    assert!(folder.path("new/a.mcap").exists());
     for (line, code) in [("--pcap absent.pcap", 1), ("--pcap drive.pcap --from 10.0.0.1", 2)] {
         let ran = folder.run(&format!("{LIVE} {line} --mcap nothing.mcap"));
         assert_eq!(ran.code, code);

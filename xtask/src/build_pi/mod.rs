@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
 
-/// The largest size of the binary, which suits the smallest boards: 4.2 MiB of it are models.
+/// The largest size of the binary, which suits the smallest boards: 4.1 MiB of it are models.
 const MOST_BYTES: u64 = 7 << 20;
 
 /// Flags of `build-pi`.

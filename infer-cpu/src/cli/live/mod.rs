@@ -62,7 +62,8 @@ pub struct LiveArgs {
     #[arg(long, value_name = "PORT")]
     udp: Option<u16>,
 
-    /// Read packets from a capture, pcap or pcapng
+    /// Read packets from a capture, pcap or pcapng; the sensor's stamps give the intervals between
+    /// them
     #[arg(long, value_name = "FILE")]
     pcap: Option<PathBuf>,
 
@@ -102,7 +103,7 @@ pub struct LiveArgs {
     metadata: Option<PathBuf>,
 
     /// Poses of the sensor in the world, in TUM's format (Unix time x y z qx qy qz qw), by which
-    /// clusters are deskewed and tracked in the world
+    /// clusters are deskewed and tracked in the world; they must cover all packets
     #[arg(long, value_name = "FILE", conflicts_with = "twist")]
     poses: Option<PathBuf>,
 
