@@ -115,7 +115,7 @@ def compare_critical_points(model, n_kept, clouds, files):
 def exported(model, name, *flags):
     """A session of ONNX Runtime with the model, once ONNX's checker took it."""
     file = OUT / f"{name}.onnx"
-    edgepuck("export-onnx", model, "--out", file, *flags)
+    edgepuck("export-onnx", model, "--overwrite", "--out", file, *flags)
     graph = onnx.load(file)
     onnx.checker.check_model(graph, full_check=True)
     assert [(o.domain, o.version) for o in graph.opset_import] == [("", OPSET)]

@@ -111,7 +111,7 @@ def scanned(placed_mesh, sensor, position, adapter):
         f'scale = {float(scale)!r}\nposition_m = {[float(x) for x in place]}\n'
         f'[[sensor]]\nprofile = "{sensor}"\nposition_m = {position}\nlook_at_m = {TARGET_M}\n'
     )
-    edgepuck("scan", scene, "--out", scan, "--adapter", adapter)
+    edgepuck("scan", scene, "--overwrite", "--out", scan, "--adapter", adapter)
     return numpy.load(scan)
 
 

@@ -130,7 +130,7 @@ def untrained(widths, t_nets, random):
     name = f"random{len(widths)}"
     checkpoint, file = OUT / f"{name}.pth", OUT / f"{name}.safetensors"
     torch.save({"model_state_dict": model.state_dict()}, checkpoint)
-    edgepuck("import-weights", checkpoint, "--out", file)
+    edgepuck("import-weights", checkpoint, "--overwrite", "--out", file)
     return model, file
 
 

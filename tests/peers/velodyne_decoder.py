@@ -202,7 +202,7 @@ def scene(name, mesh, sensor, rpm):
             f"effects = {{ intensity = true }}\n"
             f"[[object]]\nmesh = \"{name}.off\"\nreflectivity = 0.9\n"
             f"[[sensor]]\nprofile = \"./{name}-{extension}-sensor.toml\"\n{sensor}\n")
-        edgepuck("scan", OUT / f"{name}-{extension}.toml", "--out", OUT / f"{name}.{extension}",
+        edgepuck("scan", OUT / f"{name}-{extension}.toml", "--overwrite", "--out", OUT / f"{name}.{extension}",
                  "--adapter", "cpu")
     return str(OUT / f"{name}.pcap"), OUT / f"{name}.npz"
 
