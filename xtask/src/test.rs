@@ -208,7 +208,8 @@ fn has_cpp_compiler() -> bool {
 
 /// Checks that the Raspberry Pi's crate depends on nothing for GPUs or training.
 fn infer_cpu_is_light() -> anyhow::Result<Counts> {
-    const TOO_HEAVY: [&str; 7] = ["wgpu", "naga", "tokio", "ndarray", "rayon", "sim-gpu", "train"];
+    const TOO_HEAVY: [&str; 7] =
+        ["wgpu", "naga", "tokio", "ndarray", "rayon", "sim-gpu", "edgepuck-train"];
     let tree = ["tree", "--package", "infer-cpu", "--edges", "normal", "--prefix", "none"];
     let tree = output(&mut cargo(&tree))?;
     let heavy = tree.lines().find(|line| TOO_HEAVY.iter().any(|name| line.starts_with(name)));
