@@ -20,8 +20,9 @@ impl Timeline {
         Self { options: options.clone(), sensor: None, returns: Vec::new(), span_s: None }
     }
 
-    /// Adds a packet; packets that are not the sensor's data are skipped.
-    pub fn take(&mut self, payload: &[u8], arrival: Arrival) {
+    /// Adds a packet and returns when it was sent, seconds of Unix time; packets that are not the
+    /// sensor's data are skipped.
+    pub fn take(&mut self, payload: &[u8], arrival: Arrival) -> Option<f64> {
         let Self { options, sensor, returns, span_s } = self;
         if sensor.is_none() {
             let decoder = Decoder::new(options.ouster.as_ref(), payload).ok();
@@ -30,14 +31,15 @@ impl Timeline {
                 (decoder, clock)
             });
         }
-        let Some((decoder, clock)) = sensor else { return };
-        let Ok(facts) = decoder.decode(payload, returns) else { return };
+        let (decoder, clock) = sensor.as_mut()?;
+        let facts = decoder.decode(payload, returns).ok()?;
         let (succession, time_s) =
             clock.take(facts.stamp_us, facts.duration_us, arrival.likely().time_s);
         if !matches!(succession, Succession::Duplicate | Succession::Late) {
             let [first_s, last_s] = span_s.get_or_insert([time_s; 2]);
             (*first_s, *last_s) = (first_s.min(time_s), last_s.max(time_s));
         }
+        Some(time_s)
     }
 
     /// The times of the first and the last packet, seconds of Unix time.

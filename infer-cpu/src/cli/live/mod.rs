@@ -67,7 +67,7 @@ pub struct LiveArgs {
     #[arg(long, value_name = "FILE")]
     pcap: Option<PathBuf>,
 
-    /// Take packets of the capture at the times at which they were captured, instead of as fast as
+    /// Take packets of the capture at the times at which the sensor sent them, instead of as fast as
     /// possible
     #[arg(long, requires = "pcap")]
     realtime: bool,
@@ -145,7 +145,7 @@ pub fn run(args: &LiveArgs) -> anyhow::Result<Outcome> {
         signal_hook::flag::register(signal, Arc::clone(&is_over))?;
     }
     let mut notifier = Notifier::of_environment()?;
-    let source = args.source(options.ouster.as_ref(), &is_over)?;
+    let source = args.source(&options, &is_over)?;
     let mut outputs = args.outputs()?;
     notifier.ready()?;
     let (mut heard, mut is_silent) = (Instant::now(), false);
@@ -250,7 +250,7 @@ impl LiveArgs {
         let mut timeline = Timeline::new(options);
         let mut sensor = Sensor::new(self.from, options.ouster.as_ref());
         sensor.has_warned = true;
-        let source = Source::Capture { file: file.to_path_buf(), sensor, realtime: false };
+        let source = Source::Capture { file: file.to_path_buf(), sensor, timeline: None };
         source.run(|tick| {
             if let Tick::Packet(payload, arrival) = tick {
                 timeline.take(payload, arrival);
@@ -282,15 +282,12 @@ impl LiveArgs {
         Ok(Outputs::new(prints, recorder))
     }
 
-    fn source(
-        &self,
-        metadata: Option<&Metadata>,
-        is_over: &Arc<AtomicBool>,
-    ) -> anyhow::Result<Source> {
-        let sensor = Sensor::new(self.from, metadata);
+    fn source(&self, options: &LiveOptions, is_over: &Arc<AtomicBool>) -> anyhow::Result<Source> {
+        let sensor = Sensor::new(self.from, options.ouster.as_ref());
         match (&self.pcap, self.udp) {
             (Some(file), _) => {
-                Ok(Source::Capture { file: file.clone(), sensor, realtime: self.realtime })
+                let timeline = self.realtime.then(|| Box::new(Timeline::new(options)));
+                Ok(Source::Capture { file: file.clone(), sensor, timeline })
             }
             (None, port) => {
                 let address = (self.interface, port.unwrap_or_default()).into();

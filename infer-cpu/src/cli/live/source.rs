@@ -12,7 +12,7 @@ use std::sync::mpsc::{
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use crate::live::Arrival;
+use crate::live::{Arrival, Timeline};
 use anyhow::Context;
 use formats::ouster::{self, Metadata};
 use formats::{Senders, pcap, velodyne};
@@ -36,7 +36,12 @@ pub enum Tick<'a> {
 }
 
 pub enum Source {
-    Capture { file: PathBuf, sensor: Sensor, realtime: bool },
+    Capture {
+        file: PathBuf,
+        sensor: Sensor,
+        /// For packets that are taken when the sensor sent them, instead of as fast as possible.
+        timeline: Option<Box<Timeline>>,
+    },
     Udp(Box<Listener>),
 }
 
@@ -129,7 +134,7 @@ impl Source {
     pub fn run(self, mut take: impl FnMut(Tick<'_>) -> bool) -> anyhow::Result<Read> {
         let read = match self {
             Self::Udp(listener) => listener.run(&mut take)?,
-            Self::Capture { file, sensor, realtime } => replay(&file, sensor, realtime, &mut take)?,
+            Self::Capture { file, sensor, timeline } => replay(&file, sensor, timeline, &mut take)?,
         };
         take(Tick::End);
         Ok(read)
@@ -234,11 +239,11 @@ impl Listener {
     }
 }
 
-/// Passes the packets of a capture to `take`, at their times if `realtime`.
+/// Passes the packets of a capture to `take`, at their times if there is a `timeline`.
 fn replay(
     file: &Path,
     mut sensor: Sensor,
-    realtime: bool,
+    mut timeline: Option<Box<Timeline>>,
     take: &mut impl FnMut(Tick<'_>) -> bool,
 ) -> anyhow::Result<Read> {
     let (mut read, start, mut first_s) = (Read::default(), Instant::now(), None);
@@ -248,14 +253,16 @@ fn replay(
             return ControlFlow::Continue(());
         }
         let time_s = packet.time_s.unwrap_or_default();
-        let mut moment = None;
-        if realtime {
-            let since_s = time_s - *first_s.get_or_insert(time_s);
-            let due = start + Duration::try_from_secs_f64(since_s).unwrap_or_default();
-            thread::sleep(due.saturating_duration_since(Instant::now()));
-            moment = Some(Instant::now());
+        let mut arrival = Arrival { time_s, moment: None };
+        if let Some(timeline) = &mut timeline {
+            if let Some(sent_s) = timeline.take(&packet.payload, arrival) {
+                let since_s = sent_s - *first_s.get_or_insert(sent_s);
+                let due = start + Duration::try_from_secs_f64(since_s).unwrap_or_default();
+                thread::sleep(due.saturating_duration_since(Instant::now()));
+            }
+            arrival.moment = Some(Instant::now());
         }
-        match take(Tick::Packet(&packet.payload, Arrival { time_s, moment })) {
+        match take(Tick::Packet(&packet.payload, arrival)) {
             true => ControlFlow::Continue(()),
             false => ControlFlow::Break(()),
         }
