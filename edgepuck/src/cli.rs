@@ -125,7 +125,7 @@ fn run(command: &Command) -> anyhow::Result<Outcome> {
         #[cfg(not(feature = "models"))]
         Command::Other(words) => {
             let word = words[0].to_string_lossy();
-            Err(Usage(format!(
+            Err(crate::Usage(format!(
                 "expected a command, found `{word}`; this program was built without the commands of \
                  networks: `cargo install --path edgepuck` in a checkout builds it with them"
             ))

@@ -163,7 +163,7 @@ fn the_scenes_of_effects_md_are_read() {
     let poses =
         page.split("`trajectory = ").nth(1).and_then(|rest| rest.split('`').next()).unwrap();
     let moving = format!("{OBJECT}trajectory = {poses}\n{SENSOR}");
-    let scene = parse(&moving.replace('\n', "\n")).unwrap();
+    let scene = parse(&moving).unwrap();
     let pose = scene.objects[0].motion.as_ref().unwrap().at(0.5);
     assert_eq!(pose.position_m, DVec3::new(2.5, 0.0, 1.0));
     // Half of the 10 degrees.
