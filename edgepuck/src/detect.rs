@@ -9,6 +9,7 @@ use infer_cpu::{Classifier, Options, Precision};
 use serde_json::{Value, json};
 
 use crate::flags::need_extension;
+use crate::overwrite::Overwrite;
 use crate::points::SweepArgs;
 use crate::segment::tint;
 use crate::{Outcome, Usage, preview};
@@ -26,6 +27,9 @@ pub(crate) struct DetectArgs {
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 
+    #[command(flatten)]
+    overwrite: Overwrite,
+
     /// Fewest points of an object
     #[arg(long, default_value_t = 20, value_name = "N")]
     min_points: usize,
@@ -37,6 +41,8 @@ pub(crate) struct DetectArgs {
 
 pub(crate) fn run(args: &DetectArgs) -> anyhow::Result<Outcome> {
     need_extension("--out", &args.out, "json")?;
+    let picture = args.out.with_extension("png");
+    args.overwrite.check([&*args.out, &picture])?;
     let scan = args.input.read()?;
     let options = Options { precision: args.precision, ..Options::default() };
     let mut detector = Detector::open(&args.model, &options, args.min_points)?;
@@ -63,7 +69,6 @@ pub(crate) fn run(args: &DetectArgs) -> anyhow::Result<Outcome> {
     });
     let tints: Vec<_> = tints.collect();
     let names: Vec<_> = objects.iter().map(Object::name).collect();
-    let picture = args.out.with_extension("png");
     preview::draw_from_above(&scan, &tints, &names, &args.input.title(), &picture)?;
     Ok(Outcome::Success)
 }

@@ -1,6 +1,7 @@
 //! `edgepuck preview`: a picture of a scan.
 
 use crate::flags::need_extension;
+use crate::overwrite::Overwrite;
 use crate::points::PointsArgs;
 use crate::{Outcome, preview};
 use std::path::{Path, PathBuf};
@@ -23,10 +24,14 @@ pub struct Args {
     /// PNG file to write
     #[arg(long, default_value = "scan.png", value_name = "PNG")]
     out: PathBuf,
+
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     need_extension("--out", &args.out, "png")?;
+    args.overwrite.check([&*args.out])?;
     let clean = args.points.read(&args.scan)?;
     let noisy = args.noisy.clone().or_else(|| noisy_twin(&args.scan));
     let noisy = noisy.map(|file| args.points.read(&file)).transpose()?;

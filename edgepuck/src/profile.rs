@@ -1,5 +1,6 @@
 use crate::Outcome;
 use crate::flags::need_extension;
+use crate::overwrite::Overwrite;
 use crate::significant_digits::digits;
 use formats::atomic;
 use glam::DVec3;
@@ -19,6 +20,9 @@ pub struct ProfileArgs {
     /// from forward), elevation_deg, and where it starts: x_m, y_m, z_m
     #[arg(long, value_name = "FILE", requires = "sensor")]
     beams: Option<PathBuf>,
+
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 /// Lists the built-in sensors, or describes one sensor. Prints warnings about unusual values of a
@@ -32,6 +36,7 @@ pub fn run(args: &ProfileArgs) -> anyhow::Result<Outcome> {
         return Ok(Outcome::Success);
     };
     args.beams.iter().try_for_each(|file| need_extension("--beams", file, "csv"))?;
+    args.overwrite.check(args.beams.as_deref())?;
     let sensor = SensorProfile::resolve(name)?;
     let pattern = sensor.pattern();
     print!("{}", described(&sensor, &pattern));

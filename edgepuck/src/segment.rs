@@ -1,3 +1,4 @@
+use crate::overwrite::Overwrite;
 use crate::points::SweepArgs;
 use crate::{Outcome, Usage, preview};
 use edgepuck_segment::{Label, Segmentation, Segmenter, Settings, Sweep};
@@ -18,6 +19,9 @@ pub struct SegmentArgs {
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 
+    #[command(flatten)]
+    overwrite: Overwrite,
+
     /// Compute connected components of points within this many metres instead, for clouds that are
     /// not sweeps of a sensor; these have no ground
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
@@ -25,6 +29,7 @@ pub struct SegmentArgs {
 }
 
 pub fn run(args: &SegmentArgs) -> anyhow::Result<Outcome> {
+    args.overwrite.check([&*args.out])?;
     let scan = args.input.read()?;
     let settings = args.radius.map_or_else(Settings::default, Settings::of_components);
     let mut segmenter = Segmenter::new(settings).map_err(|error| Usage(error.to_string()))?;

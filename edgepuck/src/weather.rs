@@ -1,4 +1,5 @@
 use crate::brightness::BrightnessArgs;
+use crate::overwrite::Overwrite;
 use crate::points::SweepArgs;
 use crate::{Outcome, Usage};
 use formats::Scan;
@@ -22,6 +23,9 @@ pub struct WeatherArgs {
     /// 0 a surface, 1 rain, 2 snow, 3 fog
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
+
+    #[command(flatten)]
+    overwrite: Overwrite,
 
     /// Rain, millimetres per hour
     #[arg(long, value_name = "MM/H", allow_negative_numbers = true)]
@@ -77,6 +81,7 @@ pub fn run(args: &WeatherArgs) -> anyhow::Result<Outcome> {
     let limit = effects.detection.and_then(|detection| detection.limit);
     let limit = limit.expect("invariant: weather needs a detection limit");
 
+    args.overwrite.check([&*args.out])?;
     let scan = args.input.read_whole()?;
     let brightness = args.brightness.brightness_of(&scan, &args.input.sweep)?;
     let air = Air::new(&weather, sensor.beam_divergence_deg(), &limit, &sensor.range);

@@ -75,13 +75,16 @@ fn every_command_reads_points_of_every_format() {
     let names = ["a.npz", "a.ply", "a.npy", "a.pcd", "a.xyz", "a.pts", "a.csv", "a.las", "a.bin"];
     for name in names {
         write_cloud(&folder.at(name), &points).unwrap();
-        let said = folder.succeeds(&format!("segment {name} --out clusters --radius 0.3"));
+        let said =
+            folder.succeeds(&format!("segment {name} --overwrite --out clusters --radius 0.3"));
         assert!(said.contains(" 2 clusters"), "{name}: {said}");
-        folder.succeeds(&format!("detect {name} --out objects.json"));
-        let weather = "--fog 100 --reflectivity 0.5 --out fog.npz";
+        folder.succeeds(&format!("detect {name} --overwrite --out objects.json"));
+        let weather = "--fog 100 --reflectivity 0.5 --overwrite --out fog.npz";
         folder.succeeds(&format!("weather {name} {weather}"));
-        folder.succeeds(&format!("corrupt {name} --only crosstalk --severity 1 --out corrupted"));
-        let said = folder.succeeds(&format!("preview {name}"));
+        folder.succeeds(&format!(
+            "corrupt {name} --only crosstalk --severity 1 --overwrite --out corrupted"
+        ));
+        let said = folder.succeeds(&format!("preview {name} --overwrite"));
         assert!(said.contains(&format!("{} points: scan.png", points.len())), "{said}");
     }
     let five: Vec<u8> = (0..)
@@ -103,18 +106,35 @@ fn every_command_reads_points_of_every_format() {
         ],
     );
     for file in ["five.bin", "five"] {
-        folder.succeeds(&format!("segment {file} --format nuscenes --out clusters --radius 0.3"));
+        folder.succeeds(&format!(
+            "segment {file} --overwrite --format nuscenes --out clusters --radius 0.3"
+        ));
     }
 
     // UTM: in f32 the box would be in steps of half a metre.
     let [east, north] = [691_000.0, 5_334_000.0];
     let far: Vec<_> = points.iter().map(|[x, y, z]| [x + east, y + north, *z]).collect();
     write_cloud(&folder.at("utm.las"), &far).unwrap();
-    let segment = "segment utm.las --out clusters --radius 0.3";
+    let segment = "segment utm.las --overwrite --out clusters --radius 0.3";
     folder.refuses(1, &[(segment, "give the sensor's position by --sensor")]);
     let said = folder.succeeds(&format!("{segment} --sensor {east} {north} 0"));
     assert!(said.contains(" 2 clusters"), "{said}");
     folder.succeeds("preview utm.las --out out.png");
+    folder.write("objects.json", "mine");
+    folder.refuses(
+        2,
+        &[
+            (
+                "segment a.ply --out clusters",
+                "clusters: it exists already: --overwrite replaces it",
+            ),
+            ("detect a.ply --out objects.json", "objects.json: it exists already"),
+            ("weather a.ply --rain 1 --reflectivity 1 --out fog.npz", "fog.npz: it exists already"),
+            ("corrupt a.ply --reflectivity 1 --out corrupted", "corrupted: it exists already"),
+            ("preview a.ply", "scan.png: it exists already"),
+        ],
+    );
+    assert_eq!(folder.text("objects.json"), "mine");
 }
 
 #[test]
@@ -128,7 +148,8 @@ fn captures_of_several_senders_and_interfaces_are_read() {
         "{said}"
     );
     let chosen = |address| {
-        folder.succeeds(&format!("preview {} --from {address}", file("two_senders.pcap")))
+        folder
+            .succeeds(&format!("preview {} --overwrite --from {address}", file("two_senders.pcap")))
     };
     assert_ne!(chosen("192.168.1.201"), chosen("192.168.1.202"));
     folder.succeeds(&format!("detect {} --out a.json", file("linux_cooked.pcap")));

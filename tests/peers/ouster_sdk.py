@@ -84,7 +84,7 @@ def compare(name, capture, text, expected):
     """That `segment` reads `expected` from a capture, by the metadata `text`."""
     told = OUT / "metadata.json"
     told.write_text(text)
-    edgepuck("segment", capture, "--metadata", told, "--out", OUT / "clusters")
+    edgepuck("segment", capture, "--metadata", told, "--overwrite", "--out", OUT / "clusters")
     vertices = plyfile.PlyData.read(str(OUT / "clusters/sweep.ply"))["vertex"]
     ours = numpy.stack([vertices[axis] for axis in "xyz"], 1).astype(float)
     assert ours.shape == expected.shape, f"{name}: {len(ours)} points of {len(expected)}"
@@ -145,7 +145,7 @@ def beams():
         range_mm = numpy.full([128, COLUMNS], 10_000, numpy.uint32)
         expected = core.XYZLut(core.SensorInfo(text))(range_mm).swapaxes(0, 1).reshape(-1, 3)
         for sensor in [name, OUT / "unit.json"]:
-            edgepuck("profile", sensor, "--beams", OUT / "beams.csv")
+            edgepuck("profile", sensor, "--overwrite", "--beams", OUT / "beams.csv")
             rows = numpy.loadtxt(OUT / "beams.csv", delimiter=",", skiprows=1)
             azimuth, elevation = numpy.radians(rows[:, 2:4].T)
             level = numpy.cos(elevation)

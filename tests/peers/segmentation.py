@@ -62,7 +62,7 @@ def main():
 def compare_components(sweep, radius):
     """Both find the same sets of points."""
     folder = OUT / f"components-{radius}"
-    edgepuck("segment", sweep, "--radius", radius, "--out", folder)
+    edgepuck("segment", sweep, "--radius", radius, "--overwrite", "--out", folder)
     ours = {as_set(numpy.load(file)) for file in folder.glob("cluster-*.npy")}
     loaded = numpy.load(sweep)
     points = (loaded if sweep.suffix == ".npy" else loaded["positions"]).astype(numpy.float64)
@@ -104,7 +104,7 @@ def compare_ground(sweeps):
 
 def our_ground(sweep):
     folder = OUT / "clusters"
-    said = edgepuck("segment", sweep, "--out", folder).stderr
+    said = edgepuck("segment", sweep, "--overwrite", "--out", folder).stderr
     vertices = plyfile.PlyData.read(str(folder / "sweep.ply"))["vertex"]
     colours = numpy.stack([vertices[name] for name in ("red", "green", "blue")], 1)
     return (colours == GROUND).all(1), float(re.search(r"([0-9.]+) ms", said)[1])

@@ -238,7 +238,7 @@ def reading():
         print("a real VLP-16's packets are not here")
     config = velodyne_decoder.Config(timestamp_first_packet=True, min_range=0, max_range=1000)
     for pcap in captures:
-        edgepuck("segment", pcap, "--out", OUT / "clusters")
+        edgepuck("segment", pcap, "--overwrite", "--out", OUT / "clusters")
         vertices = plyfile.PlyData.read(str(OUT / "clusters/sweep.ply"))["vertex"]
         ours = numpy.stack([vertices[axis] for axis in "xyz"], 1).astype(float)
         scans = [points for _, points in velodyne_decoder.read_pcap(str(pcap), config)]

@@ -65,7 +65,7 @@ def edgepuck_weather(cloud, flags, sensor):
     (OUT / "sensor.toml").write_text(sensor)
     numpy.savez(OUT / "clear.npz", positions=cloud[:, :3].astype(numpy.float32),
                 intensity=cloud[:, 3:].astype(numpy.float32))
-    edgepuck("weather", OUT / "clear.npz", "--out", OUT / "weather.npz", "--profile", OUT / "sensor.toml", *flags)
+    edgepuck("weather", OUT / "clear.npz", "--overwrite", "--out", OUT / "weather.npz", "--profile", OUT / "sensor.toml", *flags)
     told = numpy.load(OUT / "weather.npz")
     return told["positions"].astype(float), told["intensity"][:, 0].astype(float), told["medium"][:, 0]
 

@@ -6,6 +6,7 @@ mod plan;
 mod sweep;
 
 use crate::brightness::BrightnessArgs;
+use crate::overwrite::Overwrite;
 use crate::points::{PlaceArgs, SweepArgs};
 use crate::{Outcome, Usage};
 use plan::{Entry, Plan};
@@ -30,6 +31,9 @@ pub struct CorruptArgs {
     /// Folder for the corrupted scans, or the packed sets, and corruptions.csv
     #[arg(long, value_name = "DIR", default_value = "data/corrupted")]
     out: PathBuf,
+
+    #[command(flatten)]
+    overwrite: Overwrite,
 
     /// Corruptions to make, separated by commas [default: all]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
@@ -68,6 +72,7 @@ pub fn run(args: &CorruptArgs) -> anyhow::Result<Outcome> {
         print!("{}", listed(&plan));
         return Ok(Outcome::Success);
     }
+    args.overwrite.check([&*args.out])?;
     let sweep = args.sweep.clone().expect("invariant: required without --list");
     let input = SweepArgs { sweep, place: args.place.clone() };
     let sensor = Sensor::resolve(&args.profile)?;
