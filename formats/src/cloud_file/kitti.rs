@@ -18,6 +18,9 @@ const KITTI_COLUMNS: usize = 4;
 const NUSCENES_COLUMNS: usize = 5;
 const COLUMN_SIZE: usize = size_of::<f32>();
 
+/// Columns of fewer points could be so by chance.
+const FEWEST: usize = 5;
+
 /// What to do where the format may not be KITTI's.
 pub(super) const REMEDY: &str = "name the format by --format: kitti has four f32 for each point, nuscenes five; a file called \
      NAME.f32x6.bin has six";
@@ -81,14 +84,12 @@ fn has_negative_intensities(start: &[u8]) -> bool {
     let points = start.as_chunks::<{ KITTI_COLUMNS * COLUMN_SIZE }>().0;
     let intensity = |point: &[u8]| NumberType::F32.decode(&point[12..], ByteOrder::Little);
     let negative = points.iter().filter(|point| intensity(&point[..]) < 0.0).count();
-    negative > points.len() / 10
+    points.len() >= FEWEST && negative > points.len() / 10
 }
 
 /// Whether each fifth number is a small whole number, as the rings of nuScenes are, and others are
 /// not.
 fn has_rings(start: &[u8]) -> bool {
-    /// Fewer could be so by chance.
-    const FEWEST: usize = 5;
     let points = start.as_chunks::<{ NUSCENES_COLUMNS * COLUMN_SIZE }>().0;
     let number = |point: &[u8], at: usize| {
         NumberType::F32.decode(&point[at * COLUMN_SIZE..], ByteOrder::Little)
