@@ -78,12 +78,14 @@ proptest! {
         let expected: Vec<_> = positions.iter().map(|position| bits(*position)).collect();
         prop_assert_eq!(read, expected);
 
-        let fan = |face: &Vec<u32>| {
-            let first = face[0];
-            face[1..].windows(2).map(|pair| [first, pair[0], pair[1]]).collect::<Vec<_>>()
-        };
-        let fans: Vec<_> = faces.iter().flat_map(fan).collect();
-        prop_assert_eq!(parsed.mesh.triangles, fans);
+        let mut triangles = parsed.mesh.triangles.iter();
+        for face in &faces {
+            let own: Vec<_> = triangles.by_ref().take(face.len().saturating_sub(2)).collect();
+            prop_assert_eq!(own.len(), face.len().saturating_sub(2));
+            prop_assert!(own.iter().all(|corners| corners.iter().all(|i| face.contains(i))));
+            prop_assert!(face.len() != 3 || own[0][..] == face[..]);
+        }
+        prop_assert_eq!(triangles.next(), None);
         prop_assert_eq!(parsed.dropped_faces, faces.iter().filter(|face| face.len() < 3).count());
     }
 

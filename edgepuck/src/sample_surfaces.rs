@@ -1,9 +1,8 @@
 use crate::Outcome;
-use crate::gen_dataset::report_failures;
+use crate::gen_dataset::{listed, report_failures};
 use crate::overwrite::Overwrite;
 use edgepuck_dataset::{SurfaceConfig, write_surfaces};
 use sim_gpu::internals::mesh::frame::{Normalize, Up};
-use sim_gpu::internals::mesh::tree::discover;
 use sim_gpu::internals::sensor::Views;
 use std::path::PathBuf;
 
@@ -43,7 +42,7 @@ pub struct SampleSurfacesArgs {
 pub fn run(args: &SampleSurfacesArgs) -> anyhow::Result<Outcome> {
     let outputs = ["surface", "seen"].map(|set| args.out.join(format!("{set}-train.npz")));
     args.overwrite.check(outputs.iter().map(PathBuf::as_path))?;
-    let meshes = discover(&args.meshes, args.seed)?;
+    let meshes = listed(&args.meshes, args.seed)?;
     let config = SurfaceConfig {
         seed: args.seed,
         normalize: Normalize::default(),

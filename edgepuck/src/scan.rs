@@ -119,6 +119,7 @@ impl MeshArgs {
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let format = ScanFormat::of_path(&args.out)?;
     let (mut scene, what) = scene(args)?;
+    scene.warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
     let mut returns = Returns::default();
     if format == ScanFormat::Pcap {
         returns = cast_packet_geometry(&mut scene, args.returns).with_context(|| what.clone())?;

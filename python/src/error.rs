@@ -1,5 +1,7 @@
-use pyo3::exceptions::PyValueError;
-use pyo3::{PyErr, create_exception};
+use pyo3::create_exception;
+use pyo3::exceptions::{PyUserWarning, PyValueError};
+use pyo3::prelude::*;
+use std::ffi::CString;
 use std::fmt::Display;
 
 create_exception!(
@@ -16,4 +18,11 @@ pub fn raised(error: impl Display) -> PyErr {
 /// The exception for an error with causes.
 pub fn raised_with_causes(error: anyhow::Error) -> PyErr {
     raised(formats::outcome::joined_causes(&error))
+}
+
+/// Gives each line to Python's `warnings`, for the line that called the package.
+pub fn warn<Line: AsRef<str>>(py: Python<'_>, lines: &[Line]) -> PyResult<()> {
+    let category = py.get_type::<PyUserWarning>();
+    let text = |line: &Line| CString::new(line.as_ref().replace('\0', " ")).map_err(raised);
+    lines.iter().try_for_each(|line| PyErr::warn(py, &category, &text(line)?, 2))
 }

@@ -1,4 +1,4 @@
-use crate::error::raised;
+use crate::error::{raised, warn};
 use crate::process;
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -25,10 +25,10 @@ impl Mesh {
         let up: Option<Up> = up.map(str::parse).transpose().map_err(raised)?;
         let unit: Unit = units.parse().map_err(raised)?;
         let normalize: Normalize = normalize.parse().map_err(raised)?;
-        process::run(py, || {
-            let mesh = sim_gpu::Mesh::read_in(&path, up, unit).map_err(raised)?;
-            Ok(Self::new(&mesh, normalize))
-        })?
+        let read = || Ok(Self::new(&sim_gpu::Mesh::read_in(&path, up, unit)?, normalize));
+        let mesh = process::run(py, read)?.map_err(|error: sim_gpu::Error| raised(error))?;
+        warn(py, mesh.mesh.warnings())?;
+        Ok(mesh)
     }
 
     /// Take vertices, `[n, 3]`, and triangles, `[m, 3]`.

@@ -1,7 +1,7 @@
 //! Scenes that Python fills, and those that files describe.
 
 use crate::arrays;
-use crate::error::raised;
+use crate::error::{raised, warn};
 use crate::mesh::Mesh;
 use crate::process::{self, LazyCaster, lock};
 use crate::sensor::Sensor;
@@ -41,7 +41,9 @@ impl Scene {
             }
             Ok::<_, sim_gpu::Error>(scene)
         })?;
-        Ok(Self { scene: Mutex::new(scene.map_err(raised)?) })
+        let scene = scene.map_err(raised)?;
+        warn(py, &scene.warnings())?;
+        Ok(Self { scene: Mutex::new(scene) })
     }
 
     /// How many instances there are.

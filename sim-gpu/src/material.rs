@@ -6,6 +6,7 @@
 //! or one of the table in `assets/materials.toml`.
 
 use std::collections::BTreeMap;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use edgepuck_assets::MATERIALS;
@@ -13,7 +14,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::config::{InvalidValue, within};
-use crate::mesh::{Appearance, Colour, Face, MeshError, colours};
+use crate::mesh::{Appearance, Colour, MeshError, colours, file_name};
 use texture::Texture;
 
 mod texture;
@@ -171,6 +172,9 @@ pub struct Materials {
     textures: Vec<Texture>,
     /// `[n_triangles]`.
     of_triangle: Vec<Paint>,
+    /// What is doubtful about the files, for the user.
+    #[doc(hidden)]
+    pub warnings: Vec<String>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -202,23 +206,31 @@ impl Materials {
             return Err(MaterialError::UnknownName { path, name, known: appearance.names });
         }
         let from_mtl = choice.colours == Some(ColourSource::Mtl);
-        let known = if from_mtl { read_libraries(path, &appearance.libraries)? } else { vec![] };
-        let mut materials = Self { even: vec![otherwise], textures: vec![], of_triangle: vec![] };
-        let named: Vec<Named> = appearance
-            .names
-            .iter()
-            .map(|name| {
-                materials.add(choice.by_name.get(name), known.iter().find(|c| c.name == *name))
-            })
-            .collect::<Result<_, _>>()?;
+        let mut warnings = vec![];
+        let known = if from_mtl {
+            read_libraries(path, &appearance.libraries, &mut warnings)?
+        } else {
+            vec![]
+        };
+        let mut materials =
+            Self { even: vec![otherwise], textures: vec![], of_triangle: vec![], warnings };
+        let mut named = Vec::new();
+        for name in &appearance.names {
+            let (own, colour) = (choice.by_name.get(name), known.iter().find(|c| c.name == *name));
+            if from_mtl && own.is_none() && colour.is_none() {
+                let warning = format!("material {name} is not in its MTL files");
+                materials.warnings.push(warning);
+            }
+            named.push(materials.add(own, colour)?);
+        }
         let from_vertices = choice.colours == Some(ColourSource::Vertices);
-        for face in &appearance.triangles {
-            let paint = match face.material.map(|place| &named[place as usize]) {
+        for (triangle, material) in appearance.materials.iter().enumerate() {
+            let paint = match material.map(|place| &named[place as usize]) {
                 Some(Named::Even(place)) => Paint::Even(*place),
                 Some(Named::Textured(place, colour)) => {
-                    Paint::Textured(*place, corners_in_image(&appearance, face, colour)?)
+                    Paint::Textured(*place, corners_in_image(&appearance, triangle, colour)?)
                 }
-                _ if from_vertices => painted(path, &appearance, face)?,
+                _ if from_vertices => painted(path, &appearance, triangle)?,
                 _ => Paint::Even(0),
             };
             materials.of_triangle.push(paint);
@@ -236,10 +248,14 @@ impl Materials {
             (Some(material), _) => *material,
             (None, None) => return Ok(Named::Nothing),
             (None, Some(colour)) => match &colour.image {
-                Some(image) => {
+                Some(map) => {
                     let kd = colour.diffuse.unwrap_or([1.0; 3]);
-                    let texture = Texture::load(image, |srgb| tinted(srgb, kd))
-                        .map_err(|cause| unfit(colour, format!("{}: {cause}", image.display())))?;
+                    let failed = |cause| unfit(colour, format!("{}: {cause}", map.image.display()));
+                    let texture = Texture::load(map, |srgb| tinted(srgb, kd)).map_err(failed)?;
+                    if map.is_turbulent {
+                        let cause = "map_Kd -t: turbulence is not applied";
+                        self.warnings.push(format!("material {}: {cause}", colour.name));
+                    }
                     self.textures.push(texture);
                     return Ok(Named::Textured(self.textures.len() as u32 - 1, colour));
                 }
@@ -284,10 +300,46 @@ enum Named<'a> {
     Textured(u32, &'a Colour),
 }
 
-fn read_libraries(path: &Path, libraries: &[String]) -> Result<Vec<Colour>, MeshError> {
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let read = libraries.iter().map(|library| colours(&folder.join(library)));
-    Ok(read.collect::<Result<Vec<_>, _>>()?.concat())
+/// Reads the MTL files that the lines `mtllib` name, of which some may be missing.
+fn read_libraries(
+    path: &Path,
+    lines: &[String],
+    warnings: &mut Vec<String>,
+) -> Result<Vec<Colour>, MeshError> {
+    let (mut known, mut missing) = (None::<Vec<Colour>>, None);
+    for file in lines.iter().flat_map(|names| library_files(path, names)) {
+        match colours(&file) {
+            Ok(found) => known.get_or_insert_default().extend(found),
+            Err(MeshError::Read { source, path }) if source.kind() == io::ErrorKind::NotFound => {
+                let error = MeshError::Read { source, path };
+                warnings.push(error.to_string());
+                missing.get_or_insert(error);
+            }
+            Err(error) => return Err(error),
+        }
+    }
+    match (known, missing) {
+        (None, Some(error)) => Err(error),
+        (known, _) => Ok(known.unwrap_or_default()),
+    }
+}
+
+/// The files of a line `mtllib` of the OBJ file at `path`: one, if there is a file of this name,
+/// or several, whose names end in `.mtl`.
+fn library_files(path: &Path, names: &str) -> Vec<PathBuf> {
+    let file = |name: &str| path.with_file_name(file_name(name.trim()));
+    if file(names).is_file() {
+        return vec![file(names)];
+    }
+    let (mut files, mut name) = (Vec::new(), String::new());
+    for word in names.split_inclusive(char::is_whitespace) {
+        name += word;
+        if word.trim_end().to_ascii_lowercase().ends_with(".mtl") {
+            files.push(file(&std::mem::take(&mut name)));
+        }
+    }
+    files.extend((!name.is_empty()).then(|| file(&name)));
+    files
 }
 
 fn unfit(colour: &Colour, cause: String) -> MaterialError {
@@ -296,18 +348,22 @@ fn unfit(colour: &Colour, cause: String) -> MaterialError {
 
 fn corners_in_image(
     appearance: &Appearance,
-    face: &Face,
+    triangle: usize,
     colour: &Colour,
 ) -> Result<[[f32; 2]; 3], MaterialError> {
     let missing = || unfit(colour, "map_Kd: a face has no texture coordinates".to_owned());
-    let corners = face.texture.ok_or_else(missing)?;
-    Ok(corners.map(|i| appearance.texture_coordinates[i as usize].map(|x| x as f32)))
+    let mut corners = [[0.0; 2]; 3];
+    for (corner, index) in corners.iter_mut().zip(appearance.textures[triangle]) {
+        let index = index.ok_or_else(missing)? as usize;
+        *corner = appearance.texture_coordinates[index].map(|x| x as f32);
+    }
+    Ok(corners)
 }
 
-/// The reflectivities of the corners of `face` by their colours, if all have one.
-fn painted(path: &Path, appearance: &Appearance, face: &Face) -> Result<Paint, MaterialError> {
+/// The reflectivities of the corners of a triangle by their colours, if all have one.
+fn painted(path: &Path, appearance: &Appearance, triangle: usize) -> Result<Paint, MaterialError> {
     let mut corners = [0.0; 3];
-    for (corner, vertex) in corners.iter_mut().zip(face.vertices) {
+    for (corner, vertex) in corners.iter_mut().zip(appearance.vertices[triangle]) {
         let Some(found) = appearance.colours[vertex as usize] else { return Ok(Paint::Even(0)) };
         if !found.iter().all(|part| (0.0..=1.0).contains(part)) {
             return Err(MaterialError::Vertex { path: path.to_owned(), vertex: vertex + 1, found });
@@ -342,6 +398,7 @@ mod tests {
     const OBJ: &str = "mtllib car parts.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\n\
                        usemtl body\nf 1 2 4 3\nf 1 2\nusemtl tyre # black\nf 2 4 3\n\
                        usemtl body\nf 1 4 3\n";
+    const WHITE: Material = Material::diffuse(1.0);
     const MTL: &str = "newmtl body\nKd 0.5 0.5 0.5\nnewmtl tyre\nKd 1 0 0\n";
 
     fn load(obj: &str, mtl: &str, choice: &MaterialChoice) -> Result<Vec<f64>, String> {
@@ -409,9 +466,24 @@ mod tests {
             ("newmtl body\n", mtl.clone(), "material body: expected a colour Kd, found none"),
             ("newmtl body\nmap_Kd a.png\n", mtl.clone(), unread),
             (
-                "newmtl body\nmap_Kd -s 1 a.png\n",
+                "newmtl body\nmap_Kd -q 1 a.png\n",
                 mtl.clone(),
-                ":2: expected a file without options",
+                ":2: expected an option of map_Kd, found \"-q\"",
+            ),
+            (
+                "newmtl body\nmap_Kd -mm 1 a.png\n",
+                mtl.clone(),
+                ":2: expected 2 numbers after -mm, found \"a.png\"",
+            ),
+            (
+                "newmtl body\nmap_Kd -clamp on\n",
+                mtl.clone(),
+                ":2: expected a file as map_Kd, found \"-clamp on\"",
+            ),
+            (
+                "version https://git-lfs.github.com/spec/v1\n",
+                mtl.clone(),
+                "/car parts.mtl: expected materials, found a Git LFS pointer",
             ),
         ] {
             let error = load(OBJ, text, &choice).unwrap_err();
@@ -438,6 +510,31 @@ mod tests {
         );
     }
 
+    #[test]
+    fn some_libraries_may_be_missing() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = |name: &str| folder.path().join(name);
+        fs::write(file("a b.mtl"), "\u{FEFF}newmtl body\rKd 1 1 1\r").unwrap();
+        let absent = format!("{}: cannot be read: ", file("other.mtl").display());
+        for (names, expected) in [
+            ("a b.mtl other.mtl", vec![&*absent, "material tyre is not in its MTL files"]),
+            ("other.mtl\t.\\a b.mtl", vec![&absent, "material tyre is not in its MTL files"]),
+            (".\\a b.mtl", vec!["material tyre is not in its MTL files"]),
+        ] {
+            fs::write(file("a.obj"), OBJ.replace("car parts.mtl", names)).unwrap();
+            let otherwise = Material::diffuse(0.9);
+            let all = Materials::load(&file("a.obj"), &from(ColourSource::Mtl), otherwise).unwrap();
+            let found = [1, 3].map(|triangle| all.at(triangle, || DVec3::ZERO).reflectivity);
+            assert_eq!(found, [1.0, 0.9], "{names}");
+            assert_eq!(all.warnings.len(), expected.len(), "{:?}", all.warnings);
+            let begins = all.warnings.iter().zip(expected).all(|(w, start)| w.starts_with(start));
+            assert!(begins, "{:?}", all.warnings);
+        }
+        fs::write(file("a.obj"), OBJ.replace("car parts.mtl", "c.mtl d.mtl")).unwrap();
+        let error = Materials::load(&file("a.obj"), &from(ColourSource::Mtl), WHITE).unwrap_err();
+        assert!(error.to_string().contains("c.mtl: cannot be read"), "{error}");
+    }
+
     #[cfg(feature = "textures")]
     #[test]
     fn an_image_colours_the_faces_of_its_material() {
@@ -445,26 +542,47 @@ mod tests {
         let file = |name: &str| folder.path().join(name);
         // Black on the left, white on the right.
         let pixels = image::GrayImage::from_raw(2, 1, vec![0, 255]).unwrap();
-        pixels.save(file("stripes.png")).unwrap();
+        fs::create_dir(file("in")).unwrap();
+        for name in ["stripes.png", "in/my stripes.png", "stripes.bmp", "stripes.tga"] {
+            image::DynamicImage::from(pixels.clone()).to_rgb8().save(file(name)).unwrap();
+        }
         let corners = "vt 0.25 0.5\nvt 0.75 0.5\nvt 1.25 0.5\n";
         let obj =
             format!("mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\n{corners}usemtl a\nf 1/1 2/2 3/3\n");
         fs::write(file("a.obj"), &obj).unwrap();
-        fs::write(file("m.mtl"), "newmtl a\nKd 1 0 0\nmap_Kd stripes.png\n").unwrap();
-        let choice = from(ColourSource::Mtl);
-        let all = Materials::load(&file("a.obj"), &choice, Material::diffuse(1.0)).unwrap();
-        let at = |x, y, z| all.at(0, || DVec3::new(x, y, z)).reflectivity;
-        // The red part of white.
-        for (found, expected) in [
-            (at(1.0, 0.0, 0.0), 0.0),
-            (at(0.0, 1.0, 0.0), 0.2126),
-            (at(0.0, 0.0, 1.0), 0.0),
-            (at(0.5, 0.5, 0.0), 0.1063),
+        let load = |map: &str| {
+            fs::write(file("m.mtl"), format!("newmtl a\nKd 1 0 0\nmap_Kd {map}\n")).unwrap();
+            Materials::load(&file("a.obj"), &from(ColourSource::Mtl), WHITE)
+        };
+        // The red part of white, and of a grey of 0.5.
+        let (red, grey) = (0.2126, 0.2126 * linear(0.5));
+        let others = "-blendu on -blendv off -bm 1 -boost 2 -cc on -clamp off -imfchan l -o 0 -s 1 1 \
+                      -t 0 0 0 -texres 64 -type sphere stripes.png";
+        for (map, expected) in [
+            ("stripes.png", [0.0, red, 0.0, 0.5 * red]),
+            (others, [0.0, red, 0.0, 0.5 * red]),
+            ("in\\my stripes.png", [0.0, red, 0.0, 0.5 * red]),
+            ("stripes.bmp", [0.0, red, 0.0, 0.5 * red]),
+            ("stripes.tga", [0.0, red, 0.0, 0.5 * red]),
+            // u becomes 2 u + 0.25: 0.75, 1.75, 2.75 and 1.25.
+            ("-s 2 1 1 -o 0.25 0 stripes.png", [red, red, red, 0.0]),
+            ("-o 0.5 stripes.png", [red, 0.0, red, 0.5 * red]),
+            ("-clamp on stripes.png", [0.0, red, red, 0.5 * red]),
+            ("-mm 0.5 0.5 stripes.png", [grey, red, grey, 0.5 * (red + grey)]),
+            ("-mm 0 2 stripes.png", [0.0, red, 0.0, 0.5 * red]),
         ] {
-            assert!((found - expected).abs() < 1e-7, "{found}, not {expected}");
+            let all = load(map).unwrap();
+            assert_eq!(all.warnings, Vec::<String>::new());
+            let places = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::new(0.5, 0.5, 0.0)];
+            let found = places.map(|place| all.at(0, || place).reflectivity);
+            for (found, expected) in found.iter().zip(expected) {
+                assert!((found - expected).abs() < 1e-7, "{map}: {found}, not {expected}");
+            }
         }
+        let turbulent = load("-t 0.1 stripes.png").unwrap();
+        assert_eq!(turbulent.warnings, ["material a: map_Kd -t: turbulence is not applied"]);
         fs::write(file("a.obj"), obj.replace("1/1", "1")).unwrap();
-        let error = Materials::load(&file("a.obj"), &choice, Material::diffuse(1.0)).unwrap_err();
+        let error = load("stripes.png").unwrap_err();
         assert!(error.to_string().ends_with("a face has no texture coordinates"), "{error}");
     }
 

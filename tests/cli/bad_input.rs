@@ -118,3 +118,44 @@ fn what_is_not_there_is_named() {
     );
     assert!(!folder.at("x.npz").exists());
 }
+
+#[test]
+fn a_dataset_inside_the_folder_of_its_meshes_does_not_count() {
+    let folder = Folder::with_meshes();
+    let words = "gen-dataset meshes --out meshes/scans --adapter cpu --format ply --sensor vlp32c";
+    let said = folder.succeeds(words);
+    assert!(said.contains("9 meshes, 0 failed"), "{said}");
+    let said = folder.succeeds(&format!("{words} --overwrite"));
+    assert!(said.contains("9 meshes, 0 failed"), "{said}");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_name_that_is_not_unicode_does_not_stop_the_others() {
+    use std::os::unix::ffi::OsStrExt;
+    let folder = Folder::with_meshes();
+    let name = std::ffi::OsStr::from_bytes(b"ring_\xE9.off");
+    fs::write(folder.at("meshes/ring/train").join(name), crate::meshes::off(8, 0.1)).unwrap();
+    let said = folder.exits(3, "gen-dataset meshes --out out --adapter cpu --sensor vlp32c");
+    assert!(said.contains("9 meshes, 1 failed"), "{said}");
+    assert!(said.contains(r"failed: ring/train/ring_\xE9.off: "), "{said}");
+    assert!(said.contains("the path is not Unicode; rename it"), "{said}");
+}
+
+#[test]
+fn what_is_doubtful_about_meshes_is_told_once() {
+    let folder = Folder::new();
+    // A square with a triangle out of it, and a bow tie.
+    let obj = "v 0 0 0\nv 4 0 0\nv 4 4 0\nv 2 1 0\nv 0 4 0\nf 1 2 3 4 5\nf 1 3 2 5\n";
+    folder.write("meshes/tie/a.obj", obj);
+    let warning = "a.obj: 1 of 2 faces cross themselves, so that their surface is a guess; the \
+                   first is face 2";
+    let said = folder.succeeds("gen-dataset meshes --out out --adapter cpu --up z --sensor vlp32c");
+    assert_eq!(said.matches(&format!("warning: tie/{warning}")).count(), 1, "{said}");
+    assert_eq!(said.matches("split; expected CLASS/NAME").count(), 1, "{said}");
+    let object = "[[object]]\nname = \"one\"\nmesh = \"meshes/tie/a.obj\"\nup = \"z\"\n";
+    let sensor = "[[sensor]]\nprofile = \"vlp32c\"\nposition_m = [1, 0.5, 9]\npitch_deg = 90\n";
+    folder.write("scene.toml", object.to_owned() + &object.replace("one", "two") + sensor);
+    let said = folder.succeeds("scan scene.toml --out scan.npz --adapter cpu");
+    assert_eq!(said.matches(warning).count(), 1, "{said}");
+}

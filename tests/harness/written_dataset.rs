@@ -95,6 +95,7 @@ fn write_mesh(out: &Path, config: &DatasetConfig, entry: &Entry) -> MeshRecord {
         defects: MeshDefects::default(),
         simplified: None,
         scans,
+        warnings: Vec::new(),
     }
 }
 

@@ -1,9 +1,9 @@
 use super::plan::{Plan, chosen};
 use super::{CorruptArgs, Written, usage, write_list};
 use crate::Outcome;
-use crate::gen_dataset::report_failures;
+use crate::gen_dataset::{listed, report_failures};
 use anyhow::Context;
-use edgepuck_dataset::{Corrupted, CorruptedSet, ObjectCorruption, Up, Views, discover};
+use edgepuck_dataset::{Corrupted, CorruptedSet, ObjectCorruption, Up, Views};
 use formats::Split;
 use indicatif::{ProgressBar, ProgressStyle};
 use sim_gpu::Sensor;
@@ -42,7 +42,7 @@ pub(super) fn run(
     let ObjectArgs { views: count, distance: distance_m, points, up } = args.objects;
     let views = Views { count, distance_m, ..Views::ROTATING };
     views.validate().map_err(usage)?;
-    let meshes = discover(folder, args.seed)?;
+    let meshes = listed(folder, args.seed)?;
     let tested = meshes.iter().filter(|entry| entry.split == Split::Test).count();
     anyhow::ensure!(tested > 0, "{}: expected a mesh for testing, found none", folder.display());
     let set = |name: String, corruption: &ObjectCorruption| {

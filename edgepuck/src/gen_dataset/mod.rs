@@ -13,8 +13,8 @@ use anyhow::Context;
 use clap::Parser;
 use clap::error::ErrorKind;
 use edgepuck_dataset::{
-    Begin, DatasetConfig, DatasetError, Layout, Manifest, MeshFailure, Plan, Progress,
-    check_layouts, discover, make, verify,
+    Begin, DatasetConfig, DatasetError, Layout, Manifest, MeshEntry, MeshFailure, Plan, Progress,
+    check_layouts, discover, doubts, make, verify,
 };
 use edgepuck_shapes as shapes;
 use formats::hash::Hashing;
@@ -124,7 +124,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
         None => (write_default_shapes(config.seed)?, PathBuf::from(DEFAULT_OUT)),
     };
     let out = args.out.clone().unwrap_or(default_out);
-    let meshes = discover(&meshes_folder, config.seed)?;
+    let meshes = listed(&meshes_folder, config.seed)?;
     let caster = args.caster.caster()?;
     let plan = Plan {
         part: args.shard.map(|shard| (shard.number, shard.of)),
@@ -177,6 +177,15 @@ fn stop_on_signals(progress: &Progress) -> anyhow::Result<()> {
         signal_hook::flag::register(signal, Arc::clone(&progress.stop))?;
     }
     Ok(())
+}
+
+/// The meshes in `folder`; prints what is odd about its layout.
+pub fn listed(folder: &Path, seed: u64) -> anyhow::Result<Vec<MeshEntry>> {
+    let meshes = discover(folder, seed)?;
+    for doubt in doubts(&meshes) {
+        eprintln!("warning: {}: {doubt}", folder.display());
+    }
+    Ok(meshes)
 }
 
 /// Prints the meshes that failed, with the causes.

@@ -35,7 +35,7 @@ pub fn print(out: &Path, manifest: &Manifest, progress: &Progress, total: Durati
 }
 
 /// Prints the first notes, and how many more there are.
-fn print_notes(notes: &[String]) {
+pub fn print_notes(notes: &[String]) {
     const MOST: usize = 10;
     notes.iter().take(MOST).for_each(|note| eprintln!("{note}"));
     if notes.len() > MOST {

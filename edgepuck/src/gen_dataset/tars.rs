@@ -1,6 +1,6 @@
 //! `gen-dataset --layout webdataset`: makes tars and hands each over when it is complete.
 
-use super::report_failures;
+use super::{report_failures, summary};
 use crate::{Outcome, shell};
 use edgepuck_dataset::{Cut, HandOver, Plan, Progress, Sample, TarRecord, Tars, make_tars};
 use sim_gpu::Caster;
@@ -48,6 +48,7 @@ pub fn run(args: &TarArgs, plan: &Plan, caster: &Caster) -> anyhow::Result<Outco
     let mut failures: Vec<_> = made.tars.iter().flat_map(|tar| tar.failures.clone()).collect();
     failures.sort_by(|p, q| p.source.cmp(&q.source));
     failures.dedup_by(|p, q| p.source == q.source);
+    summary::print_notes(&progress.notes());
     report_failures(&failures);
     let clouds: u64 = made.tars.iter().map(|tar| tar.clouds).sum();
     let bytes: u64 = made.tars.iter().map(|tar| tar.bytes).sum();

@@ -12,7 +12,7 @@ use crate::records;
 
 /// Reads the elements `wanted` of the PLY file in `reader`, which errors call `name`.
 ///
-/// A kind of element is its index in `wanted`. For each kind, `choose` returns the indices of
+/// A kind of element is its index in `wanted`; the file must have the first. For each kind, `choose` returns the indices of
 /// properties. `each` gets the kind and a row for each element: the numbers of the chosen
 /// properties, in the order of the choice. The last of them may be a list, whose numbers end the
 /// row. Other properties and elements are skipped. Memory does not grow with the counts of the
@@ -32,7 +32,12 @@ pub fn read_elements(
     let mut choices = vec![None; header.elements.len()];
     for (kind, wanted) in wanted.iter().enumerate() {
         let at = header.elements.iter().position(|element| element.name == *wanted);
-        let at = at.ok_or_else(|| wrong(wanted, "missing".to_owned()))?;
+        let Some(at) = at else {
+            if kind == 0 {
+                return Err(wrong(wanted, "missing".to_owned()));
+            }
+            continue;
+        };
         let chosen = choose(kind, &header.elements[at]).map_err(|cause| wrong(wanted, cause))?;
         choices[at] = Some((kind, chosen));
     }

@@ -78,7 +78,7 @@ pub use formats::vlp32c::Returns;
 pub use sim_gpu::internals::job::Culling;
 pub use sim_gpu::internals::material::ColourSource;
 pub use sim_gpu::internals::mesh::frame::{Normalize, Unit, Up};
-pub use sim_gpu::internals::mesh::tree::{MeshEntry, discover};
+pub use sim_gpu::internals::mesh::tree::{MeshEntry, discover, doubts};
 pub use sim_gpu::internals::sensor::Views;
 pub use sim_gpu::internals::simplify::Simplify;
 

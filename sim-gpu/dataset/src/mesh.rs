@@ -20,7 +20,7 @@ use sim_gpu::internals::material::{Material, MaterialChoice, MaterialError, Mate
 use sim_gpu::internals::mesh::frame::{Normalize, Unit, Up, to_world};
 use sim_gpu::internals::mesh::tree::MeshEntry;
 use sim_gpu::internals::mesh::validate::triangle_stats;
-use sim_gpu::internals::mesh::{LoadedMesh, TriangleMesh, load_hashed};
+use sim_gpu::internals::mesh::{LoadedMesh, TriangleMesh};
 use sim_gpu::internals::ray::RayFrame;
 use sim_gpu::internals::scan::ObjectHits;
 use sim_gpu::internals::simplify::{Simplified, Viewpoint, resolved_m, simplified_surface};
@@ -54,6 +54,7 @@ pub(crate) fn prepare<'a>(run: &Run<'a>, entry: &MeshEntry) -> Result<Prepared<'
         read(entry, config.up, config.units, config.normalize, config.hash)
     })?;
     let materials = materials(entry, config)?;
+    warnings(&record, materials.as_ref()).for_each(|warning| progress.note(warning));
     let id = record.entry.id();
     let centre = DVec3::from_array(record.views_around);
     let views = run.rig.views(&id, centre);
@@ -104,6 +105,15 @@ fn note_doubts(progress: &Progress, source: &str, scene: &Scene, views: &[View])
     }
 }
 
+/// What is doubtful about the files of a mesh, for the user.
+pub(crate) fn warnings<'a>(
+    record: &'a MeshRecord,
+    materials: Option<&'a Materials>,
+) -> impl Iterator<Item = String> + 'a {
+    let all = record.warnings.iter().chain(materials.into_iter().flat_map(|m| &m.warnings));
+    all.map(|warning| format!("warning: {}: {warning}", record.source))
+}
+
 pub(crate) fn materials(
     entry: &MeshEntry,
     config: &DatasetConfig,
@@ -136,8 +146,9 @@ pub(crate) fn read(
     normalize: Normalize,
     hashing: Hashing,
 ) -> Result<(MeshRecord, TriangleMesh, Vec<u32>), MeshFailure> {
-    let (LoadedMesh { mesh, format, dropped_faces }, hash) = load_hashed(&entry.path, hashing)
-        .map_err(|error| MeshFailure::unreadable(entry, &error))?;
+    let (loaded, hash) =
+        entry.load(hashing).map_err(|error| MeshFailure::unreadable(entry, &error))?;
+    let LoadedMesh { mesh, format, dropped_faces, warnings } = loaded;
     let up = up.unwrap_or(format.default_up());
     let mesh = mesh.in_metres(unit);
     let world = to_world(&mesh, up, normalize);
@@ -160,6 +171,7 @@ pub(crate) fn read(
         defects: stats.defects,
         simplified: None,
         scans: Vec::new(),
+        warnings,
     };
     Ok((record, world.mesh, stats.kept))
 }

@@ -1,7 +1,7 @@
 use crate::clouds::Source;
 use crate::config::{DatasetConfig, Variant, Viewpoints};
 use crate::error::DatasetError;
-use crate::mesh::{materials, read};
+use crate::mesh::{materials, read, warnings};
 use crate::record::{Cloud, Entry};
 use crate::view::{self, Rig, View, patterns};
 use formats::hash::Hashing;
@@ -17,7 +17,7 @@ use sim_gpu::internals::scan::ObjectHits;
 use sim_gpu::internals::sensor::BeamPattern;
 use sim_gpu::internals::target::{Surface, Target};
 use sim_gpu::{Caster, Scene};
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Views of a mesh that are tried until one has enough points.
@@ -34,6 +34,7 @@ pub struct Clouds {
     classes: Vec<String>,
     patterns: Vec<Arc<BeamPattern>>,
     cache: Mutex<Cache>,
+    warnings: Mutex<BTreeSet<String>>,
 }
 
 /// A mesh in memory.
@@ -94,7 +95,8 @@ impl Clouds {
         classes.dedup();
         let is_wanted = |mesh: &&MeshEntry| split.is_none_or(|split| mesh.split == split);
         let meshes = meshes.iter().filter(is_wanted).cloned().collect();
-        Ok(Self { config, variant, meshes, classes, patterns, cache })
+        let warnings = Mutex::default();
+        Ok(Self { config, variant, meshes, classes, patterns, cache, warnings })
     }
 
     /// The number of clouds.
@@ -152,6 +154,13 @@ impl Clouds {
         indices: &[usize],
     ) -> Result<Vec<Labelled>, DatasetError> {
         self.draw_each(caster, seed, indices)?.into_iter().collect()
+    }
+
+    /// What is doubtful about the files of the meshes that were drawn, for the user.
+    #[must_use]
+    pub fn warnings(&self) -> Vec<String> {
+        let told = self.warnings.lock().unwrap_or_else(PoisonError::into_inner);
+        told.iter().cloned().collect()
     }
 
     /// As [`Clouds::draw`], with a result for each cloud.
@@ -284,6 +293,8 @@ impl Clouds {
         let (record, mesh, kept) =
             read(entry, config.up, config.units, config.normalize, Hashing::None)?;
         let materials = materials(entry, config)?;
+        let told = &mut *self.warnings.lock().unwrap_or_else(PoisonError::into_inner);
+        told.extend(warnings(&record, materials.as_ref()));
         // Rays are cast at it in every epoch, which pays for the better tree.
         let target = Target::new(Surface::new(mesh, kept), Builder::Sah);
         let centre = DVec3::from_array(record.views_around);

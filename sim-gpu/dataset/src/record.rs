@@ -55,6 +55,9 @@ pub struct MeshRecord {
     pub simplified: Option<Simplified>,
     /// Its scans: by set in the order of the configuration, then by view.
     pub scans: Vec<ScanRecord>,
+    /// What is doubtful about the file, for the user. Records that come from files have none.
+    #[serde(skip)]
+    pub warnings: Vec<String>,
 }
 
 fn is_origin(position: &[f64; 3]) -> bool {

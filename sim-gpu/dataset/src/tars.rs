@@ -136,6 +136,8 @@ pub fn make_tars(
             Some(cause) => not_handed_over.push((file, cause)),
         }
     }
+    let warnings = makers.iter().flat_map(|maker| maker.clouds.warnings());
+    warnings.for_each(|warning| progress.note(warning));
     if let Some((first, cause)) = not_handed_over.first().cloned() {
         return Err(DatasetError::NotHandedOver { tars: not_handed_over.len(), first, cause });
     }

@@ -39,6 +39,7 @@ pub struct Mesh {
     ready: Arc<OnceLock<Ready>>,
     centre: DVec3,
     scale: f64,
+    warnings: Vec<String>,
 }
 
 /// A mesh that can be cast at.
@@ -61,8 +62,9 @@ impl Mesh {
     /// As [`Mesh::read`], of a file whose upward axis or unit may be another.
     #[doc(hidden)]
     pub fn read_in(path: &Path, up: Option<Up>, unit: Unit) -> Result<Self, Error> {
-        let LoadedMesh { mesh, format, .. } = load(path)?;
-        Ok(Self::upright(mesh.in_metres(unit), up.unwrap_or(format.default_up())))
+        let LoadedMesh { mesh, format, warnings, .. } = load(path)?;
+        let mesh = Self::upright(mesh.in_metres(unit), up.unwrap_or(format.default_up()));
+        Ok(mesh.with_warnings(path, &warnings))
     }
 
     /// A mesh of these vertices, `[n][3]` in metres, z up, and these triangles, `[m][3]` indices of
@@ -141,6 +143,19 @@ impl Mesh {
         self.scale
     }
 
+    /// What is doubtful about the file that it was read from, such as polygons that cross
+    /// themselves: a line each, with the file.
+    #[must_use]
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    pub(super) fn with_warnings(mut self, file: &Path, warnings: &[String]) -> Self {
+        let file = file.display();
+        self.warnings.extend(warnings.iter().map(|warning| format!("{file}: {warning}")));
+        self
+    }
+
     /// The mesh as `normalize` has it; [`Normalize::None`] leaves it as it is.
     #[doc(hidden)]
     #[must_use]
@@ -149,7 +164,8 @@ impl Mesh {
             return self.clone();
         }
         let WorldMesh { mesh, centre, scale } = to_world(self.triangle_mesh(), Up::Z, normalize);
-        Self { centre, scale, recentres: false, ..Self::of(mesh) }
+        let warnings = self.warnings.clone();
+        Self { centre, scale, recentres: false, warnings, ..Self::of(mesh) }
     }
 
     /// A mesh that is cast at as `target`, which stands `centre` away from where the mesh does.
@@ -202,7 +218,8 @@ impl Mesh {
 
     fn with(triangles: OnceLock<TriangleMesh>, ready: OnceLock<Ready>) -> Self {
         let (triangles, ready) = (Arc::new(triangles), Arc::new(ready));
-        Self { triangles, recentres: true, ready, centre: DVec3::ZERO, scale: 1.0 }
+        let (centre, scale, warnings) = (DVec3::ZERO, 1.0, vec![]);
+        Self { triangles, recentres: true, ready, centre, scale, warnings }
     }
 
     fn of(triangles: TriangleMesh) -> Self {

@@ -10,6 +10,7 @@ use crate::simplify::Simplified;
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, AttributeSet};
 use glam::{DAffine3, DVec3};
+use std::collections::HashSet;
 use std::ops::{Index, IndexMut};
 use std::path::Path;
 use std::sync::Arc;
@@ -156,6 +157,14 @@ impl Scene {
     #[must_use]
     pub fn instances(&self) -> &[Instance] {
         &self.instances
+    }
+
+    /// What is doubtful about the files of its meshes and materials: each line once, with the file.
+    #[must_use]
+    pub fn warnings(&self) -> Vec<&str> {
+        let all = self.instances.iter().flat_map(|instance| instance.mesh.warnings());
+        let mut told = HashSet::new();
+        all.map(String::as_str).filter(|warning| told.insert(*warning)).collect()
     }
 
     /// The handles of the instances, in their order.

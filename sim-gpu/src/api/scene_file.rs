@@ -24,6 +24,9 @@ impl TryFrom<&SceneFile> for Scene {
         scene.sensors = file.sensors.iter().map(MountedSensor::from).collect();
         for object in &file.objects {
             let (mesh, simplified) = mesh(file, object)?;
+            let materials = materials(object)?;
+            let warnings = materials.as_ref().map_or(&[][..], |materials| &materials.warnings);
+            let mesh = mesh.with_warnings(&object.mesh, warnings);
             let pose = Pose { position_m: object.position_m, rotation: object.rotation };
             let id = scene.add(mesh, pose);
             scene[id] = Instance {
@@ -33,7 +36,7 @@ impl TryFrom<&SceneFile> for Scene {
                 label: object.label.clone(),
                 reflectivity: object.reflectivity,
                 retroreflection: object.retroreflection,
-                materials: materials(object)?.map(Arc::new),
+                materials: materials.map(Arc::new),
                 simplified,
                 ..scene[id].clone()
             };
@@ -58,20 +61,21 @@ fn materials(object: &SceneObject) -> Result<Option<Materials>, Error> {
 
 /// The mesh of `object`, and what simplification made of it if it was asked for.
 fn mesh(file: &SceneFile, object: &SceneObject) -> Result<(Mesh, Option<Simplified>), Error> {
-    let LoadedMesh { mesh, format, .. } = load(&object.mesh)?;
+    let LoadedMesh { mesh, format, warnings, .. } = load(&object.mesh)?;
     let mesh = mesh.in_metres(object.units);
     let up = object.up.unwrap_or(format.default_up());
     let normalize = object.normalize.unwrap_or(Normalize::None);
-    match file.simplify_of(object) {
-        None => Ok((Mesh::upright(mesh, up).normalized(normalize), None)),
+    let (mesh, simplified) = match file.simplify_of(object) {
+        None => (Mesh::upright(mesh, up).normalized(normalize), None),
         Some(simplify) => {
             let world = to_world(&mesh, up, normalize);
             // A mesh that is not scaled keeps its own origin.
             let centre = if normalize == Normalize::None { world.centre } else { DVec3::ZERO };
             let (target, simplified) = simplified(file, object, simplify, world.mesh, centre)?;
-            Ok((Mesh::from_target(target, centre), Some(simplified)))
+            (Mesh::from_target(target, centre), Some(simplified))
         }
-    }
+    };
+    Ok((mesh.with_warnings(&object.mesh, &warnings), simplified))
 }
 
 fn simplified(

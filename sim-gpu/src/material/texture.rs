@@ -1,27 +1,29 @@
 //! Images of materials.
 
-use std::path::Path;
+use crate::mesh::ColourMap;
 
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Texture {
+    map: ColourMap,
     width: usize,
     /// By row, from the top.
     luminance: Vec<f32>,
 }
 
 impl Texture {
-    /// Reads the PNG or JPEG file at `path`; `luminance` is that of an sRGB colour.
+    /// Reads the BMP, JPEG, PNG or TGA file of `map`; `luminance` is that of an sRGB colour.
     #[cfg(feature = "textures")]
-    pub fn load(path: &Path, luminance: impl Fn([f64; 3]) -> f64) -> Result<Self, String> {
+    pub fn load(map: &ColourMap, luminance: impl Fn([f64; 3]) -> f64) -> Result<Self, String> {
         let failed = |error: &dyn std::error::Error| format!("cannot be read: {error}");
-        let reader = image::ImageReader::open(path).map_err(|error| failed(&error))?;
+        let reader = image::ImageReader::open(&map.image).map_err(|error| failed(&error))?;
         let reader = reader.with_guessed_format().map_err(|error| failed(&error))?;
         let pixels = reader.decode().map_err(|error| failed(&error))?.into_rgb8();
         // A table of the 256 values of each channel.
         let weight = |channel: usize| -> [f64; 256] {
             std::array::from_fn(|value| {
                 let mut colour = [0.0; 3];
-                colour[channel] = value as f64 / 255.0;
+                let part = map.base + map.gain * value as f64 / 255.0;
+                colour[channel] = part.clamp(0.0, 1.0);
                 luminance(colour)
             })
         };
@@ -29,21 +31,27 @@ impl Texture {
         let of = |image::Rgb([r, g, b]): &image::Rgb<u8>| {
             (red[usize::from(*r)] + green[usize::from(*g)] + blue[usize::from(*b)]) as f32
         };
-        Ok(Self { width: pixels.width() as usize, luminance: pixels.pixels().map(of).collect() })
+        let luminance = pixels.pixels().map(of).collect();
+        Ok(Self { map: map.clone(), width: pixels.width() as usize, luminance })
     }
 
     /// An error: this build reads no images.
     #[cfg(not(feature = "textures"))]
-    pub fn load(_: &Path, _: impl Fn([f64; 3]) -> f64) -> Result<Self, String> {
+    pub fn load(_: &ColourMap, _: impl Fn([f64; 3]) -> f64) -> Result<Self, String> {
         Err("this build reads no images: build with `--features textures`".to_owned())
     }
 
-    /// The luminance at `u` to the right and `v` upwards in the repeated image, whose sides are 1,
-    /// interpolated between the centres of pixels.
+    /// The luminance at the texture coordinates `u` to the right and `v` upwards, interpolated
+    /// between the centres of pixels. The sides of the image are 1; it repeats unless it is clamped.
     pub fn at(&self, u: f64, v: f64) -> f64 {
         let (width, height) = (self.width, self.luminance.len() / self.width);
-        let (column, right) = between(u, width);
-        let (row, down) = between(1.0 - v, height);
+        let ColourMap { scale, offset, is_clamped, .. } = self.map;
+        let between = |at: f64, n: usize| {
+            let margin = 0.5 / n as f64;
+            between(if is_clamped { at.clamp(margin, 1.0 - margin) } else { at }, n)
+        };
+        let (column, right) = between(u * scale[0] + offset[0], width);
+        let (row, down) = between(1.0 - (v * scale[1] + offset[1]), height);
         let pixel = |row: usize, column: usize| {
             f64::from(self.luminance[row % height * width + column % width])
         };
@@ -67,7 +75,8 @@ mod tests {
 
     #[test]
     fn an_image_is_read_between_its_pixels_and_repeats() {
-        let image = Texture { width: 2, luminance: vec![0.0, 1.0, 0.5, 0.25] };
+        let map = ColourMap::of("".into());
+        let mut image = Texture { map, width: 2, luminance: vec![0.0, 1.0, 0.5, 0.25] };
         // At the centres of pixels: the upper row is at v = 0.75.
         for ([u, v], expected) in [
             ([0.25, 0.75], 0.0),
@@ -84,5 +93,9 @@ mod tests {
         }
         let edge = image.at(1.0 - f64::EPSILON / 2.0, 1e300);
         assert!((0.0..=1.0).contains(&edge), "{edge}");
+        image.map.is_clamped = true;
+        for ([u, v], expected) in [([-9.0, 9.0], 0.0), ([9.0, 0.5], 0.625), ([0.5, 0.75], 0.5)] {
+            assert_eq!(image.at(u, v), expected, "at {u}, {v}");
+        }
     }
 }

@@ -1,36 +1,36 @@
 //! The colours of an OBJ file and its MTL files.
 //!
 //! The geometry is read without them ([`super::load()`]); this is a second pass, if materials are
-//! requested. (tobj's own reader of MTL panics if a colour lacks a number.)
+//! requested.
 
 use std::path::{Path, PathBuf};
 
 use super::error::{Malformed, MeshError, ParseError};
+use super::foreign::foreign;
 use super::format::MeshFormat;
 use super::load::read;
-use super::obj::{data, for_each_line, words};
+use super::obj::{self, for_each_line, index, words};
+use super::polygon::fan;
+use super::tokens::without_mark;
+use super::triangle_mesh::recut;
 
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Appearance {
-    /// The MTL files, as the OBJ file names them.
+    /// The rests of the lines `mtllib`, each of which names one or more MTL files.
     pub libraries: Vec<String>,
     /// The names of the materials, in the order of their first use.
     pub names: Vec<String>,
-    /// By triangle of the mesh.
-    pub triangles: Vec<Face>,
+    /// The index of the material's name, by triangle of the mesh.
+    pub materials: Vec<Option<u32>>,
+    /// The vertices of the file at the corners, by triangle.
+    pub vertices: Vec<[u32; 3]>,
+    /// The indices of texture coordinates at the corners, by triangle.
+    pub textures: Vec<[Option<u32>; 3]>,
     /// The colour of each vertex of the file, if any: red, green and blue, sRGB.
     pub colours: Vec<Option<[f64; 3]>>,
     /// `vt`: coordinates from the lower left corner of an image, whose sides are 1.
     pub texture_coordinates: Vec<[f64; 2]>,
-}
-
-/// The colouring of one triangle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Face {
-    /// The index of its material's name.
-    pub material: Option<u32>,
-    pub vertices: [u32; 3],
-    pub texture: Option<[u32; 3]>,
+    current: Option<u32>,
 }
 
 /// A material of an MTL file.
@@ -41,7 +41,32 @@ pub(crate) struct Colour {
     /// `Kd`: red, green and blue, sRGB, 0 to 1.
     pub diffuse: Option<[f64; 3]>,
     /// `map_Kd`: the image of its colours.
-    pub image: Option<PathBuf>,
+    pub image: Option<ColourMap>,
+}
+
+/// An image of colours, and how it lies on the surface.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct ColourMap {
+    pub image: PathBuf,
+    /// `-s`: texture coordinates are multiplied by it.
+    pub scale: [f64; 2],
+    /// `-o`: it is then added to texture coordinates.
+    pub offset: [f64; 2],
+    /// `-mm`: a part x of a colour, 0 to 1, becomes base + gain x.
+    pub base: f64,
+    pub gain: f64,
+    /// `-clamp on`: the image does not repeat.
+    pub is_clamped: bool,
+    /// `-t`: the coordinates are disturbed at random, which is not done.
+    pub is_turbulent: bool,
+}
+
+impl ColourMap {
+    /// An image as it is.
+    pub fn of(image: PathBuf) -> Self {
+        let (scale, offset, base, gain) = ([1.0; 2], [0.0; 2], 0.0, 1.0);
+        Self { image, scale, offset, base, gain, is_clamped: false, is_turbulent: false }
+    }
 }
 
 impl Appearance {
@@ -54,24 +79,28 @@ impl Appearance {
     }
 
     fn parse(bytes: &[u8]) -> Result<Self, ParseError> {
-        let (mut found, mut current) = (Self::default(), None);
-        for_each_line(bytes, |number, line, _| {
-            match keyed(line) {
-                (b"mtllib", library) => found.libraries.push(text(library)),
-                (b"usemtl", name) => current = Some(found.place_of(text(name))),
-                (b"v", position) => found.colours.push(colour_of(position)),
-                (b"vt", at) => {
-                    let at = texture_coordinate(at).map_err(|cause| cause.at(number))?;
-                    found.texture_coordinates.push(at);
-                }
-                (b"f", corners) => {
-                    found.add_face(corners, current).map_err(|cause| cause.at(number))?;
-                }
-                _ => {}
-            }
-            Ok(())
-        })?;
+        let mut found = Self::default();
+        let mut parsed = obj::read(without_mark(bytes), |key, rest| found.add(key, rest))?;
+        parsed.cut_polygons(|triangles, cuts| recut(&mut found.textures[triangles], cuts));
+        found.vertices = parsed.mesh.triangles;
         Ok(found)
+    }
+
+    fn add(&mut self, key: &[u8], rest: &[u8]) -> Result<(), Malformed> {
+        match key {
+            b"mtllib" => self.libraries.push(text(rest)),
+            b"usemtl" => self.current = Some(self.place_of(text(rest))),
+            b"v" => self.colours.push(colour_of(rest)),
+            b"vt" => self.texture_coordinates.push(texture_coordinate(rest)?),
+            b"f" => {
+                let textures = words(rest).map(|word| self.texture(word));
+                let textures: Vec<_> = textures.collect::<Result<_, _>>()?;
+                self.textures.extend(fan(&textures));
+                self.materials.resize(self.textures.len(), self.current);
+            }
+            _ => {}
+        }
+        Ok(())
     }
 
     fn place_of(&mut self, name: String) -> u32 {
@@ -82,24 +111,12 @@ impl Appearance {
         place as u32
     }
 
-    /// Appends a face as the reader of the geometry does: as a fan around its first corner.
-    fn add_face(&mut self, corners: &[u8], material: Option<u32>) -> Result<(), Malformed> {
-        let (mut vertices, mut textures) = (Vec::new(), Vec::new());
-        for corner in words(corners) {
-            let mut parts = corner.split(|&byte| byte == b'/');
-            let vertex = parts.next().unwrap_or_default();
-            vertices.push(index(vertex, self.colours.len())?);
-            if let Some(texture) = parts.next().filter(|part| !part.is_empty()) {
-                textures.push(index(texture, self.texture_coordinates.len())?);
-            }
-        }
-        let has_texture = textures.len() == vertices.len();
-        self.triangles.extend((2..vertices.len()).map(|i| Face {
-            material,
-            vertices: [vertices[0], vertices[i - 1], vertices[i]],
-            texture: has_texture.then(|| [textures[0], textures[i - 1], textures[i]]),
-        }));
-        Ok(())
+    /// The index of the texture coordinates of a corner, if it has some.
+    fn texture(&self, corner: &[u8]) -> Result<Option<u32>, Malformed> {
+        let word = corner.split(|&byte| byte == b'/').nth(1).filter(|word| !word.is_empty());
+        let n = self.texture_coordinates.len();
+        let outside = |word| Malformed::expected(&format!("an index of 1..={n} vt"), word);
+        word.map(|word| index(word, n, n)?.ok_or_else(|| outside(word))).transpose()
     }
 }
 
@@ -109,29 +126,20 @@ pub(crate) fn colours(path: &Path) -> Result<Vec<Colour>, MeshError> {
 }
 
 fn parse_colours(bytes: &[u8], library: &Path) -> Result<Vec<Colour>, ParseError> {
+    if let Some(error) = foreign(bytes, "materials") {
+        return Err(error);
+    }
     let mut colours: Vec<Colour> = Vec::new();
-    for_each_line(bytes, |number, line, _| {
-        let (key, value) = keyed(line);
+    for_each_line(without_mark(bytes), |key, value| {
         match (key, colours.last_mut()) {
             (b"newmtl", _) => {
                 let (name, library) = (text(value), library.to_owned());
                 colours.push(Colour { name, library, diffuse: None, image: None });
             }
-            (b"Kd", Some(colour)) => {
-                colour.diffuse = Some(srgb(value).map_err(|cause| cause.at(number))?);
-            }
-            (b"map_Kd", Some(colour)) => {
-                if value.starts_with(b"-") {
-                    return Err(
-                        Malformed::expected("a file without options as map_Kd", value).at(number)
-                    );
-                }
-                let folder = library.parent().unwrap_or(Path::new(""));
-                colour.image = Some(folder.join(text(value).replace('\\', "/")));
-            }
+            (b"Kd", Some(colour)) => colour.diffuse = Some(srgb(value)?),
+            (b"map_Kd", Some(colour)) => colour.image = Some(colour_map(value, library)?),
             (b"Kd" | b"map_Kd", None) => {
-                let cause = Malformed::expected("newmtl and a name before it", line);
-                return Err(cause.at(number));
+                return Err(Malformed::expected("newmtl and a name before it", key));
             }
             _ => {}
         }
@@ -140,15 +148,67 @@ fn parse_colours(bytes: &[u8], library: &Path) -> Result<Vec<Colour>, ParseError
     Ok(colours)
 }
 
-fn malformed(path: &Path) -> impl Fn(ParseError) -> MeshError {
-    |ParseError { line, cause }| MeshError::Malformed { path: path.into(), line, cause }
+/// Reads the options and the file of `map_Kd`, as the specification of MTL lists them.
+fn colour_map(value: &[u8], library: &Path) -> Result<ColourMap, Malformed> {
+    let mut map = ColourMap::of(PathBuf::new());
+    let mut rest = value;
+    while rest.starts_with(b"-") {
+        let option = next_word(&mut rest);
+        // Of three numbers, the last two may be missing.
+        let (least, most) = match option {
+            b"-s" | b"-o" | b"-t" => (1, 3),
+            b"-mm" => (2, 2),
+            b"-bm" | b"-boost" | b"-texres" => (1, 1),
+            b"-blendu" | b"-blendv" | b"-cc" | b"-clamp" | b"-imfchan" | b"-type" => (0, 0),
+            _ => return Err(Malformed::expected("an option of map_Kd", option)),
+        };
+        let mut given = Vec::new();
+        while given.len() < most {
+            let mut after = rest;
+            let number =
+                numbers(next_word(&mut after)).and_then(|numbers| numbers.first().copied());
+            let Some(number) = number else { break };
+            given.push(number);
+            rest = after;
+        }
+        let pair = |missing: f64| [given[0], *given.get(1).unwrap_or(&missing)];
+        match option {
+            _ if given.len() < least => {
+                let expected = format!("{least} numbers after {}", text(option));
+                return Err(Malformed::expected(&expected, rest));
+            }
+            b"-s" => map.scale = pair(1.0),
+            b"-o" => map.offset = pair(0.0),
+            b"-mm" => [map.base, map.gain] = pair(1.0),
+            b"-t" => map.is_turbulent = given.iter().any(|number| *number != 0.0),
+            b"-clamp" => map.is_clamped = next_word(&mut rest) == b"on",
+            // The others say how to filter the image, or are for other maps.
+            _ if most == 0 => drop(next_word(&mut rest)),
+            _ => {}
+        }
+    }
+    if rest.is_empty() {
+        return Err(Malformed::expected("a file as map_Kd", value));
+    }
+    map.image = library.with_file_name(file_name(&text(rest)));
+    Ok(map)
 }
 
-/// The first word and the rest of a line.
-fn keyed(line: &[u8]) -> (&[u8], &[u8]) {
-    let data = data(line).trim_ascii();
-    let end = data.iter().position(u8::is_ascii_whitespace).unwrap_or(data.len());
-    (&data[..end], data[end..].trim_ascii())
+/// The path of a file by its name in another file, where Windows has backslashes.
+pub(crate) fn file_name(name: &str) -> PathBuf {
+    name.replace('\\', "/").into()
+}
+
+/// Takes the first word of a line, which begins with one, and the blanks after it.
+fn next_word<'a>(line: &mut &'a [u8]) -> &'a [u8] {
+    let end = line.iter().position(u8::is_ascii_whitespace).unwrap_or(line.len());
+    let (word, rest) = line.split_at(end);
+    *line = rest.trim_ascii_start();
+    word
+}
+
+fn malformed(path: &Path) -> impl Fn(ParseError) -> MeshError {
+    |ParseError { line, cause }| MeshError::Malformed { path: path.into(), line, cause }
 }
 
 /// A name, which may hold spaces.
@@ -189,15 +249,20 @@ fn srgb(value: &[u8]) -> Result<[f64; 3], Malformed> {
     }
 }
 
-/// Converts an index of an OBJ file, from 1 or, if negative, from the end, to one from 0.
-fn index(word: &[u8], n: usize) -> Result<u32, Malformed> {
-    let number: Option<i64> = std::str::from_utf8(word).ok().and_then(|word| word.parse().ok());
-    let found = match number {
-        Some(number @ 1..) => Some(number - 1),
-        Some(number @ ..=-1) => Some(number + n as i64),
-        _ => None,
-    };
-    let fits = found.filter(|&found| (0..n as i64).contains(&found));
-    fits.map(|found| found as u32)
-        .ok_or_else(|| Malformed::expected(&format!("an index within 1..={n}"), word))
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn corners_keep_their_textures_and_materials_when_a_polygon_is_cut() {
+        let obj = "v 0 0 0\nv 4 0 0\nv 4 4 0\nv 2 1 0\nv 0 4 0\nvt 9\nvt 0\nvt 1\nvt 2\nvt 3\nvt 4\n\
+                   f 1 2 3\nusemtl a\nf 1/2 2/3 3/4 4/5 5/6\n";
+        let found = Appearance::parse(obj.as_bytes()).unwrap();
+        assert_eq!(found.materials, [None, Some(0), Some(0), Some(0)]);
+        assert_eq!(found.textures[0], [None; 3]);
+        assert_ne!(found.vertices[1..], [[0, 1, 2], [0, 2, 3], [0, 3, 4]]);
+        for (vertices, textures) in found.vertices.iter().zip(&found.textures).skip(1) {
+            assert_eq!(*textures, vertices.map(|vertex| Some(vertex + 1)));
+        }
+    }
 }

@@ -31,6 +31,12 @@ pub enum MeshError {
         /// The requested file.
         path: PathBuf,
     },
+    /// The path of a mesh of a dataset is not Unicode, and so cannot be stored in a manifest.
+    #[error("{}: the path is not Unicode; rename it", path.display())]
+    NotUnicode {
+        /// The file.
+        path: PathBuf,
+    },
     /// The file was read but is not a mesh.
     #[error("{}{}: {cause}", path.display(), line.map(|line| format!(":{line}")).unwrap_or_default())]
     Malformed {

@@ -85,6 +85,17 @@ impl Unit {
     }
 }
 
+impl TriangleMesh {
+    /// The same mesh in metres, from coordinates in this unit.
+    #[must_use]
+    pub fn in_metres(mut self, unit: Unit) -> Self {
+        if unit != Unit::Metre {
+            self.vertices.iter_mut().for_each(|vertex| *vertex *= unit.metres());
+        }
+        self
+    }
+}
+
 /// A mesh around the origin, and its transform: `vertex = (position - centre) * scale`, where
 /// `position` is that of the file, turned z up.
 #[derive(Clone, Debug, PartialEq)]

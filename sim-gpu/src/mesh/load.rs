@@ -6,7 +6,9 @@ use std::path::Path;
 use formats::hash::{FileHash, Hashing};
 
 use super::error::{Malformed, MeshError, ParseError};
+use super::foreign::foreign;
 use super::format::MeshFormat;
+use super::tokens::without_mark;
 use super::triangle_mesh::{Parsed, TriangleMesh};
 use super::{obj, off, ply, stl};
 
@@ -20,6 +22,8 @@ pub struct LoadedMesh {
     pub format: MeshFormat,
     /// The number of faces of fewer than three corners, which were dropped.
     pub dropped_faces: usize,
+    /// What is doubtful about the file, for the user.
+    pub warnings: Vec<String>,
 }
 
 /// Reads the mesh at `path`, in the format of its extension.
@@ -36,22 +40,25 @@ pub fn load_hashed(
         MeshFormat::from_path(path).ok_or_else(|| MeshError::UnknownFormat { path: path.into() });
     let bytes = read(path)?;
     let format = format?;
-    let Parsed { mesh, dropped_faces } = parse(&bytes, format).map_err(|error| {
+    let Parsed { mesh, dropped_faces, warnings, .. } = parse(&bytes, format).map_err(|error| {
         MeshError::Malformed { path: path.into(), line: error.line, cause: error.cause }
     })?;
-    Ok((LoadedMesh { mesh, format, dropped_faces }, hashing.of_bytes(&bytes)))
+    Ok((LoadedMesh { mesh, format, dropped_faces, warnings }, hashing.of_bytes(&bytes)))
 }
 
 /// Reads a mesh of `format` from a file's bytes.
 pub fn parse(bytes: &[u8], format: MeshFormat) -> Result<Parsed, ParseError> {
+    let text = without_mark(bytes);
     let parsed = match format {
         _ if bytes.is_empty() => Err(Malformed::Empty.into()),
-        MeshFormat::Off => off::parse(bytes),
-        MeshFormat::Obj => obj::parse(bytes),
-        MeshFormat::Ply => ply::parse(bytes),
+        MeshFormat::Off => off::parse(text),
+        MeshFormat::Obj => obj::parse(text),
+        MeshFormat::Ply => ply::parse(text),
         MeshFormat::Stl => stl::parse(bytes),
-    }?;
-    check(&parsed.mesh)?;
+    };
+    let checked = parsed.and_then(|parsed| check(&parsed.mesh).map(|()| parsed));
+    let mut parsed = checked.map_err(|error| foreign(bytes, "a mesh").unwrap_or(error))?;
+    parsed.cut_polygons(|_, _| ());
     Ok(parsed)
 }
 
@@ -118,6 +125,76 @@ mod tests {
         let extension = "notes.txt: expected one of the extensions off, obj, ply, stl";
         assert_eq!(message("notes.txt"), extension);
         assert!(message("missing.off").starts_with("missing.off: cannot be read: "));
+    }
+
+    #[test]
+    fn concave_polygons_are_cut_in_every_format() {
+        let corners = "0 0 0\n4 0 0\n4 4 0\n2 1 0\n0 4 0\n";
+        let off = format!("OFF\n5 1 0\n{corners}5 0 1 2 3 4\n");
+        let obj = corners.replace("0\n", "0\nv ");
+        let obj = format!("v {}f 1 2 3 4 5\n", obj.trim_end_matches("v "));
+        let ply = format!(
+            "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_index\n\
+             element vertex 5\nproperty float x\nproperty float y\nproperty float z\n\
+             end_header\n5 0 1 2 3 4\n{corners}"
+        );
+        for (text, format) in
+            [(off, MeshFormat::Off), (obj, MeshFormat::Obj), (ply, MeshFormat::Ply)]
+        {
+            let parsed = parse(text.as_bytes(), format).unwrap();
+            let TriangleMesh { vertices, triangles } = &parsed.mesh;
+            let area = |corners: &[u32; 3]| {
+                let [a, b, c] = corners.map(|corner| vertices[corner as usize]);
+                0.5 * (b - a).cross(c - a).length()
+            };
+            // By hand: a square of 16 less a triangle of 6.
+            assert_eq!(triangles.iter().map(area).sum::<f64>(), 10.0, "{format}");
+            assert_eq!((triangles.len(), &parsed.warnings[..]), (3, &[][..]));
+        }
+    }
+
+    #[test]
+    fn text_may_begin_with_a_byte_order_mark() {
+        let stl = "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n\
+                   endloop\nendfacet\nendsolid\n";
+        let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
+                   property float z\nelement face 1\nproperty list uchar int vertex_index\n\
+                   end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+        let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+        for (text, format) in MeshFormat::ALL
+            .into_iter()
+            .zip([TRIANGLE, obj, ply, stl])
+            .map(|(format, text)| (text, format))
+        {
+            let plain = parse(text.as_bytes(), format);
+            assert!(plain.is_ok(), "{plain:?}");
+            assert_eq!(parse(format!("\u{FEFF}{text}").as_bytes(), format), plain);
+            // Line ends of old Macintoshes.
+            assert_eq!(parse(text.replace('\n', "\r").as_bytes(), format), plain);
+        }
+    }
+
+    #[test]
+    fn other_kinds_of_files_are_named() {
+        let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 3\n";
+        let wide =
+            |of: fn(u16) -> [u8; 2]| "v 0 0 0\n".encode_utf16().flat_map(of).collect::<Vec<_>>();
+        let marked = |mark: [u8; 2], of| [mark.to_vec(), wide(of)].concat();
+        for (bytes, found) in [
+            (pointer.into(), "a Git LFS pointer: fetch the file by `git lfs pull`"),
+            (wide(u16::to_le_bytes), "text in UTF-16: save it as UTF-8"),
+            (wide(u16::to_be_bytes), "text in UTF-16: save it as UTF-8"),
+            (marked([0xFF, 0xFE], u16::to_le_bytes), "text in UTF-16: save it as UTF-8"),
+            (marked([0xFE, 0xFF], u16::to_be_bytes), "text in UTF-16: save it as UTF-8"),
+            (b"\x1F\x8B\x08\0".to_vec(), "a compressed file: unpack it"),
+            (b"PK\x03\x04\0".to_vec(), "a compressed file: unpack it"),
+            (b"<!DOCTYPE html>\n".to_vec(), "a web page"),
+        ] {
+            for format in MeshFormat::ALL {
+                let error = parse(&bytes, format).unwrap_err().to_string();
+                assert_eq!(error, format!("expected a mesh, found {found}"), "{format}");
+            }
+        }
     }
 
     #[test]

@@ -2,12 +2,14 @@
 
 mod appearance;
 mod error;
+mod foreign;
 mod format;
 pub mod frame;
 mod load;
 mod obj;
 mod off;
 mod ply;
+mod polygon;
 mod stl;
 #[cfg(test)]
 mod testing;
@@ -17,7 +19,7 @@ mod triangle_mesh;
 pub mod unit_frame;
 pub mod validate;
 
-pub(crate) use appearance::{Appearance, Colour, Face, colours};
+pub(crate) use appearance::{Appearance, Colour, ColourMap, colours, file_name};
 pub use error::{Malformed, MeshError, ParseError};
 pub use format::{MeshFormat, mesh_extensions};
 pub use load::{LoadedMesh, check, load, load_hashed, parse};

@@ -1,181 +1,119 @@
-//! Wavefront OBJ, through the crate tobj.
+//! Wavefront OBJ: positions and faces.
 //!
-//! tobj is given positions and faces only. Groups, materials, normals and texture coordinates do
-//! not matter to a beam, but would split the mesh into several models, or make it fail. Lines keep
-//! their numbers, so that errors can name them.
-
-use std::io::{BufRead, Cursor};
+//! Groups, materials, normals and texture coordinates do not matter to a beam: faults in them are
+//! no faults of the mesh.
 
 use glam::DVec3;
-use tobj::{LoadError, LoadOptions};
 
 use super::error::{Malformed, ParseError, excerpt};
-use super::triangle_mesh::{Parsed, TriangleMesh};
+use super::tokens::{coordinate, integer, lines};
+use super::triangle_mesh::Parsed;
 
 /// All objects become one mesh. It has the vertices that faces refer to, in the order of their
 /// first use.
 pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, ParseError> {
-    let geometry = Geometry::parse(bytes)?;
-    let options = LoadOptions {
-        triangulate: true,
-        ignore_points: true,
-        ignore_lines: true,
-        ..LoadOptions::default()
-    };
-    let mut text = Cursor::new(&geometry.text);
-    let no_materials = |_: &std::path::Path| Err(LoadError::OpenFileFailed);
-    let models = match tobj::load_obj_buf(&mut text, &options, no_materials) {
-        Ok((models, _)) => models,
-        Err(error) => return Err(geometry.blame(error, text.position() as usize)),
-    };
-    let mut parsed = Parsed { dropped_faces: geometry.dropped_faces, ..Parsed::default() };
-    for model in models {
-        append(&mut parsed.mesh, &model.mesh);
+    let mut parsed = read(bytes, |_, _| Ok(()))?;
+    let (mut used, mesh) = (Vec::new(), &mut parsed.mesh);
+    let mut places = vec![u32::MAX; mesh.vertices.len()];
+    for corner in mesh.triangles.as_flattened_mut() {
+        let place = &mut places[*corner as usize];
+        if *place == u32::MAX {
+            *place = used.len() as u32;
+            used.push(mesh.vertices[*corner as usize]);
+        }
+        *corner = *place;
     }
+    mesh.vertices = used;
     Ok(parsed)
 }
 
-fn append(mesh: &mut TriangleMesh, model: &tobj::Mesh) {
-    let base = mesh.vertices.len() as u32;
-    mesh.vertices.extend(model.positions.as_chunks().0.iter().copied().map(DVec3::from_array));
-    let corners = model.indices.as_chunks::<3>().0;
-    mesh.triangles.extend(corners.iter().map(|corners| corners.map(|index| base + index)));
+/// Reads the mesh with all vertices of the file. `also` gets the first word and the rest of each
+/// line, without a comment.
+pub(super) fn read(
+    bytes: &[u8],
+    mut also: impl FnMut(&[u8], &[u8]) -> Result<(), Malformed>,
+) -> Result<Parsed, ParseError> {
+    // Faces may refer to later vertices.
+    let mut n_vertices = 0;
+    for_each_line(bytes, |key, _| {
+        n_vertices += usize::from(key == b"v");
+        Ok(())
+    })?;
+    Malformed::check_vertex_count(n_vertices as u64)?;
+    let (mut parsed, mut corners) = (Parsed::default(), Vec::new());
+    for_each_line(bytes, |key, rest| {
+        match key {
+            b"v" => parsed.mesh.vertices.push(position(rest)?),
+            b"f" => {
+                corners.clear();
+                for word in words(rest) {
+                    let corner = word.split(|&byte| byte == b'/').next().unwrap_or_default();
+                    let index = index(corner, parsed.mesh.vertices.len(), n_vertices)?;
+                    let outside = || Malformed::IndexOutOfRange {
+                        found: excerpt(corner),
+                        n_vertices: n_vertices as u64,
+                    };
+                    corners.push(index.ok_or_else(outside)?);
+                }
+                parsed.add_face(&corners);
+            }
+            _ => {}
+        }
+        also(key, rest)
+    })?;
+    Ok(parsed)
 }
 
-/// Calls a function for each line, with its number from 1 and the number of lines of the file that
-/// it takes: a backslash at the end continues a line on the next one.
+/// Reads x, y, z and, if nothing else follows, the weight; not colours.
+fn position(rest: &[u8]) -> Result<DVec3, Malformed> {
+    let mut words = words(rest);
+    let mut next = |n| {
+        let short = || Malformed::Syntax(format!("expected 3 coordinates of a vertex, found {n}"));
+        coordinate(words.next().ok_or_else(short)?)
+    };
+    let position = DVec3::new(next(0)?, next(1)?, next(2)?);
+    let (Some(word), None) = (words.next(), words.next()) else { return Ok(position) };
+    let weight = coordinate(word).ok().filter(|weight| *weight != 0.0);
+    let wrong = || Malformed::expected("a weight other than 0", word);
+    Ok(position / weight.ok_or_else(wrong)?)
+}
+
+/// Converts an index, from 1 or, if negative, from the end of the `n_before` items so far, to one
+/// from 0, if there are more than it of `n` items.
+pub(super) fn index(word: &[u8], n_before: usize, n: usize) -> Result<Option<u32>, Malformed> {
+    let number = integer(word, "an index")?;
+    let from_0 = if number < 0 { number + n_before as i64 } else { number - 1 };
+    Ok(u32::try_from(from_0).ok().filter(|index| (*index as usize) < n))
+}
+
+/// Calls a function for each line, with its first word and the rest without a comment. A backslash
+/// at the end of a line continues it on the next one.
 pub(super) fn for_each_line(
     bytes: &[u8],
-    mut take: impl FnMut(usize, &[u8], usize) -> Result<(), ParseError>,
+    mut take: impl FnMut(&[u8], &[u8]) -> Result<(), Malformed>,
 ) -> Result<(), ParseError> {
-    let mut lines = bytes.split(|&byte| byte == b'\n').enumerate();
+    let mut lines = lines(bytes);
     while let Some((number, line)) = lines.next() {
-        let mut line = line.trim_ascii_end();
+        let mut line = line.trim_ascii();
         let mut joined = Vec::new();
-        let mut n_lines = 1;
         while let Some(head) = line.strip_suffix(b"\\").filter(|_| !line.starts_with(b"#")) {
             joined.extend_from_slice(head);
             joined.push(b' ');
             line = lines.next().map_or(b"", |(_, line)| line.trim_ascii_end());
-            n_lines += 1;
         }
         if !joined.is_empty() {
             joined.extend_from_slice(line);
             line = &joined;
         }
-        take(number + 1, line, n_lines)?;
+        let data = line.split(|&byte| byte == b'#').next().unwrap_or_default();
+        let end = data.iter().position(u8::is_ascii_whitespace).unwrap_or(data.len());
+        take(&data[..end], data[end..].trim_ascii()).map_err(|cause| cause.at(number))?;
     }
     Ok(())
 }
 
-/// The part of a line before a comment.
-pub(super) fn data(line: &[u8]) -> &[u8] {
-    line.split(|&byte| byte == b'#').next().unwrap_or_default()
-}
-
 pub(super) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
-    data(line).split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
-}
-
-/// The positions and faces of an OBJ file as text, on their lines in the file.
-struct Geometry {
-    text: Vec<u8>,
-    n_vertices: u64,
-    dropped_faces: usize,
-}
-
-impl Geometry {
-    fn parse(bytes: &[u8]) -> Result<Self, ParseError> {
-        let mut geometry =
-            Self { text: Vec::with_capacity(bytes.len()), n_vertices: 0, dropped_faces: 0 };
-        for_each_line(bytes, |number, line, n_lines| {
-            geometry.add(line).map_err(|cause| cause.at(number))?;
-            geometry.text.resize(geometry.text.len() + n_lines, b'\n');
-            Ok(())
-        })?;
-        Ok(geometry)
-    }
-
-    fn add(&mut self, line: &[u8]) -> Result<(), Malformed> {
-        let mut words = words(line);
-        match words.next() {
-            Some(b"v") => self.add_position(&words.collect::<Vec<_>>()),
-            Some(b"f") => {
-                self.add_face(words);
-                Ok(())
-            }
-            _ => Ok(()),
-        }
-    }
-
-    /// Adds x, y, z and, if nothing else follows, the weight; not colours.
-    fn add_position(&mut self, words: &[&[u8]]) -> Result<(), Malformed> {
-        self.n_vertices += 1;
-        let kept = if words.len() == 4 { words } else { &words[..words.len().min(3)] };
-        self.text.push(b'v');
-        for word in kept {
-            // tobj parses words such as "nan" as numbers.
-            if word.iter().any(|byte| matches!(byte, b'n' | b'N')) {
-                return Err(Malformed::expected("a finite coordinate", word));
-            }
-            self.text.push(b' ');
-            self.text.extend_from_slice(word);
-        }
-        Ok(())
-    }
-
-    /// Adds the indices of positions: the parts of the words before a slash.
-    fn add_face<'a>(&mut self, words: impl Iterator<Item = &'a [u8]>) {
-        let start = self.text.len();
-        self.text.push(b'f');
-        let mut n_corners = 0;
-        for word in words {
-            self.text.push(b' ');
-            let position = word.split(|&byte| byte == b'/').next().unwrap_or_default();
-            // Dropping it would silently change the number of corners.
-            self.text.extend_from_slice(if position.is_empty() { b"?" } else { position });
-            n_corners += 1;
-        }
-        if n_corners < 3 {
-            self.text.truncate(start);
-            self.dropped_faces += 1;
-        }
-    }
-
-    /// Converts tobj's error, and finds its line: that of the last of the `n_read` bytes, except
-    /// for errors that tobj detects after the last line.
-    fn blame(&self, error: LoadError, n_read: usize) -> ParseError {
-        match error {
-            LoadError::FaceVertexOutOfBounds => self.first_out_of_range(),
-            _ => {
-                let lines = self.text[..n_read].split_inclusive(|&byte| byte == b'\n');
-                let (line, number) = lines.zip(1..).last().unwrap_or_default();
-                let line = excerpt(line.trim_ascii_end());
-                Malformed::Syntax(format!("{error} in {line:?}")).at(number)
-            }
-        }
-    }
-
-    /// The error of the first face with an index that is 0 or out of range. Indices from the start
-    /// may refer to all positions of the file, indices from the end to those before the face.
-    fn first_out_of_range(&self) -> ParseError {
-        let mut above = 0;
-        for (number, line) in self.text.lines().map_while(Result::ok).enumerate() {
-            above += i128::from(line.starts_with('v'));
-            for word in line.split(' ').skip(1).filter(|_| line.starts_with('f')) {
-                let index: i128 = word.parse().unwrap_or_default();
-                let n_vertices = i128::from(self.n_vertices);
-                if index == 0 || index > n_vertices || -index > above {
-                    let cause = Malformed::IndexOutOfRange {
-                        found: word.to_owned(),
-                        n_vertices: self.n_vertices,
-                    };
-                    return cause.at(number + 1);
-                }
-            }
-        }
-        Malformed::Syntax(LoadError::FaceVertexOutOfBounds.to_string()).into()
-    }
+    line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
 }
 
 #[cfg(test)]
@@ -206,6 +144,7 @@ mod tests {
             parse,
             format!("# C:\\meshes\\\n{CORNERS}f 1 2 3 # 4").replace('\n', "\r\n"),
         );
+        is_the_triangle(parse, format!("{CORNERS}f 1 2 3\n").replace('\n', "\r"));
         is_the_triangle(parse, format!("{CORNERS}f 1 \\\n2 \\\r\n3\n"));
         let mut latin = b"# na\xEFve\no caf\xE9\n".to_vec();
         latin.extend_from_slice(format!("{CORNERS}f 1 2 3\n").as_bytes());
@@ -236,10 +175,10 @@ mod tests {
             ("\nf 1 2 4\n", "line 5: index 4 is out of range: there are 3 vertices"),
             ("f 1 2 3\n\nf 1 2 0\n", "line 6: index 0 is out of range: there are 3 vertices"),
             ("f 1 2 -4\n", "line 4: index -4 is out of range: there are 3 vertices"),
-            ("f 1 /2 3\n", "line 4: face parse error in \"f 1 ? 3\""),
-            ("v 0 0\n", "line 4: position parse error in \"v 0 0\""),
-            ("#\nv 0 x 0\n", "line 5: position parse error in \"v 0 x 0\""),
-            ("v 1 1 1 0\n", "line 4: scaling (w) by zero in \"v 1 1 1 0\""),
+            ("f 1 /2 3\n", "line 4: expected an index, found \"\""),
+            ("v 0 0\n", "line 4: expected 3 coordinates of a vertex, found 2"),
+            ("#\nv 0 x 0\n", "line 5: expected a finite coordinate, found \"x\""),
+            ("v 1 1 1 0\n", "line 4: expected a weight other than 0, found \"0\""),
             ("\n\nv 0 NaN 0\n", "line 6: expected a finite coordinate, found \"NaN\""),
             ("v 0 -inf 0\n", "line 4: expected a finite coordinate, found \"-inf\""),
         ];

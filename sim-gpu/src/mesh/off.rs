@@ -13,7 +13,7 @@ use super::tokens::{Tokens, integer};
 use super::triangle_mesh::Parsed;
 
 pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, ParseError> {
-    let mut tokens = Tokens::new(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes));
+    let mut tokens = Tokens::new(bytes);
     if !tokens.seek_data() {
         return Err(Malformed::Empty.into());
     }
@@ -114,7 +114,6 @@ mod tests {
         {
             is_the_triangle(parse, format!("{header}{TRIANGLE}"));
         }
-        is_the_triangle(parse, format!("\u{FEFF}OFF\n3 1 0\n{TRIANGLE}"));
         is_the_triangle(
             parse,
             format!("\n # made by hand\n\nOFF # keyword\n\n# counts\n3 1 0\n{TRIANGLE}"),

@@ -1,5 +1,6 @@
 //! PLY, ASCII and binary of either byte order, through the reader of clouds and scans.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use formats::FormatError;
@@ -11,22 +12,25 @@ use super::triangle_mesh::Parsed;
 
 /// The names of the list of a face's corners.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
-/// The elements of a mesh, and the index of the faces.
-const KINDS: [&str; 2] = ["vertex", "face"];
+/// The elements of a mesh, and the indices of those that hold faces.
+const KINDS: [&str; 3] = ["vertex", "face", "tristrips"];
+const VERTEX: usize = 0;
 const FACE: usize = 1;
 
-/// Reads x, y and z of the element `vertex` and the list of vertex indices of `face`, and skips
-/// everything else.
+/// Reads x, y and z of the element `vertex` and the lists of vertex indices of `face` and
+/// `tristrips`, and skips everything else. In a strip, each vertex makes a triangle with the two
+/// before it, and -1 begins another strip.
 ///
 /// A coordinate of type `float` is rounded to f32 in text too, so that both
 /// encodings of a mesh give the same positions.
-pub(super) fn parse(mut bytes: &[u8]) -> Result<Parsed, ParseError> {
+pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, ParseError> {
     if !bytes.starts_with(b"ply") {
         return Err(Malformed::expected("a PLY file", &bytes[..bytes.len().min(16)]).at(1));
     }
-    let mut is_single = [false; 3];
+    let (mut is_single, mut has_faces) = ([false; 3], false);
     let choose = |kind, element: &Element| {
-        if kind == FACE {
+        if kind != VERTEX {
+            has_faces = true;
             return Ok(vec![element.list(&CORNERS)?]);
         }
         let mut places = vec![];
@@ -38,23 +42,38 @@ pub(super) fn parse(mut bytes: &[u8]) -> Result<Parsed, ParseError> {
     };
     let mut parsed = Parsed::default();
     let (mut corners, mut bad_index) = (Vec::new(), None);
+    let mut corner = |index: f64| {
+        let corner = index as u32;
+        if f64::from(corner) != index {
+            bad_index.get_or_insert(index);
+        }
+        corner
+    };
     let name = Path::new("");
-    read_elements(&mut bytes, name, &KINDS, choose, |kind, row| {
-        if kind == FACE {
+    let bytes = with_line_feeds(bytes);
+    read_elements(&mut &*bytes, name, &KINDS, choose, |kind, row| match kind {
+        VERTEX => parsed.mesh.vertices.push(DVec3::from_slice(row)),
+        FACE => {
             corners.clear();
-            for &index in row {
-                let corner = index as u32;
-                if f64::from(corner) != index {
-                    bad_index.get_or_insert(index);
-                }
-                corners.push(corner);
-            }
+            corners.extend(row.iter().map(|index| corner(*index)));
             parsed.add_face(&corners);
-        } else {
-            parsed.mesh.vertices.push(DVec3::from_slice(row));
+        }
+        _ => {
+            for strip in row.split(|index| *index == -1.0) {
+                for (number, indices) in strip.windows(3).enumerate() {
+                    let mut triangle = [0, 1, 2].map(|place| corner(indices[place]));
+                    // Every other triangle of a strip is turned over.
+                    triangle.swap(0, number % 2);
+                    parsed.add_face(&triangle);
+                }
+            }
         }
     })
     .map_err(syntax)?;
+    if !has_faces {
+        let cause = "expected an element called face or tristrips, found a cloud of points";
+        return Err(Malformed::Syntax(cause.to_owned()).into());
+    }
     // The reader parses text as f64, whatever the type.
     for vertex in &mut parsed.mesh.vertices {
         for axis in (0..3).filter(|&axis| is_single[axis]) {
@@ -68,6 +87,20 @@ pub(super) fn parse(mut bytes: &[u8]) -> Result<Parsed, ParseError> {
         }
         None => Ok(parsed),
     }
+}
+
+/// The file with `\n` in place of the line ends `\r`, which the format's first description has.
+fn with_line_feeds(bytes: &[u8]) -> Cow<'_, [u8]> {
+    let end = memchr::memmem::find(bytes, b"end_header").unwrap_or(bytes.len());
+    let header = &bytes[..end];
+    if header.contains(&b'\n') {
+        return bytes.into();
+    }
+    let mut bytes = bytes.to_vec();
+    let is_text = memchr::memmem::find(header, b"format ascii").is_some();
+    let end = if is_text { bytes.len() } else { bytes.len().min(end + "end_header\r".len()) };
+    bytes[..end].iter_mut().filter(|byte| **byte == b'\r').for_each(|byte| *byte = b'\n');
+    bytes.into()
 }
 
 fn syntax(error: FormatError) -> ParseError {
@@ -122,6 +155,9 @@ mod tests {
             }
             is_the_triangle(parse, &little);
             is_the_triangle(parse, &big);
+            let old = header("binary_little_endian", precision, 3, 1);
+            let body = &little[old.len()..];
+            is_the_triangle(parse, [old.replace('\n', "\r").as_bytes(), body].concat());
             fails(
                 parse,
                 [(&little[..little.len() - 1], "element face: the file ends after 0 of 1")],
@@ -146,6 +182,24 @@ mod tests {
         let parsed = parse(text.as_bytes()).unwrap();
         assert_eq!(parsed.mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
         assert_eq!(parsed.dropped_faces, 2);
+    }
+
+    #[test]
+    fn strips_become_triangles_that_turn_alike() {
+        // By the definition of OpenGL's triangle strips.
+        let text = header("ascii", "float", 4, 0).replace(
+            "end_header\n",
+            "element tristrips 2\n\
+                   property list int int vertex_indices\nend_header\n",
+        ) + "0 0 0\n1 0 0\n0 1 0\n1 1 0\n9 0 1 2 3 -1 0 2 1 -1\n3 3 2 0\n";
+        let expected = [[0, 1, 2], [2, 1, 3], [0, 2, 1], [3, 2, 0]];
+        assert_eq!(parse(text.as_bytes()).unwrap().mesh.triangles, expected);
+        let alone = text.replace("element face 0\nproperty list uchar int vertex_indices\n", "");
+        assert_eq!(parse(alone.as_bytes()).unwrap().mesh.triangles, expected);
+        let bad = text.replace("3 3 2 0", "3 3 2 -2");
+        fails(parse, [(bad, "index -2 is out of range: there are 4 vertices")]);
+        let cloud = "expected an element called face or tristrips, found a cloud of points";
+        fails(parse, [(alone.replace("tristrips", "strips"), cloud)]);
     }
 
     #[test]

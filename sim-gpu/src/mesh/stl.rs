@@ -7,6 +7,7 @@ use std::collections::HashMap;
 use glam::DVec3;
 
 use super::error::{Malformed, ParseError};
+use super::tokens::{lines, without_mark};
 use super::triangle_mesh::Parsed;
 
 /// Binary STL, little-endian: 80 bytes of text, the number of triangles (u32), and for each
@@ -15,9 +16,10 @@ const HEADER: usize = 80;
 const PREFIX: usize = HEADER + 4;
 const TRIANGLE: usize = 50;
 
-/// The lines of a facet in ASCII, and the number of numbers at the end of each.
+/// The lines of a facet in ASCII, and the number of numbers at the end of each. Normals are not
+/// used, and some programs write NaN for those of triangles without area.
 const FACET: [(&str, usize); 7] = [
-    ("facet normal", 3),
+    ("facet", 0),
     ("outer loop", 0),
     ("vertex", 3),
     ("vertex", 3),
@@ -27,23 +29,32 @@ const FACET: [(&str, usize); 7] = [
 ];
 
 pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, ParseError> {
-    let begins_solid = begins_with_word(bytes, "solid");
+    let text = without_mark(bytes);
+    let begins_solid = begins_with_word(text, "solid");
     let promised = bytes.as_chunks::<4>().0.get(HEADER / 4).copied().map(u32::from_le_bytes);
     let whole = promised.is_some_and(|promised| binary_length(promised) == bytes.len() as u64);
     // Some programs begin the header of their binary files with "solid".
     let binary = whole || !begins_solid || bytes[..bytes.len().min(PREFIX)].contains(&0);
     if !binary {
-        return parse_ascii(bytes);
+        return parse_ascii(text);
     }
     let Some(promised) = promised else {
         return Err(Malformed::expected("an STL file", bytes).into());
     };
     let (triangles, _) = bytes[PREFIX..].as_chunks::<TRIANGLE>();
+    let held = triangles.len();
     if binary_length(promised) > bytes.len() as u64 {
-        let (held, promised) = (triangles.len() as u64, u64::from(promised));
+        let (held, promised) = (held as u64, u64::from(promised));
         return Err(Malformed::Truncated { part: "faces", held, promised }.into());
     }
     let mut corners = Corners::default();
+    if held > promised as usize {
+        let found = format!("the header promises {promised} triangles, the file holds {held}");
+        if promised == 0 {
+            return Err(Malformed::Syntax(found).into());
+        }
+        corners.parsed.warnings.push(format!("{found}, of which the first {promised} are read"));
+    }
     for triangle in &triangles[..promised as usize] {
         let (numbers, _) = triangle.as_chunks::<4>();
         let (positions, _) = numbers[3..].as_chunks::<3>();
@@ -61,7 +72,7 @@ fn parse_ascii(bytes: &[u8]) -> Result<Parsed, ParseError> {
     let mut corners = Corners::default();
     // The number of lines of the current facet, and whether a solid is open.
     let (mut n_read, mut is_open, mut last) = (0, false, 0);
-    for (line, number) in bytes.split(|&byte| byte == b'\n').zip(1..) {
+    for (number, line) in lines(bytes) {
         let line = line.trim_ascii();
         if line.is_empty() {
             continue;
@@ -87,12 +98,15 @@ fn parse_ascii(bytes: &[u8]) -> Result<Parsed, ParseError> {
     Ok(corners.parsed)
 }
 
-/// The `n` numbers of a line that begins with `keywords`.
+/// The `n` numbers of a line that begins with `keywords`. After `facet`, anything may follow.
 fn numbers(line: &[u8], keywords: &str, n: usize) -> Result<Vec<f32>, Malformed> {
     let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
     let are_there = keywords
         .split(' ')
         .all(|key| words.next().is_some_and(|word| word.eq_ignore_ascii_case(key.as_bytes())));
+    if are_there && keywords == "facet" {
+        return Ok(Vec::new());
+    }
     let number =
         |word| std::str::from_utf8(word).ok()?.parse().ok().filter(|x: &f32| x.is_finite());
     let numbers: Option<Vec<f32>> = words.map(number).collect();
@@ -184,6 +198,28 @@ mod tests {
         let mesh = parse(&binary(b"", 2, &[TRIANGLE, second])).unwrap().mesh;
         assert_eq!(mesh.vertices.len(), 4);
         assert_eq!(mesh.triangles, [[0, 1, 2], [2, 1, 3]]);
+    }
+
+    #[test]
+    fn normals_are_ignored() {
+        for normal in ["nan nan nan", "-nan(ind) 0 0", "1.#QNAN 0 0", "inf 0 0", ""] {
+            let facet = FACET.replace("0 0 1", normal);
+            is_the_triangle(parse, format!("solid a\n{facet}endsolid a\n"));
+        }
+    }
+
+    #[test]
+    fn more_triangles_than_the_header_promises_are_told() {
+        let parsed = parse(&binary(b"", 1, &[TRIANGLE; 3])).unwrap();
+        assert_eq!(parsed.mesh.triangles.len(), 1);
+        let warning =
+            "the header promises 1 triangles, the file holds 3, of which the first 1 are read";
+        assert_eq!(parsed.warnings, [warning]);
+        // An attribute after the triangles is not one.
+        let attribute = [binary(b"", 1, &[TRIANGLE]), vec![0; 49]].concat();
+        is_the_triangle(parse, attribute);
+        let cause = "the header promises 0 triangles, the file holds 4";
+        fails(parse, [(binary(b"", 0, &[TRIANGLE; 4]), cause)]);
     }
 
     #[test]

@@ -2,6 +2,22 @@
 
 use super::error::Malformed;
 
+/// A text without its byte order mark, if it has one.
+pub(super) fn without_mark(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes)
+}
+
+/// The lines of a text, with their numbers from 1. A line ends with `\n`, `\r\n` or `\r`.
+pub(super) fn lines(mut rest: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
+    let next = move || {
+        let end = memchr::memchr2(b'\n', b'\r', rest).unwrap_or(rest.len());
+        let (line, end) = rest.split_at_checked(end).filter(|_| !rest.is_empty())?;
+        rest = end.strip_prefix(b"\r\n").or_else(|| end.get(1..)).unwrap_or_default();
+        Some(line)
+    };
+    (1..).zip(std::iter::from_fn(next))
+}
+
 /// The tokens of a text, line by line, without its comments (from `#` on).
 pub(super) struct Tokens<'a> {
     bytes: &'a [u8],
@@ -91,9 +107,8 @@ pub(super) fn integer(token: &[u8], expected: &str) -> Result<i64, Malformed> {
     number.ok_or_else(|| Malformed::expected(expected, token))
 }
 
-fn coordinate(token: &[u8]) -> Result<f64, Malformed> {
-    let number = std::str::from_utf8(token).ok().and_then(|text| text.parse::<f64>().ok());
-    let finite = number.filter(|number| number.is_finite());
+pub(super) fn coordinate(token: &[u8]) -> Result<f64, Malformed> {
+    let finite = fast_float2::parse(token).ok().filter(|number: &f64| number.is_finite());
     finite.ok_or_else(|| Malformed::expected("a finite coordinate", token))
 }
 

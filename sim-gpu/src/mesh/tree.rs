@@ -1,15 +1,20 @@
 //! The meshes of a dataset, with their classes and splits.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::ffi::OsStr;
-use std::path::{Path, PathBuf};
+use std::fs::File;
+use std::io::Read;
+use std::path::{Component, Path, PathBuf};
 
 use formats::Split;
+use formats::hash::{FileHash, Hashing};
 use formats::rng::StreamKey;
 use sha2::{Digest, Sha256};
-use walkdir::WalkDir;
+use walkdir::{DirEntry, WalkDir};
 
+use super::error::MeshError;
 use super::format::{MeshFormat, mesh_extensions};
+use super::load::{LoadedMesh, load_hashed};
 
 /// The share of meshes in the training set of a seeded split.
 const TRAIN_SHARE: f64 = 0.8;
@@ -48,9 +53,6 @@ pub enum TreeError {
         /// The error of the operating system.
         source: std::io::Error,
     },
-    /// The path of a mesh is not Unicode, and so cannot be stored in a manifest.
-    #[error("{}: the path is not Unicode; rename it", .0.display())]
-    NotUnicode(PathBuf),
     /// The folder has no mesh.
     #[error("{}: no mesh found; looked for {}", .0.display(), mesh_extensions().map(|e| format!("*.{e}")).join(", "))]
     NoMesh(PathBuf),
@@ -69,40 +71,97 @@ pub enum TreeError {
 /// Lists the meshes in the folder `root`, or the single file `root`, sorted by class, split and
 /// name.
 ///
-/// A mesh `CLASS/{train,test}/NAME.ext` keeps its split. The class of any other mesh is its folder,
-/// and 4 of 5 are in the training set. The split is a function of `seed`, class and name alone, so
-/// that a new mesh does not move others. Folders above `root` count too: `root` may itself be a
-/// class, or a split of one.
+/// A mesh `CLASS/{train,test}/NAME.ext` keeps its split, and so does any mesh with such a folder
+/// between `root` and its class or its own folder. The class of a mesh is its folder. But if
+/// folders deeper than those below `root` have one mesh each, as `CLASS/ID/models/model.obj`, then
+/// the class is the folder below `root` (CLASS), and the name that of the next folder (ID).
+///
+/// Of the meshes without a split, 4 of 5 are in the training set. The split is a function of
+/// `seed`, class and name alone, so that a new mesh does not move others. Folders above `root`
+/// count too: `root` may itself be a class, or a split of one.
 ///
 /// Characters that some platform forbids in file names become `_`. If several meshes have the same
 /// class, split and name (`a.obj` beside `a.off`, or in folders at different depths), `_` and a
-/// hash of the relative path is appended to each of their names.
+/// hash of the relative path is appended to each of their names. A path that is not Unicode cannot
+/// be stored in a manifest: [`MeshEntry::load`] fails.
 ///
 /// Links are followed, except to a folder that contains them. Files with other extensions, files
-/// and folders whose name begins with a dot, and `__MACOSX` are ignored.
+/// and folders whose name begins with a dot, `__MACOSX` and datasets of scans are ignored.
 pub fn discover(root: &Path, seed: u64) -> Result<Vec<MeshEntry>, TreeError> {
     let absolute =
         root.canonicalize().map_err(|source| TreeError::Read { path: root.into(), source })?;
-    let mut entries = Vec::new();
-    for path in mesh_files(root)? {
-        entries.push(entry(root, &absolute, path, seed)?);
-    }
-    if entries.is_empty() {
+    let files = mesh_files(root)?;
+    if files.is_empty() {
         return Err(TreeError::NoMesh(root.into()));
     }
+    let mut places: Vec<Place> =
+        files.into_iter().map(|path| Place::of(root, &absolute, path)).collect();
+    let begins_with = |split: Split| {
+        move |place: &Place| {
+            place.below().len() > 1 && place.below().first().is_some_and(|at| at == split.name())
+        }
+    };
+    let [train, test] = [Split::Train, Split::Test].map(begins_with);
+    let is_split_first = places.iter().any(&train)
+        && places.iter().any(&test)
+        && places.iter().all(|place| train(place) || test(place));
+    places.iter_mut().for_each(|place| place.take_split(is_split_first));
+
+    let mut n_in_folder = HashMap::new();
+    for place in &places {
+        *n_in_folder.entry(place.path.parent()).or_insert(0) += 1;
+    }
+    let deep = || places.iter().filter(|place| place.may_have_own_folder());
+    let alone = deep().filter(|place| n_in_folder[&place.path.parent()] == 1).count();
+    // A few folders with a second mesh do not change the meaning of the others.
+    let has_own_folder = 10 * alone >= 9 * deep().count();
+
+    let mut entries: Vec<MeshEntry> =
+        places.iter().map(|place| place.entry(has_own_folder, seed)).collect();
     make_unique(&mut entries)?;
     entries.sort_by(|a, b| (&a.class, a.split, &a.name).cmp(&(&b.class, b.split, &b.name)));
     Ok(entries)
 }
 
+/// What suggests that the folders of `entries` mean something else, for the user.
+#[must_use]
+pub fn doubts(entries: &[MeshEntry]) -> Vec<String> {
+    let classes: HashSet<&str> = entries.iter().map(|entry| &*entry.class).collect();
+    let has = |split| entries.iter().any(|entry| entry.split == split);
+    let empty = Split::ALL.into_iter().filter(|split| !has(*split));
+    let mut doubts: Vec<String> =
+        empty.map(|split| format!("no mesh is in the {split} split")).collect();
+    if classes.len() > 1 && classes.len() == entries.len() {
+        doubts.push(format!("each of the {} classes has one mesh", classes.len()));
+    }
+    let layouts = "expected CLASS/NAME, CLASS/{train,test}/NAME or CLASS/ID/NAME in the folder";
+    doubts.into_iter().map(|doubt| format!("{doubt}; {layouts}")).collect()
+}
+
+impl MeshEntry {
+    /// Reads its file, with the hash of the bytes that `hashing` asks for.
+    pub fn load(&self, hashing: Hashing) -> Result<(LoadedMesh, Option<FileHash>), MeshError> {
+        if !self.path.ends_with(&self.relative) {
+            return Err(MeshError::NotUnicode { path: self.path.clone() });
+        }
+        load_hashed(&self.path, hashing)
+    }
+}
+
 /// The mesh files at and below `root`, in order of their paths.
 fn mesh_files(root: &Path) -> Result<Vec<PathBuf>, TreeError> {
     let walk = WalkDir::new(root).follow_links(true).sort_by_file_name();
-    let is_wanted = |name: &OsStr| !name.as_encoded_bytes().starts_with(b".") && name != "__MACOSX";
+    let root_is_dataset = is_dataset(root);
+    let is_wanted = |item: &DirEntry| {
+        let is_set = || ["clean", "noisy"].iter().any(|part| item.path().join(part).is_dir());
+        item.depth() == 0
+            || !item.file_name().as_encoded_bytes().starts_with(b".")
+                && item.file_name() != "__MACOSX"
+                && !(item.file_type().is_dir() && is_dataset(item.path()))
+                && !(root_is_dataset && item.depth() == 1 && is_set())
+    };
     let mut files = Vec::new();
-    for item in
-        walk.into_iter().filter_entry(|item| item.depth() == 0 || is_wanted(item.file_name()))
-    {
+    for item in walk.into_iter().filter_entry(is_wanted) {
         match item {
             Ok(item) if item.file_type().is_dir() => {}
             Ok(item) if MeshFormat::from_path(item.path()).is_some() => {
@@ -124,39 +183,95 @@ fn mesh_files(root: &Path) -> Result<Vec<PathBuf>, TreeError> {
     Ok(files)
 }
 
-fn entry(root: &Path, absolute: &Path, path: PathBuf, seed: u64) -> Result<MeshEntry, TreeError> {
-    let below = path.strip_prefix(root).unwrap_or(&path);
-    let whole = absolute.join(below);
-    let whole = if below.as_os_str().is_empty() { absolute } else { &whole };
-    let unicode = |text: &OsStr| text.to_str().map(str::to_owned);
-    let not_unicode = || TreeError::NotUnicode(path.clone());
+/// Whether a folder holds a dataset of scans, finished or not.
+fn is_dataset(folder: &Path) -> bool {
+    let mut head = Vec::new();
+    let manifest = File::open(folder.join("manifest.json"));
+    let read = manifest.and_then(|file| file.take(64).read_to_end(&mut head));
+    let is_manifest =
+        read.is_ok() && memchr::memmem::find(&head, br#""tool": "edgepuck""#).is_some();
+    is_manifest || folder.join("journal/terms.json").exists()
+}
 
-    let relative = if below.as_os_str().is_empty() {
-        path.file_name().and_then(unicode).ok_or_else(not_unicode)?
-    } else {
-        let parts: Option<Vec<_>> = below.iter().map(unicode).collect();
-        parts.ok_or_else(not_unicode)?.join("/")
-    };
-    let stem = path.file_stem().and_then(unicode).ok_or_else(not_unicode)?;
-    let name = safe_name(&stem);
+/// Where a mesh is.
+struct Place {
+    path: PathBuf,
+    relative: String,
+    /// Its folders from that of the file system on, without that of its split.
+    folders: Vec<String>,
+    /// The number of folders at and above the root.
+    n_above: usize,
+    /// Its split, if a folder says so, and whether that folder is its own.
+    split: Option<(Split, bool)>,
+}
 
-    let mut folders = whole.ancestors().skip(1).map(Path::file_name);
-    let parent = folders.next().flatten().unwrap_or(OsStr::new("mesh"));
-    let given = match parent.to_str() {
-        Some("train") => Some(Split::Train),
-        Some("test") => Some(Split::Test),
-        _ => None,
-    };
-    let above = folders.next().flatten().filter(|_| given.is_some());
-    let class = safe_name(&unicode(above.unwrap_or(parent)).ok_or_else(not_unicode)?);
-    let split = match above.and(given) {
-        Some(split) => split,
-        None => {
+impl Place {
+    fn of(root: &Path, absolute: &Path, path: PathBuf) -> Self {
+        let below = path.strip_prefix(root).unwrap_or(&path);
+        let (above, below) = match (below.parent(), path.file_name()) {
+            (Some(_), _) | (_, None) => (absolute, below),
+            // The root is the file.
+            (None, Some(name)) => (absolute.parent().unwrap_or(absolute), Path::new(name)),
+        };
+        let names = |path: &Path| -> Vec<String> {
+            let normal =
+                |part| if let Component::Normal(name) = part { Some(text(name)) } else { None };
+            path.components().filter_map(normal).collect()
+        };
+        let (mut folders, below) = (names(above), names(below));
+        let (relative, n_above) = (below.join("/"), folders.len());
+        folders.extend_from_slice(&below[..below.len().saturating_sub(1)]);
+        Self { path, relative, folders, n_above, split: None }
+    }
+
+    /// Its folders below the root.
+    fn below(&self) -> &[String] {
+        self.folders.get(self.n_above..).unwrap_or_default()
+    }
+
+    /// Removes the last folder that is called as a split from its folders. Directly below the root
+    /// it may as well be a class, unless `is_split_first` or it is the folder of the mesh.
+    fn take_split(&mut self, is_split_first: bool) {
+        let (n, first) = (self.folders.len(), self.n_above + usize::from(!is_split_first));
+        let split = |name: &String| name.parse::<Split>().ok();
+        let at = self.folders.iter().rposition(|name| split(name).is_some());
+        let Some(at) = at.filter(|&at| n > 1 && (at + 1 == n || at >= first)) else { return };
+        let name = self.folders.remove(at);
+        self.split = split(&name).map(|split| (split, at + 1 == n));
+    }
+
+    /// Whether the mesh could be the one of its folder, and a folder above that its class.
+    fn may_have_own_folder(&self) -> bool {
+        self.below().len() > 1 && self.split.is_none_or(|(_, is_own)| !is_own)
+    }
+
+    fn entry(&self, has_own_folder: bool, seed: u64) -> MeshEntry {
+        let own = self.may_have_own_folder() && has_own_folder;
+        let (class, name) = match (self.below(), self.folders.last()) {
+            ([class, name, ..], _) if own => (&**class, name.clone()),
+            (_, class) => (
+                class.map_or("mesh", |class| class),
+                self.path.file_stem().map(text).unwrap_or_default(),
+            ),
+        };
+        let (class, name) = (safe_name(class), safe_name(&name));
+        let split = self.split.map(|(split, _)| split).unwrap_or_else(|| {
             let unit = StreamKey::new(seed, &format!("{class}/{name}"), 0).unit(0);
             if unit < TRAIN_SHARE { Split::Train } else { Split::Test }
-        }
-    };
-    Ok(MeshEntry { path, relative, class, split, name })
+        });
+        let (path, relative) = (self.path.clone(), self.relative.clone());
+        MeshEntry { path, relative, class, split, name }
+    }
+}
+
+/// A part of a path, with each byte that is not Unicode as `\xE9`.
+fn text(part: &OsStr) -> String {
+    let mut text = String::new();
+    for chunk in part.as_encoded_bytes().utf8_chunks() {
+        text += chunk.valid();
+        chunk.invalid().iter().for_each(|byte| text += &format!("\\x{byte:02X}"));
+    }
+    text
 }
 
 fn make_unique(entries: &mut [MeshEntry]) -> Result<(), TreeError> {
@@ -352,12 +467,114 @@ mod tests {
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn a_name_that_is_not_unicode_is_an_error() {
+    fn a_name_that_is_not_unicode_fails_when_it_is_loaded() {
         use std::os::unix::ffi::OsStrExt;
         let (_folder, root) = tree(&["cup/a.off"]);
-        fs::write(root.join("cup").join(OsStr::from_bytes(b"caf\xE9.txt")), "").unwrap();
-        assert_eq!(discover(&root, 1).unwrap().len(), 1);
-        fs::write(root.join("cup").join(OsStr::from_bytes(b"caf\xE9.off")), "").unwrap();
-        assert!(matches!(discover(&root, 1), Err(TreeError::NotUnicode(_))));
+        for name in [&b"caf\xE9.txt"[..], b"caf\xE9.off", b"caf\xEA.off"] {
+            fs::write(root.join("cup").join(OsStr::from_bytes(name)), "").unwrap();
+        }
+        let entries = discover(&root, 1).unwrap();
+        let message = |entry: &MeshEntry| {
+            let error = entry.load(Hashing::None).unwrap_err().to_string();
+            let path = format!("{}/", root.display());
+            format!("{}: {}", entry.relative, error.strip_prefix(&path).unwrap())
+        };
+        let mut found: Vec<_> = entries.iter().map(message).collect();
+        found.sort();
+        let expected = [
+            "cup/a.off: cup/a.off: the file is empty",
+            "cup/caf\\xE9.off: cup/caf\u{FFFD}.off: the path is not Unicode; rename it",
+            "cup/caf\\xEA.off: cup/caf\u{FFFD}.off: the path is not Unicode; rename it",
+        ];
+        assert_eq!(found, expected);
+    }
+
+    /// The class, the split if a folder gives it, and the name of each of these files.
+    fn layout(paths: &[&str]) -> Vec<String> {
+        let (_folder, root) = tree(paths);
+        let entry =
+            |entry: &MeshEntry| format!("{} {} {}", entry.relative, entry.class, entry.name);
+        discover(&root, 1).unwrap().iter().map(entry).collect()
+    }
+
+    #[test]
+    fn meshes_in_folders_of_their_own_have_the_class_of_the_folder_below_the_root() {
+        let shapenet = [
+            "02691156/10a/models/model.obj",
+            "02691156/10b/models/model.obj",
+            "03001627/20a/models/model.obj",
+        ];
+        let of_ids = ["bed/1/mesh.obj", "bed/2/mesh.obj", "car/1/mesh.obj"];
+        let nested =
+            ["in/bed/1.obj", "in/bed/2.obj", "in/car/1.obj", "out/car/2.obj", "out/car/3.obj"];
+        let given = ["in/bed/train/1.obj", "in/bed/test/2.obj", "in/car/test/3.obj"];
+        let cases: [(&[&str], &[&str]); 4] = [
+            (&shapenet, &["02691156 10a", "02691156 10b", "03001627 20a"]),
+            (&of_ids, &["bed 1", "bed 2", "car 1"]),
+            (&nested, &["bed 1", "bed 2", "car 1", "car 2", "car 3"]),
+            (&given, &["bed 1", "bed 2", "car 3"]),
+        ];
+        for (paths, expected) in cases {
+            let mut found = layout(paths);
+            found.sort();
+            let mut expected: Vec<_> =
+                paths.iter().zip(expected).map(|(path, entry)| format!("{path} {entry}")).collect();
+            expected.sort();
+            assert_eq!(found, expected);
+        }
+        // One folder of 20 has a second mesh.
+        let many: Vec<_> = (0..20).map(|id| format!("bed/{id}/mesh.obj")).collect();
+        let paths = many.iter().map(String::as_str).chain(["bed/7/part.obj"]);
+        let found = layout(&paths.collect::<Vec<_>>());
+        assert!(found.iter().all(|entry| entry.contains(" bed ")), "{found:?}");
+    }
+
+    #[test]
+    fn folders_called_as_splits_are_splits_wherever_they_are() {
+        let split = |path: &str, others: &[&str]| {
+            let (_folder, root) = tree(&[others, &[path]].concat());
+            let entries = discover(&root, 1).unwrap();
+            let entry = entries.iter().find(|entry| entry.relative == path).unwrap();
+            format!("{} {} {}", entry.class, entry.split, entry.name)
+        };
+        let train = ["train/bed/1.off", "train/car/1.off"];
+        assert_eq!(split("test/car/2.off", &train), "car test 2");
+        assert_eq!(split("test/car/2/mesh.off", &["train/car/1/mesh.off"]), "car test 2");
+        assert_eq!(split("car/test/2/mesh.off", &["car/train/1/mesh.off"]), "car test 2");
+        // A railway, beside other classes.
+        assert!(split("train/ice/1.off", &["car/bus/1.off"]).starts_with("train "));
+    }
+
+    #[test]
+    fn scans_of_datasets_are_not_meshes() {
+        let manifest = "{\n  \"tool\": \"edgepuck\",\n  \"version\": \"0.1.0\"\n}\n";
+        let (_folder, root) = tree(&["cup/a.off", "out/rotational/clean/cup/train/a_v0.ply"]);
+        let n = |root: &Path| discover(root, 1).unwrap().len();
+        assert_eq!(n(&root), 2, "not a dataset");
+        fs::write(root.join("out/manifest.json"), "{\"meshes\": []}").unwrap();
+        assert_eq!(n(&root), 2, "another program's manifest");
+        fs::write(root.join("out/manifest.json"), manifest).unwrap();
+        assert_eq!(n(&root), 1);
+        fs::remove_file(root.join("out/manifest.json")).unwrap();
+        fs::create_dir(root.join("out/journal")).unwrap();
+        fs::write(root.join("out/journal/terms.json"), "{}").unwrap();
+        assert_eq!(n(&root), 1, "an unfinished dataset");
+        // The folder of the meshes is the dataset's too.
+        fs::create_dir(root.join("out/cup")).unwrap();
+        fs::write(root.join("out/cup/b.off"), "").unwrap();
+        assert_eq!(n(&root.join("out")), 1);
+    }
+
+    #[test]
+    fn an_odd_layout_is_told() {
+        let doubts = |paths: &[&str]| {
+            let (_folder, root) = tree(paths);
+            let all = doubts(&discover(&root, 1).unwrap());
+            all.iter().map(|doubt| doubt.split(';').next().unwrap().to_owned()).collect::<Vec<_>>()
+        };
+        let sound = ["a/train/1.off", "a/test/2.off", "b/train/1.off"];
+        assert!(doubts(&sound).is_empty());
+        assert_eq!(doubts(&sound[..1]), ["no mesh is in the test split"]);
+        assert_eq!(doubts(&sound[1..]), ["each of the 2 classes has one mesh"]);
     }
 }

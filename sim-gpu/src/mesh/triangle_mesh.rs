@@ -1,7 +1,9 @@
 //! The mesh type of all formats.
 
-use super::frame::Unit;
 use glam::DVec3;
+use std::ops::Range;
+
+use super::polygon;
 
 /// A triangle mesh in f64.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -12,17 +14,6 @@ pub struct TriangleMesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
-impl TriangleMesh {
-    /// The same mesh in metres, from coordinates in this unit.
-    #[must_use]
-    pub fn in_metres(mut self, unit: Unit) -> Self {
-        if unit != Unit::Metre {
-            self.vertices.iter_mut().for_each(|vertex| *vertex *= unit.metres());
-        }
-        self
-    }
-}
-
 /// The result of parsing a mesh file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Parsed {
@@ -30,14 +21,61 @@ pub struct Parsed {
     pub mesh: TriangleMesh,
     /// The number of faces of fewer than three corners, which were dropped.
     pub dropped_faces: usize,
+    /// What is doubtful about the file, for the user.
+    pub warnings: Vec<String>,
+    n_faces: usize,
+    /// The faces of more than three corners: their number from 1, and their triangles.
+    polygons: Vec<(usize, Range<usize>)>,
 }
 
 impl Parsed {
     /// Appends a face as a fan around its first corner, or counts it as dropped if it has fewer
     /// than three corners.
     pub(super) fn add_face(&mut self, corners: &[u32]) {
+        self.n_faces += 1;
         self.dropped_faces += usize::from(corners.len() < 3);
-        let sides = corners.windows(2).skip(1);
-        self.mesh.triangles.extend(sides.map(|side| [corners[0], side[0], side[1]]));
+        let first = self.mesh.triangles.len();
+        self.mesh.triangles.extend(polygon::fan(corners));
+        if corners.len() > 3 {
+            self.polygons.push((self.n_faces, first..self.mesh.triangles.len()));
+        }
+    }
+
+    /// Replaces the fans that do not cover their polygons, once all vertices are there and checked.
+    /// `replace` gets the triangles of each, and the numbers of the corners of those that take
+    /// their place.
+    pub(super) fn cut_polygons(&mut self, mut replace: impl FnMut(Range<usize>, &[[usize; 3]])) {
+        let (mut crossing, mut uneven) = (Vec::new(), Vec::new());
+        for (face, range) in std::mem::take(&mut self.polygons) {
+            let TriangleMesh { vertices, triangles } = &mut self.mesh;
+            let fan = &mut triangles[range.clone()];
+            let corners = polygon::corners(fan);
+            let cut = polygon::cut(corners.iter().map(|i| vertices[*i as usize]).collect());
+            if let Some(cuts) = &cut.triangles {
+                recut(fan, cuts);
+                replace(range, cuts);
+            }
+            crossing.extend(cut.crosses_itself.then_some(face));
+            uneven.extend(cut.is_uneven.then_some(face));
+        }
+        for (faces, what) in [(crossing, "cross themselves"), (uneven, "are not flat")] {
+            if let Some(first) = faces.first() {
+                let warning = format!(
+                    "{} of {} faces {what}, so that their surface is a guess; the first is face \
+                     {first}",
+                    faces.len(),
+                    self.n_faces
+                );
+                self.warnings.push(warning);
+            }
+        }
+    }
+}
+
+/// Replaces a fan by the triangles of these numbers of its corners.
+pub(super) fn recut<T: Copy>(fan: &mut [[T; 3]], cuts: &[[usize; 3]]) {
+    let corners = polygon::corners(fan);
+    for (triangle, cut) in fan.iter_mut().zip(cuts) {
+        *triangle = cut.map(|corner| corners[corner]);
     }
 }
