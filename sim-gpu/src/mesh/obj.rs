@@ -1,9 +1,11 @@
-//! Wavefront OBJ: positions and faces.
+//! Wavefront OBJ: positions and faces, through the crate tobj.
 //!
 //! Groups, materials, normals and texture coordinates do not matter to a beam: faults in them are
-//! no faults of the mesh.
+//! no faults of the mesh. tobj would split the mesh by them, or fail, so that it is given positions
+//! and faces only. These are checked before, because its errors name no line.
 
 use glam::DVec3;
+use tobj::{LoadError, LoadOptions};
 
 use super::error::{Malformed, ParseError, excerpt};
 use super::tokens::{coordinate, integer, lines};
@@ -12,19 +14,50 @@ use super::triangle_mesh::Parsed;
 /// All objects become one mesh. It has the vertices that faces refer to, in the order of their
 /// first use.
 pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, ParseError> {
-    let mut parsed = read(bytes, |_, _| Ok(()))?;
-    let (mut used, mesh) = (Vec::new(), &mut parsed.mesh);
-    let mut places = vec![u32::MAX; mesh.vertices.len()];
-    for corner in mesh.triangles.as_flattened_mut() {
-        let place = &mut places[*corner as usize];
-        if *place == u32::MAX {
-            *place = used.len() as u32;
-            used.push(mesh.vertices[*corner as usize]);
+    let mut geometry = Vec::with_capacity(bytes.len());
+    let checked = read(bytes, |key, rest| {
+        append_geometry(&mut geometry, key, rest);
+        Ok(())
+    })?;
+    let options = LoadOptions { ignore_points: true, ignore_lines: true, ..LoadOptions::default() };
+    let no_materials = |_: &std::path::Path| Err(LoadError::OpenFileFailed);
+    let (models, _) = tobj::load_obj_buf(&mut &geometry[..], &options, no_materials)
+        .map_err(|error| Malformed::Syntax(error.to_string()))?;
+    let mut parsed = Parsed::default();
+    for tobj::Model { mesh, .. } in models {
+        let base = parsed.mesh.vertices.len() as u32;
+        let positions = mesh.positions.as_chunks().0.iter().copied().map(DVec3::from_array);
+        parsed.mesh.vertices.extend(positions);
+        let mut corners = mesh.indices.iter().map(|index| base + index);
+        // tobj lists the numbers of corners unless all faces are triangles.
+        let triangles = std::iter::repeat_n(3, mesh.indices.len() / 3);
+        let arities: Vec<u32> = match mesh.face_arities.is_empty() {
+            true => triangles.collect(),
+            false => mesh.face_arities,
+        };
+        for arity in arities {
+            parsed.add_face(&corners.by_ref().take(arity as usize).collect::<Vec<_>>());
         }
-        *corner = *place;
     }
-    mesh.vertices = used;
+    parsed.dropped_faces = checked.dropped_faces;
     Ok(parsed)
+}
+
+/// Appends a line of positions or of the positions of a face, as tobj reads them.
+fn append_geometry(text: &mut Vec<u8>, key: &[u8], rest: &[u8]) {
+    let kept: Vec<&[u8]> = match key {
+        // A fourth number alone is a weight; more are a colour.
+        b"v" if words(rest).count() == 4 => words(rest).collect(),
+        b"v" => words(rest).take(3).collect(),
+        b"f" => words(rest).filter_map(|word| word.split(|&byte| byte == b'/').next()).collect(),
+        _ => return,
+    };
+    text.extend_from_slice(key);
+    for word in kept {
+        text.push(b' ');
+        text.extend_from_slice(word);
+    }
+    text.push(b'\n');
 }
 
 /// Reads the mesh with all vertices of the file. `also` gets the first word and the rest of each

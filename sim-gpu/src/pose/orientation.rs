@@ -33,7 +33,11 @@ impl PoseKeys {
             return Pose::look_at(position_m, target_m)
                 .map_err(|e| InvalidValue::new(format!("{table}.{}", e.key), e.cause));
         }
-        let rotation = self.rotation(table)?.unwrap_or(DQuat::IDENTITY);
+        let rotation = self.rotation(table)?.ok_or_else(|| {
+            let cause = "expected look_at_m, yaw_deg/pitch_deg/roll_deg or quaternion_xyzw, found \
+                         none of them";
+            InvalidValue::new(table, cause)
+        })?;
         Ok(Pose { position_m, rotation })
     }
 

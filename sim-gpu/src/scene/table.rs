@@ -14,7 +14,7 @@ use crate::config::{InvalidValue, positive, within};
 use crate::effects::Effects;
 use crate::material::{ColourSource, MaterialChoice, MaterialTable};
 use crate::mesh::frame::{Normalize, Unit, Up};
-use crate::pose::{PoseKeys, Trajectory};
+use crate::pose::{Pose, PoseKeys, Trajectory};
 use crate::sensor::SensorProfile;
 use crate::simplify::Simplify;
 
@@ -114,7 +114,12 @@ fn trajectory(
                 let pose: TimedPose = pose.try_into().map_err(|error: toml::de::Error| {
                     InvalidValue::new(&key, error.message().to_owned())
                 })?;
-                Ok((pose.time_s, pose.keys().pose(&key)?))
+                let keys = pose.keys();
+                let at = match (keys.look_at_m, keys.rotation(&key)?) {
+                    (None, None) => Pose::at(keys.position_m(&key)?),
+                    _ => keys.pose(&key)?,
+                };
+                Ok((pose.time_s, at))
             };
             let poses: Result<_, InvalidValue> = poses.into_iter().enumerate().map(timed).collect();
             Trajectory::new(poses?).map_err(|invalid| wrong(invalid.to_string()))?

@@ -172,7 +172,8 @@ fn the_profiles_of_sensors_md_are_read() {
     assert_eq!(layouts.len(), 3);
     for layout in layouts {
         let file = folder.path().join("my_sensor.toml");
-        let found = profile::parse(&format!("{head}\n{layout}"), &file);
+        std::fs::write(&file, format!("{head}\n{layout}")).unwrap();
+        let found = SensorProfile::load(&file);
         let profile = found.unwrap_or_else(|error| panic!("{error}\n{layout}"));
         assert!(!profile.pattern().is_empty());
     }
