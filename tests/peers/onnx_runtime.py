@@ -85,7 +85,8 @@ def compare_all_points(model, clouds, files):
 def compare_surroundings(name, clouds, files):
     """Points among all those of their cloud: infer-cpu keeps the first ones."""
     model = WEIGHTS / f"{name}.safetensors"
-    session = exported(name, name)
+    # One by its name, which the program has inside.
+    session = exported(name if name == "edge-64" else model, name)
     worst = 0.0
     for n_kept in (1, 64, 4096):
         ours = logits(model, files, "--sampler", "first", "--points", n_kept)

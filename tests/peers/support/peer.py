@@ -40,8 +40,8 @@ def run(*words, check=True, **more):
     return done
 
 
-def edgepuck(*words):
-    return run(EDGEPUCK, *words)
+def edgepuck(*words, check=True):
+    return run(EDGEPUCK, *words, check=check)
 
 
 def infer(*words):
