@@ -15,6 +15,7 @@ __all__ = [
     "adapters",
     "detect",
     "main",
+    "read_points",
     "run",
     "save_scan",
     "seed_of_epoch",
