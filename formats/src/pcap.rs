@@ -20,7 +20,7 @@ use etherparse::{
     UdpSlice,
 };
 use pcap_parser::traits::PcapNGPacketBlock;
-use pcap_parser::{Block, Linktype, PcapBlockOwned, PcapError, create_reader};
+use pcap_parser::{Block, Linktype, PIB_MAGIC, PcapBlockOwned, PcapError, create_reader};
 
 use crate::error::FormatError;
 
@@ -143,11 +143,15 @@ pub fn read_from(
     let mut reader = create_reader(CAPACITY, capture)
         .map_err(|error| flaw("header".to_owned(), words(&error)))?;
     let (mut interfaces, mut fragments, mut number) = (Vec::new(), Fragments::default(), 0);
-    let mut counts = Counts::default();
+    let (mut counts, mut has_blocks) = (Counts::default(), false);
     loop {
         let part = || format!("frame {number}");
+        if has_blocks && begins_with_short_block(reader.data()) {
+            return Err(flaw(part(), "expected a block of 12 bytes or more".to_owned()));
+        }
         match reader.next() {
             Ok((size, block)) => {
+                has_blocks |= matches!(block, PcapBlockOwned::NG(_));
                 if let Some(frame) = Frame::in_block(&block, &mut interfaces) {
                     match frame.udp_packet(number, &mut fragments) {
                         Ok(Some(packet)) => {
@@ -181,6 +185,14 @@ pub fn read_from(
             Err(error) => return Err(flaw(part(), words(&error))),
         }
     }
+}
+
+/// Whether the data of a pcapng begin with a block of process information that says to be shorter
+/// than its own header: pcap-parser 0.17.0 subtracts the header's 12 bytes without a check.
+fn begins_with_short_block(data: &[u8]) -> bool {
+    let Some(&[kind, length]) = data.as_chunks::<4>().0.first_chunk() else { return false };
+    let is_short = |of: fn([u8; 4]) -> u32| of(kind) == PIB_MAGIC && of(length) < 12;
+    is_short(u32::from_le_bytes) || is_short(u32::from_be_bytes)
 }
 
 /// Whether the file at `path` is a capture by its extension or its first bytes.

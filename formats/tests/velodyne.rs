@@ -374,6 +374,19 @@ fn frames(file: &[u8]) -> Vec<Vec<u8>> {
     frames
 }
 
+#[test]
+fn a_block_that_is_shorter_than_its_header_is_an_error() {
+    for (kind, length) in [
+        (0x8000_0001_u32.to_le_bytes(), 4_u32.to_le_bytes()),
+        (0x8000_0001_u32.to_be_bytes(), 11_u32.to_be_bytes()),
+    ] {
+        let file = [&pcapng(&[])[..], &kind, &length, &[0; 8]].concat();
+        let read = pcap::read_from(&file[..], Path::new("-"), |_| ControlFlow::Continue(()));
+        let error = read.unwrap_err().to_string();
+        assert!(error.contains("expected a block of 12 bytes or more"), "{error}");
+    }
+}
+
 /// The same as pcapng: a section, an Ethernet interface, and an enhanced packet block each
 /// (draft-ietf-opsawg-pcapng).
 pub fn pcapng(frames: &[Vec<u8>]) -> Vec<u8> {
