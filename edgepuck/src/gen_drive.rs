@@ -78,7 +78,8 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         let found = args.out.display();
         return Err(Usage(format!("--out: expected a file name with .pcap, found {found}")).into());
     }
-    args.overwrite.check([&*args.out])?;
+    let [poses, truth] = ["tum", "truth.jsonl"].map(|end| args.out.with_extension(end));
+    args.overwrite.check([&*args.out, &poses, &truth])?;
     let mut recipe = read_recipe(&args.recipe)?;
     recipe.use_sensors(std::slice::from_ref(&args.sensor));
     let stage = Stage::new(recipe, &args.recipe, args.meshes.as_deref(), args.seed)?;

@@ -40,7 +40,8 @@ pub struct SampleSurfacesArgs {
 }
 
 pub fn run(args: &SampleSurfacesArgs) -> anyhow::Result<Outcome> {
-    let outputs = ["surface", "seen"].map(|set| args.out.join(format!("{set}-train.npz")));
+    let outputs = ["surface-train", "surface-test", "seen-train", "seen-test"]
+        .map(|set| args.out.join(set).with_extension("npz"));
     args.overwrite.check(outputs.iter().map(PathBuf::as_path))?;
     let meshes = listed(&args.meshes, args.seed)?;
     let config = SurfaceConfig {
