@@ -1,6 +1,7 @@
 //! Flags of effects, for the commands that scan meshes.
 
 use crate::Usage;
+use crate::flags::first_given;
 use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel, Quantum};
 use sim_gpu::internals::config;
 use std::path::PathBuf;
@@ -69,14 +70,13 @@ impl EffectFlags {
 
     /// A flag that was given.
     pub fn given(&self) -> Option<&'static str> {
-        let given = [
+        first_given(&[
             (self.noise.is_some(), "--noise"),
             (self.noise_mean != 0.0, "--noise-mean"),
             (self.dropout != 0.0, "--dropout"),
             (self.quantise.is_some(), "--quantise"),
             (self.effects.is_some(), "--effects"),
-        ];
-        given.into_iter().find(|(is_given, _)| *is_given).map(|(_, flag)| flag)
+        ])
     }
 
     fn quantum(&self) -> Result<Option<Quantum>, Usage> {

@@ -32,6 +32,11 @@ pub fn need_extension(flag: &str, file: &Path, expected: &str) -> Result<(), Usa
     Err(Usage(format!("{flag}: expected a name with .{expected}, found {}", file.display())))
 }
 
+/// The first of these flags that was given.
+pub fn first_given(flags: &[(bool, &'static str)]) -> Option<&'static str> {
+    flags.iter().find(|(is_given, _)| *is_given).map(|(_, flag)| *flag)
+}
+
 /// Parses a finite number above 0.
 pub fn positive(word: &str) -> Result<f64, String> {
     match word.parse::<f64>() {

@@ -101,7 +101,7 @@ struct MeshArgs {
 impl MeshArgs {
     /// A flag that was given, which a scene's file states itself.
     fn given(&self) -> Option<&'static str> {
-        let given = [
+        flags::first_given(&[
             (self.sensor.is_some(), "--sensor"),
             (self.distance.is_some(), "--distance"),
             (self.elevation.is_some(), "--elevation"),
@@ -111,8 +111,7 @@ impl MeshArgs {
             (self.up.is_some(), "--up"),
             (!self.attributes.is_empty(), "--attributes"),
             (self.seed.is_some(), "--seed"),
-        ];
-        given.into_iter().find(|(is_given, _)| *is_given).map(|(_, flag)| flag)
+        ])
     }
 }
 
