@@ -14,8 +14,7 @@ use sim_gpu::internals::sensor::{Layout as BeamLayout, SensorProfile};
 use std::path::PathBuf;
 use std::str::FromStr;
 
-/// The noise by default: the standard deviation of the VLP-32C's ranges is at most 3 cm (its data
-/// sheet), and 1 cm in the paper of Meyer and Reitmann (2026).
+/// The standard deviation of the noise by default, metres: BLAINDER's default.
 const NOISE_M: f64 = 0.01;
 
 /// Flags that decide what a dataset holds.
@@ -265,7 +264,7 @@ fn cast_packet_geometry(
     for set in sets {
         let name = set.sensor.name();
         let refuse = |error| usage(format!("--format pcap: sensor \"{name}\": {error}"));
-        set.sensor = packets::with_packet_geometry(set.sensor.profile()).map_err(refuse)?.into();
+        set.sensor = set.sensor.with_packet_geometry().map_err(refuse)?;
     }
     Ok(returns)
 }
