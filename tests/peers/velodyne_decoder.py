@@ -204,7 +204,7 @@ def scene(name, mesh, sensor, rpm):
             f"[[sensor]]\nprofile = \"./{name}-{extension}-sensor.toml\"\n{sensor}\n")
         done = edgepuck("scan", OUT / f"{name}-{extension}.toml", "--overwrite", "--out",
                         OUT / f"{name}.{extension}", "--adapter", "cpu", check=False)
-        # 3: no beam returned a point, which is told.
+        # A scan without a point ends with 3.
         assert done.returncode == (3 if name == "nothing" else 0), done.stderr
     return str(OUT / f"{name}.pcap"), OUT / f"{name}.npz"
 

@@ -12,11 +12,11 @@ use crate::records;
 
 /// Reads the elements `wanted` of the PLY file in `reader`, which errors call `name`.
 ///
-/// A kind of element is its index in `wanted`; the file must have the first. For each kind, `choose` returns the indices of
-/// properties. `each` gets the kind and a row for each element: the numbers of the chosen
-/// properties, in the order of the choice. The last of them may be a list, whose numbers end the
-/// row. Other properties and elements are skipped. Memory does not grow with the counts of the
-/// header.
+/// A kind of element is its index in `wanted`; the file must have the first. For each kind,
+/// `choose` returns the indices of properties. `each` gets the kind and a row for each element: the
+/// numbers of the chosen properties, in the order of the choice. The last of them may be a list,
+/// whose numbers end the row. Other properties and elements are skipped. Memory does not grow with
+/// the counts of the header.
 ///
 /// Returns the `origin` of the header, an offset to add to every position.
 pub fn read_elements(

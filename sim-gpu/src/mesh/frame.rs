@@ -109,7 +109,7 @@ pub struct WorldMesh {
 }
 
 /// Turns `mesh` z up, then moves and scales it by `normalize`. [`Normalize::None`] only moves the
-/// centre of its bounding box to the origin: whoever places the mesh moves it back by `centre`.
+/// centre of its bounding box to the origin: the caller moves it back by `centre`.
 ///
 /// Centre and size are those of the vertices that triangles refer to. Other vertices are ignored
 /// and moved to the origin. (ModelNet's files have hardly any, so that the mean is ModelNet's.) A

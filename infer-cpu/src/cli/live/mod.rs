@@ -27,7 +27,7 @@ use source::{Sensor, Source, Tick};
 /// The bundled model for clusters of streets.
 const MODEL: &str = "street-128";
 
-/// A sensor that is silent for this long is told of: its turns take at most 0.2 s.
+/// The silence of a sensor after which the user gets a warning: a turn takes at most 0.2 s.
 const SILENCE: Duration = Duration::from_secs(5);
 
 /// Flags of `live`.
