@@ -1,18 +1,25 @@
 //! `edgepuck detect`: detects and classifies the objects of a sweep.
 
+mod kitti;
+
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use edgepuck_segment::{Label, OrientedBox, Segmenter, Settings, Sweep};
 use formats::{Scan, atomic};
+use glam::{DQuat, DVec3};
 use infer_cpu::{Classifier, Options, Precision};
+use plotters::style::RGBColor;
 use serde_json::{Value, json};
+use sim_gpu::glam;
 
-use crate::flags::need_extension;
+use crate::flags::{need_extension, probability};
 use crate::overwrite::Overwrite;
 use crate::points::SweepArgs;
+use crate::preview::Outline;
 use crate::segment::tint;
 use crate::{Outcome, Usage, preview};
+use kitti::{Camera, label};
 
 #[derive(clap::Args)]
 pub(crate) struct DetectArgs {
@@ -23,9 +30,15 @@ pub(crate) struct DetectArgs {
     #[arg(long, default_value = "street-128", value_name = "MODEL")]
     model: PathBuf,
 
-    /// JSON file (.json) for the objects; a picture is written beside it, with the extension .png
+    /// File for the objects: .json, or .txt with a line of KITTI's labels for each; a picture is
+    /// written beside it, with the extension .png
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
+
+    /// Calibration of KITTI's cameras (R0_rect, Tr_velo_to_cam and P2), by which labels are in the
+    /// frame of the left colour camera, as KITTI's tools expect; without it, they are in the sensor's
+    #[arg(long, value_name = "FILE")]
+    calib: Option<PathBuf>,
 
     #[command(flatten)]
     overwrite: Overwrite,
@@ -34,18 +47,29 @@ pub(crate) struct DetectArgs {
     #[arg(long, default_value_t = 20, value_name = "N")]
     min_points: usize,
 
+    /// Least confidence of an object, 0 to 1
+    #[arg(long, default_value_t = 0.0, value_name = "P", value_parser = probability)]
+    min_confidence: f64,
+
     /// Precision of the network: f32, f32-fc16, f16 or i8
     #[arg(long, default_value = "f32")]
     precision: Precision,
 }
 
 pub(crate) fn run(args: &DetectArgs) -> anyhow::Result<Outcome> {
-    need_extension("--out", &args.out, "json")?;
+    need_extension("--out", &args.out, &["json", "txt"])?;
+    let is_json = args.out.extension().is_some_and(|found| found.eq_ignore_ascii_case("json"));
+    if is_json && args.calib.is_some() {
+        let cause = "--calib applies to KITTI's labels: expected --out with the extension .txt";
+        return Err(Usage(cause.to_owned()).into());
+    }
     let picture = args.out.with_extension("png");
     args.overwrite.check([&*args.out, &picture])?;
+    let camera = args.calib.as_deref().map(Camera::read).transpose()?;
     let scan = args.input.read()?;
     let options = Options { precision: args.precision, ..Options::default() };
     let mut detector = Detector::open(&args.model, &options, args.min_points)?;
+    detector.min_confidence = args.min_confidence;
     let started = Instant::now();
     let Detections { labels, objects, n_unknown } = detector.detect(&scan)?;
     let elapsed_ms = 1e3 * started.elapsed().as_secs_f64();
@@ -56,34 +80,64 @@ pub(crate) fn run(args: &DetectArgs) -> anyhow::Result<Outcome> {
         objects.len(),
         args.out.display()
     );
-    let written = json!({
-        "frame": "the sensor's: metres, z up, the sensor at the origin",
-        "sweep": args.input.sweep.file_name().unwrap_or_default().to_string_lossy(),
-        "objects": objects.iter().map(Object::json).collect::<Vec<_>>(),
-    });
-    atomic::write_bytes(&args.out, serde_json::to_vec_pretty(&written)?)?;
-    let is_named = |number| objects.binary_search_by_key(&number, |object| object.cluster).is_ok();
+    let written = if is_json {
+        serde_json::to_vec_pretty(&json!({
+            "frame": "the sensor's: metres, z up, the sensor at the origin",
+            "sweep": args.input.sweep.file_name().unwrap_or_default().to_string_lossy(),
+            "objects": objects.iter().map(Object::json).collect::<Vec<_>>(),
+        }))?
+    } else {
+        if camera.is_none() {
+            eprintln!(
+                "the labels are in the sensor's frame: KITTI's tools expect those of --calib"
+            );
+        }
+        let lines: String = objects.iter().map(|object| label(object, camera.as_ref())).collect();
+        lines.into_bytes()
+    };
+    atomic::write_bytes(&args.out, written)?;
     let tints = labels.iter().map(|&label| match label {
-        Label::Cluster(number) if !is_named(number) => tint(Label::Small),
-        other => tint(other),
+        Label::Cluster(number) => objects
+            .binary_search_by_key(&number, |object| object.cluster)
+            .map_or(tint(Label::Ground), |i| objects[i].tint()),
+        _ => tint(Label::Small),
     });
     let tints: Vec<_> = tints.collect();
-    let names: Vec<_> = objects.iter().map(Object::name).collect();
-    preview::draw_from_above(&scan, &tints, &names, &args.input.title(), &picture)?;
+    let outlines: Vec<_> = objects
+        .iter()
+        .map(|object| Outline {
+            corners: [0, 1, 2, 3].map(|i| object.corners()[i].truncate().to_array()),
+            class: &object.class,
+            score: object.confidence,
+            tint: object.tint(),
+        })
+        .collect();
+    preview::draw_from_above(&scan, &tints, &outlines, &args.input.title(), &picture)?;
     Ok(Outcome::Success)
 }
+
+/// The classes of streets, KITTI's types for them, and their colours in pictures.
+const STREET: [(&str, &str, RGBColor); 5] = [
+    ("bus", "Misc", RGBColor(0, 90, 210)),
+    ("car", "Car", RGBColor(210, 20, 40)),
+    ("person", "Pedestrian", RGBColor(0, 140, 60)),
+    ("truck", "Truck", RGBColor(220, 110, 0)),
+    ("two-wheeler", "Cyclist", RGBColor(150, 30, 180)),
+];
 
 /// Detects and classifies objects in sweeps.
 pub struct Detector {
     segmenter: Segmenter,
     classifier: Classifier,
+    /// The least confidence of an object, 0 by default; clusters below count as unknown.
+    pub min_confidence: f64,
 }
 
 /// The objects of a sweep.
 pub struct Detections {
     /// The label of each point.
     pub labels: Vec<Label>,
-    /// The clusters of known classes, in the order of their numbers.
+    /// The clusters of known classes with enough confidence, in the order of their numbers.
     pub objects: Vec<Object>,
     /// The number of clusters of unknown class.
     pub n_unknown: usize,
@@ -100,7 +154,7 @@ impl Detector {
         let mut settings = Settings::default();
         settings.min_points = min_points;
         let segmenter = Segmenter::new(settings).map_err(|error| Usage(error.to_string()))?;
-        Ok(Self { segmenter, classifier })
+        Ok(Self { segmenter, classifier, min_confidence: 0.0 })
     }
 
     /// Segments `scan`, in the sensor's frame, and classifies its clusters.
@@ -114,13 +168,14 @@ impl Detector {
             cloud.clear();
             cloud.extend(cluster.points.iter().map(|&i| scan.positions[i as usize]));
             let prediction = self.classifier.classify_on_ground(&cloud, cluster.ground_z_m)?;
-            if prediction.is_unknown {
+            if prediction.is_unknown || prediction.confidence() < self.min_confidence {
                 found.n_unknown += 1;
                 continue;
             }
             found.objects.push(Object {
                 cluster: number,
                 class: prediction.label.to_string(),
+                class_number: prediction.class,
                 confidence: prediction.confidence(),
                 n_points: cloud.len(),
                 place: OrientedBox::around(&cloud),
@@ -136,6 +191,8 @@ pub struct Object {
     pub cluster: u32,
     /// Its class.
     pub class: String,
+    /// The number of its class among those of the model.
+    pub class_number: usize,
     /// The confidence of the network in the class, 0 to 1.
     pub confidence: f64,
     /// The number of its points.
@@ -145,10 +202,28 @@ pub struct Object {
 }
 
 impl Object {
-    /// Its class, and its position seen from above.
-    fn name(&self) -> (&str, [f32; 2]) {
-        let [x, y, _] = self.place.centre_m;
-        (&self.class, [x, y])
+    /// Its line in [`STREET`].
+    fn known(&self) -> Option<(&'static str, &'static str, RGBColor)> {
+        STREET.into_iter().find(|(class, ..)| *class == self.class)
+    }
+
+    /// The colour of its class.
+    fn tint(&self) -> RGBColor {
+        let of_number = tint(Label::Cluster(self.class_number as u32));
+        self.known().map_or(of_number, |(.., tint)| tint)
+    }
+
+    /// The corners of its box around the base and then around the top, metres.
+    fn corners(&self) -> [DVec3; 8] {
+        let OrientedBox { centre_m, size_m, yaw_rad } = self.place;
+        let turned = DQuat::from_rotation_z(yaw_rad.into());
+        let [ahead, aside, up] =
+            [0, 1, 2].map(|axis| turned * DVec3::AXES[axis] * f64::from(size_m[axis]) * 0.5);
+        let at = |level: f64, [x, y]: [f64; 2]| {
+            DVec3::from(centre_m.map(f64::from)) + x * ahead + y * aside + level * up
+        };
+        let around = [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]];
+        [0, 1, 2, 3, 4, 5, 6, 7].map(|i| at(if i < 4 { -1.0 } else { 1.0 }, around[i % 4]))
     }
 
     fn json(&self) -> Value {

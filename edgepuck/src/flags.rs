@@ -24,11 +24,13 @@ pub fn need_folder_of_meshes(meshes: Option<&Path>) -> Result<(), Usage> {
     }
 }
 
-/// Checks that the name of the file to write has the extension `expected`.
-pub fn need_extension(flag: &str, file: &Path, expected: &str) -> Result<(), Usage> {
-    if file.extension().is_some_and(|found| found.eq_ignore_ascii_case(expected)) {
+/// Checks that the name of the file to write has one of the extensions `expected`.
+pub fn need_extension(flag: &str, file: &Path, expected: &[&str]) -> Result<(), Usage> {
+    let found = file.extension().unwrap_or_default();
+    if expected.iter().any(|extension| found.eq_ignore_ascii_case(extension)) {
         return Ok(());
     }
+    let expected = expected.join(" or .");
     Err(Usage(format!("{flag}: expected a name with .{expected}, found {}", file.display())))
 }
 
@@ -39,16 +41,24 @@ pub fn first_given(flags: &[(bool, &'static str)]) -> Option<&'static str> {
 
 /// Parses a finite number above 0.
 pub fn positive(word: &str) -> Result<f64, String> {
-    match word.parse::<f64>() {
-        Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
-        _ => Err("expected a finite number above 0".to_owned()),
-    }
+    number(word, |x| *x > 0.0 && x.is_finite(), "a finite number above 0")
 }
 
 /// Parses an elevation, degrees.
 pub fn elevation(word: &str) -> Result<f64, String> {
-    match word.parse::<f64>() {
-        Ok(degrees) if (-90.0..=90.0).contains(&degrees) => Ok(degrees),
-        _ => Err("expected degrees from -90 to 90".to_owned()),
-    }
+    number(word, |degrees| (-90.0..=90.0).contains(degrees), "degrees from -90 to 90")
+}
+
+/// Parses a probability.
+pub fn probability(word: &str) -> Result<f64, String> {
+    number(word, |p| (0.0..=1.0).contains(p), "a number from 0 to 1")
+}
+
+/// Parses a number that `is_allowed`, as `expected` says.
+pub fn number(
+    word: &str,
+    is_allowed: impl Fn(&f64) -> bool,
+    expected: &str,
+) -> Result<f64, String> {
+    word.parse().ok().filter(is_allowed).ok_or_else(|| format!("expected {expected}"))
 }

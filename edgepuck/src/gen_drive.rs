@@ -1,4 +1,3 @@
-use std::ffi::OsStr;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -8,9 +7,10 @@ use formats::atomic::Unfinished;
 use formats::vlp32c::{Capture, SEQUENCE_US, SEQUENCES_PER_PACKET, START_S};
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::Outcome;
+use crate::flags::{need_extension, number};
 use crate::gen_scenes::read_recipe;
 use crate::overwrite::Overwrite;
-use crate::{Outcome, Usage};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -49,35 +49,22 @@ pub struct Args {
     overwrite: Overwrite,
 }
 
-/// The longest drive: a capture of one day has 16 GB.
-const MOST_SECONDS: f64 = 86_400.0;
-
-const MOST_SPEED_M_S: f64 = 100.0;
-
 /// The number of packets that are fired together, on all cores: about one revolution.
 const BATCH: usize = 150;
 
 const POSES_HZ: u32 = 100;
 
+/// A day, in which a capture grows to 16 GB, is the longest drive.
 fn seconds(word: &str) -> Result<f64, String> {
-    match word.parse() {
-        Ok(s) if s > 0.0 && s <= MOST_SECONDS => Ok(s),
-        _ => Err(format!("expected a number above 0 and up to {MOST_SECONDS}, found {word}")),
-    }
+    number(word, |s| *s > 0.0 && *s <= 86_400.0, "a number above 0 and up to 86400")
 }
 
 fn speed(word: &str) -> Result<f64, String> {
-    match word.parse() {
-        Ok(speed) if (0.0..=MOST_SPEED_M_S).contains(&speed) => Ok(speed),
-        _ => Err(format!("expected a number within 0..={MOST_SPEED_M_S}, found {word}")),
-    }
+    number(word, |speed| (0.0..=100.0).contains(speed), "a number from 0 to 100")
 }
 
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
-    if args.out.extension() != Some(OsStr::new("pcap")) {
-        let found = args.out.display();
-        return Err(Usage(format!("--out: expected a file name with .pcap, found {found}")).into());
-    }
+    need_extension("--out", &args.out, &["pcap"])?;
     let [poses, truth] = ["tum", "truth.jsonl"].map(|end| args.out.with_extension(end));
     args.overwrite.check([&*args.out, &poses, &truth])?;
     let mut recipe = read_recipe(&args.recipe)?;

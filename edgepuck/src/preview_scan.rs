@@ -30,7 +30,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
-    need_extension("--out", &args.out, "png")?;
+    need_extension("--out", &args.out, &["png"])?;
     args.overwrite.check([&*args.out])?;
     let clean = args.points.read(&args.scan)?;
     let noisy = args.noisy.clone().or_else(|| noisy_twin(&args.scan));

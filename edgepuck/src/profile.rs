@@ -35,7 +35,7 @@ pub fn run(args: &ProfileArgs) -> anyhow::Result<Outcome> {
         }
         return Ok(Outcome::Success);
     };
-    args.beams.iter().try_for_each(|file| need_extension("--beams", file, "csv"))?;
+    args.beams.iter().try_for_each(|file| need_extension("--beams", file, &["csv"]))?;
     args.overwrite.check(args.beams.as_deref())?;
     let sensor = SensorProfile::resolve(name)?;
     let pattern = sensor.pattern();

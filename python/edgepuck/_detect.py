@@ -66,6 +66,8 @@ def detect(
         rings = sweep.ring if rings is None else rings
         sweep = sweep.in_sensor_frame()
     least = whole("min_points", min_points, 1, 2**32)
-    found = _edgepuck.detect(points_of(sweep), rings_of(rings), place(model), precision, least)
-    detections = [Detection(**one) for one in found]
-    return [one for one in detections if one.confidence >= min_confidence]
+    cloud = points_of(sweep)
+    found = _edgepuck.detect(
+        cloud, rings_of(rings), place(model), precision, least, min_confidence
+    )
+    return [Detection(**one) for one in found]

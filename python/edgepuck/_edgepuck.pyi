@@ -132,6 +132,7 @@ def detect(
     model: str,
     precision: str,
     min_points: int,
+    min_confidence: float,
 ) -> list[dict[str, Any]]: ...
 def read_points(
     path: str, format: str | None, metadata: str | None, sender: str | None

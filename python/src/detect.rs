@@ -18,11 +18,16 @@ pub fn detect<'py>(
     model: &str,
     precision: &str,
     min_points: usize,
+    min_confidence: f64,
 ) -> PyResult<Vec<Bound<'py, PyDict>>> {
     let options = Options { precision: precision.parse().map_err(raised)?, ..Options::default() };
     let ring = rings.map(|rings| rings.as_array().to_vec());
     let scan = Scan { positions: points(&cloud)?, ring, ..Scan::default() };
-    let found = py.detach(|| Detector::open(Path::new(model), &options, min_points)?.detect(&scan));
+    let found = py.detach(|| {
+        let mut detector = Detector::open(Path::new(model), &options, min_points)?;
+        detector.min_confidence = min_confidence;
+        detector.detect(&scan)
+    });
     let objects = found.map_err(raised_with_causes)?.objects;
     objects.iter().map(|object| told(py, object)).collect()
 }

@@ -60,6 +60,20 @@ fn a_sweep_is_cut_and_its_clusters_are_named() {
     }
     assert!(folder.bytes("objects.png").starts_with(b"\x89PNG"));
 
+    let confident = objects.iter().filter(|one| one["confidence"].as_f64().unwrap() >= 0.9);
+    let said = folder.succeeds(&format!("detect {sweep} --min-confidence 0.9 --out labels.txt"));
+    assert!(said.contains("the labels are in the sensor's frame"), "{said}");
+    let labels = folder.text("labels.txt");
+    assert!(labels.lines().count() < objects.len(), "{labels}");
+    for (line, object) in labels.lines().zip(confident.clone()) {
+        let words: Vec<&str> = line.split(' ').collect();
+        assert_eq!(words.len(), 16, "{line}");
+        let centre: Vec<f64> = serde_json::from_value(object["box"]["centre_m"].clone()).unwrap();
+        let x: f64 = words[11].parse().unwrap();
+        assert!((x - centre[0]).abs() <= 0.005 + 1e-9, "{line}: {object}");
+    }
+    assert_eq!(labels.lines().count(), confident.count());
+
     let said = folder.succeeds(&format!("detect {sweep} --model edge-64 --out whole.json"));
     assert!(said.contains("warning: edge-64: expected a model of clusters in metres"), "{said}");
 }
@@ -196,6 +210,10 @@ fn what_cannot_be_used_is_named_and_nothing_is_written() {
                 "recipe.toml: metadata: expected value at line 1",
             ),
             ("detect missing.npz --model nothing.safetensors --out out.json", "missing.npz"),
+            (
+                "detect missing.npz --out out.txt --calib flat/chairs/flat.obj",
+                "flat.obj: R0_rect: expected a line of 9 finite numbers, found 0",
+            ),
         ],
     );
     folder.refuses(
@@ -203,7 +221,15 @@ fn what_cannot_be_used_is_named_and_nothing_is_written() {
         &[
             (
                 "detect missing.npz --out out.png",
-                "--out: expected a name with .json, found out.png",
+                "--out: expected a name with .json or .txt, found out.png",
+            ),
+            (
+                "detect missing.npz --out out.json --calib calib.txt",
+                "--calib applies to KITTI's labels",
+            ),
+            (
+                "detect missing.npz --out out.json --min-confidence 2",
+                "expected a number from 0 to 1",
             ),
             (
                 "preview missing.npz --out out.html",

@@ -14,12 +14,24 @@ const TITLE_HEIGHT: u32 = 44;
 /// What is farther from the sensor is left out: the picture would be all road.
 const FARTHEST_M: f64 = 50.0;
 
-/// Draws the points of `scan` around its origin, each in its tint, and `names` at
-/// their places (x, y), to the PNG file `out`, atomically.
+/// The box around an object, seen from above.
+pub struct Outline<'a> {
+    /// Its corners (x, y) in order, metres.
+    pub corners: [[f64; 2]; 4],
+    /// The object's class.
+    pub class: &'a str,
+    /// The confidence in the class, 0 to 1.
+    pub score: f64,
+    /// The colour of the class.
+    pub tint: RGBColor,
+}
+
+/// Draws the points of `scan` around its origin, each in its tint, and `outlines` with
+/// their classes and scores, to the PNG file `out`, atomically.
 pub fn draw_from_above(
     scan: &Scan,
     tints: &[RGBColor],
-    names: &[(&str, [f32; 2])],
+    outlines: &[Outline<'_>],
     title: &str,
     out: &Path,
 ) -> Result<()> {
@@ -28,6 +40,6 @@ pub fn draw_from_above(
     let frame = Frame { centre: [0.0; 3], half: farthest.min(FARTHEST_M) };
     let [_, from_above, _] = View::ALL;
     draw_png(out, (EDGE, EDGE + TITLE_HEIGHT), (title, TITLE_HEIGHT), |below| {
-        panel::draw(below, from_above, scan, tints, &frame, names)
+        panel::draw(below, from_above, scan, tints, &frame, outlines)
     })
 }

@@ -6,6 +6,7 @@ use plotters::prelude::*;
 
 use super::canvas::{Area, metres, text};
 use super::frame::{Frame, View};
+use super::from_above::Outline;
 
 /// Edge of the square that shows the frame, in pixels.
 const SQUARE: u32 = 380;
@@ -23,14 +24,14 @@ const AXIS_NAMES: [&str; 3] = ["x (m)", "y (m)", "z (m)"];
 const GRID: RGBColor = RGBColor(232, 232, 232);
 
 /// Draws what `view` shows of `scan`, nearer points over farther ones, each in
-/// its tint, and `names` at their places on the panel, metres.
+/// its tint, and `outlines` with a legend of their classes.
 pub fn draw(
     area: &Area<'_>,
     view: View,
     scan: &Scan,
     tints: &[RGBColor],
     frame: &Frame,
-    names: &[(&str, [f32; 2])],
+    outlines: &[Outline<'_>],
 ) -> Result<()> {
     let (caption, below) = area.split_vertically(CAPTION);
     let (width, _) = area.dim_in_pixel();
@@ -65,10 +66,34 @@ pub fn draw(
         Circle::new(place, radius, tints[i].filled())
     });
     chart.draw_series(points).map_err(|error| anyhow!("drawing the points: {error}"))?;
-    let names = names.iter().map(|&(name, place)| {
-        Text::new(name.to_owned(), (f64::from(place[0]), f64::from(place[1])), text(15))
-    });
-    chart.draw_series(names).map_err(|error| anyhow!("drawing the names: {error}"))?;
+    for (i, Outline { corners, class, score, tint }) in outlines.iter().enumerate() {
+        let corners = corners.map(|[x, y]| (x, y));
+        let line = tint.stroke_width(2);
+        let closed = corners.into_iter().chain([corners[0]]);
+        let series = chart.draw_series([PathElement::new(closed.collect::<Vec<_>>(), line)])?;
+        if outlines[..i].iter().all(|other| other.class != *class) {
+            let swatch = move |(x, y)| Rectangle::new([(x, y - 6), (x + 16, y + 6)], line.filled());
+            series.label(*class).legend(swatch);
+        }
+        let [right, top] = corners
+            .iter()
+            .fold([f64::NEG_INFINITY; 2], |most, at| [most[0].max(at.0), most[1].max(at.1)]);
+        let (name, style) = (format!("{class} {score:.2}"), text(15).color(tint));
+        let (width, height) = below.estimate_text_size(&name, &style)?;
+        let behind = [(4, -2 - height as i32), (8 + width as i32, 2)];
+        chart.draw_series([EmptyElement::at((right, top))
+            + Rectangle::new(behind, WHITE.mix(0.6).filled())
+            + Text::new(name, (6, -(height as i32)), style)])?;
+    }
+    if !outlines.is_empty() {
+        chart
+            .configure_series_labels()
+            .position(SeriesLabelPosition::UpperLeft)
+            .label_font(text(15))
+            .background_style(WHITE.mix(0.85))
+            .border_style(GRID)
+            .draw()?;
+    }
     Ok(())
 }
 

@@ -1,0 +1,130 @@
+//! Labels of KITTI's object benchmark, as the readme of its development kit defines them.
+
+use anyhow::Context;
+use formats::FormatError;
+use glam::{DMat3, DMat4, DVec3};
+use sim_gpu::glam;
+use std::f64::consts::{PI, TAU};
+use std::path::Path;
+
+use super::Object;
+
+/// The left colour camera of a frame.
+pub struct Camera {
+    /// From the LiDAR's frame to the rectified camera's.
+    rect_from_lidar: DMat4,
+    /// From the rectified camera's frame to pixels times depth.
+    image_from_rect: DMat4,
+}
+
+impl Camera {
+    /// Reads a calibration file of the benchmark.
+    pub fn read(file: &Path) -> anyhow::Result<Self> {
+        let text = std::fs::read_to_string(file).with_context(|| file.display().to_string())?;
+        let matrix = |key: &str, columns: usize| {
+            let line = text
+                .lines()
+                .find_map(|line| line.trim_start().strip_prefix(key)?.strip_prefix(':'));
+            let words = line.unwrap_or_default().split_whitespace();
+            let numbers: Vec<f64> = words.map_while(|word| word.parse().ok()).collect();
+            if numbers.len() != 3 * columns || numbers.iter().any(|x| !x.is_finite()) {
+                let (expected, found) = (3 * columns, numbers.len());
+                let cause = format!("expected a line of {expected} finite numbers, found {found}");
+                return Err(FormatError::malformed(file, key, cause));
+            }
+            let rows = [0, 1, 2].map(|row| &numbers[row * columns..][..columns]);
+            let column = |i: usize| DVec3::from(rows.map(|row| row[i]));
+            let rotation = DMat3::from_cols(column(0), column(1), column(2));
+            let shift = if columns == 4 { column(3) } else { DVec3::ZERO };
+            Ok(DMat4::from_translation(shift) * DMat4::from_mat3(rotation))
+        };
+        Ok(Self {
+            rect_from_lidar: matrix("R0_rect", 3)? * matrix("Tr_velo_to_cam", 4)?,
+            image_from_rect: matrix("P2", 4)?,
+        })
+    }
+
+    /// The left, top, right and bottom of the box with these corners in the picture, pixels; `None`
+    /// if a corner is not before the camera.
+    fn bounds(&self, corners: [DVec3; 8]) -> Option<[f64; 4]> {
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for corner in corners {
+            let at = self.rect_from_lidar.transform_point3(corner);
+            let at = self.image_from_rect.transform_point3(at);
+            (low, high) = (low.min(at / at.z), high.max(at / at.z));
+            (at.z > 0.0).then_some(())?;
+        }
+        Some([low.x, low.y, high.x, high.y])
+    }
+}
+
+/// The line of an object: type, truncation, occlusion, alpha, left, top, right, bottom, height,
+/// width, length, x, y, z, rotation and score, in the frame of `camera` or else the sensor's.
+pub fn label(object: &Object, camera: Option<&Camera>) -> String {
+    let kind = object.known().map_or(&*object.class, |(_, kind, _)| kind);
+    let kind = kind.replace(char::is_whitespace, "_");
+    let [length, width, height] = object.place.size_m.map(f64::from);
+    let yaw_rad = f64::from(object.place.yaw_rad);
+    let base = DVec3::from(object.place.centre_m.map(f64::from)) - 0.5 * height * DVec3::Z;
+    let (mut alpha, mut bounds, mut at, mut rotation) = (-10.0, [-1.0; 4], base, yaw_rad);
+    if let Some(camera) = camera {
+        let along = DVec3::new(yaw_rad.cos(), yaw_rad.sin(), 0.0);
+        let along = camera.rect_from_lidar.transform_vector3(along);
+        at = camera.rect_from_lidar.transform_point3(base);
+        // About the camera's y axis, which points downwards.
+        rotation = (-along.z).atan2(along.x);
+        alpha = (rotation - at.x.atan2(at.z) + PI).rem_euclid(TAU) - PI;
+        bounds = camera.bounds(object.corners()).unwrap_or(bounds);
+    }
+    let [left, top, right, bottom] = bounds;
+    let [x, y, z] = at.to_array();
+    format!(
+        "{kind} -1 -1 {alpha:.2} {left:.2} {top:.2} {right:.2} {bottom:.2} {height:.2} {width:.2} \
+         {length:.2} {x:.2} {y:.2} {z:.2} {rotation:.2} {:.4}\n",
+        object.confidence
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use edgepuck_segment::OrientedBox;
+
+    /// A camera at the LiDAR that looks along x, with a focal length of 700 pixels.
+    const CALIBRATION: &str = "P2: 700 0 600 0 0 700 180 0 0 0 1 0\n\
+        R0_rect: 1 0 0 0 1 0 0 0 1\nTr_velo_to_cam: 0 -1 0 0 0 0 -1 0 1 0 0 0\n";
+
+    fn object(class: &str, centre_m: [f32; 3]) -> Object {
+        let place = OrientedBox { centre_m, size_m: [4.0, 2.0, 1.0], yaw_rad: 0.0 };
+        let (class, class_number) = (class.to_owned(), 0);
+        Object { cluster: 0, class, class_number, confidence: 0.875, n_points: 50, place }
+    }
+
+    #[test]
+    fn boxes_are_projected_and_turned_as_the_readme_of_the_kit_defines() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("calib.txt");
+        std::fs::write(&file, CALIBRATION).unwrap();
+        let camera = Camera::read(&file).unwrap();
+        let ahead = object("car", [10.0, 0.0, 0.0]);
+        assert_eq!(
+            label(&ahead, None),
+            "Car -1 -1 -10.00 -1.00 -1.00 -1.00 -1.00 1.00 2.00 4.00 10.00 0.00 -0.50 0.00 0.8750\n"
+        );
+        // The near face is 8 m away: 700 / 8 pixels a metre. A car that drives away has a rotation
+        // of -pi / 2.
+        assert_eq!(
+            label(&ahead, Some(&camera)),
+            "Car -1 -1 -1.57 512.50 136.25 687.50 223.75 1.00 2.00 4.00 0.00 0.50 10.00 -1.57 0.8750\n"
+        );
+        // Behind the camera there is no picture, and -pi / 2 - pi is pi / 2.
+        assert_eq!(
+            label(&object("garden chair", [-10.0, 0.0, 0.0]), Some(&camera)),
+            "garden_chair -1 -1 1.57 -1.00 -1.00 -1.00 -1.00 1.00 2.00 4.00 0.00 0.50 -10.00 -1.57 \
+             0.8750\n"
+        );
+        std::fs::write(&file, CALIBRATION.replace("180", "x")).unwrap();
+        let error = Camera::read(&file).err().unwrap().to_string();
+        assert!(error.ends_with("P2: expected a line of 12 finite numbers, found 6"), "{error}");
+    }
+}
