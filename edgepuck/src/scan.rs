@@ -89,7 +89,7 @@ struct MeshArgs {
     up: Option<Up>,
 
     /// Attributes of each point besides its position, as of gen-dataset [default: range, beam, ring,
-    /// time, object]
+    /// time, object, intensity]
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     attributes: Vec<Attribute>,
 
@@ -200,6 +200,7 @@ fn scene_of_meshes(args: &Args) -> anyhow::Result<Scene> {
     ensure!(args.simplify.is_none(), Usage("--simplify applies to scenes only".to_owned()));
     let mut scene = Scene::new();
     scene.seed = args.meshes.seed.unwrap_or_default();
+    scene.attributes.insert(Attribute::Intensity);
     if !args.meshes.attributes.is_empty() {
         scene.attributes = args.meshes.attributes.iter().copied().collect();
     }

@@ -65,6 +65,27 @@ fn a_sweep_is_corrupted_in_every_way_and_twice_alike() {
 }
 
 #[test]
+fn sweeps_of_the_default_commands_have_the_intensities_that_corruptions_need() {
+    let folder = Folder::new();
+    folder.write("wall.off", WALL);
+    folder.succeeds("gen-scenes yard --adapter cpu --sweeps 1 --save 1 --out scenes");
+    folder.succeeds("scan wall.off --distance 10 --adapter cpu --out wall.ply");
+    // The sensor looks at the middle of the wall, from 20 degrees above: white, with the cosine of
+    // the incidence. The centre of the wall is at (20, 0, 3).
+    let wall = formats::scan_file::read_scan(&folder.at("wall.ply")).unwrap();
+    let brightest = wall.intensity.iter().flatten().copied().fold(0.0, f32::max);
+    assert!((0.99..=1.0).contains(&brightest), "{brightest}");
+    for (sweep, sensor) in [("scenes/sweeps/000000.npz", ""), ("wall.ply", "--sensor 29.4 0 6.4")] {
+        let words = format!("--only fog,wet-ground,crosstalk --severity 1 {sensor} --overwrite");
+        folder.succeeds(&format!("corrupt {sweep} {words} --out out"));
+        for (file, count) in counts(&folder, "out/corruptions.csv") {
+            let scan = folder.scan(&format!("out/{file}"));
+            assert!(count > 100 && scan.intensity.unwrap().iter().any(|i| *i > 0.1), "{file}");
+        }
+    }
+}
+
+#[test]
 fn intensities_stay_in_the_numbers_of_the_file() {
     let folder = Folder::new();
     folder.write("ground.off", GROUND);

@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 
 use formats::rng::StreamKey;
 use glam::{DQuat, DVec3};
-use sim_gpu::effects::{Dropout, Effects, Noise, NoiseModel};
+use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel};
 use sim_gpu::internals::caster::OpenCaster;
 use sim_gpu::internals::config::InvalidValue;
 use sim_gpu::internals::job::Culling;
@@ -66,6 +66,7 @@ impl Stage {
             let effects = Effects {
                 noise: Some(Noise { mean_m: 0.0, sigma_m, model: NoiseModel::Range }),
                 dropout: Some(Dropout { probability: choice.dropout }),
+                intensity: Some(Intensity),
                 ..choice.effects.clone()
             };
             let in_file = |invalid: InvalidValue| SceneError::from(invalid.in_file(file));

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use formats::Scan;
 use formats::rng::StreamKey;
+use formats::scan::Attribute;
 use glam::DVec3;
 use sim_gpu::internals::bvh::Builder;
 use sim_gpu::internals::mesh::TriangleMesh;
@@ -19,7 +20,7 @@ use crate::stage::{Stage, StageSensor};
 #[derive(Clone, Debug)]
 pub struct Sweep {
     /// The points in the order of firing, in the sensor's frame, metres, with range, beam, ring,
-    /// time and object. Object 0 is the ground, and object `i` is `i - 1` of [`DrawnScene::objects`].
+    /// time, object and intensity. Object 0 is the ground, and object `i` is `i - 1` of [`DrawnScene::objects`].
     pub scan: Scan,
 }
 
@@ -42,6 +43,7 @@ impl Stage {
     pub fn build(&self, scene: &DrawnScene) -> Scene {
         let mut world = Scene::new();
         (world.seed, world.effects) = (self.seed(), self.effects(scene).clone());
+        world.attributes.insert(Attribute::Intensity);
         let ground = shared(scene.ground.mesh(), Builder::Morton);
         self.add_ground(&mut world, &ground, scene.number);
         for object in &scene.objects {
