@@ -4,7 +4,7 @@
 mod canvas;
 mod colours;
 mod frame;
-mod from_above;
+pub mod from_above;
 mod panel;
 
 use std::path::Path;
@@ -15,7 +15,7 @@ use formats::Scan;
 use canvas::{draw_png, text};
 use colours::Colours;
 use frame::{Frame, View};
-pub use from_above::{Outline, draw_from_above};
+pub use from_above::draw_from_above;
 
 const TITLE_HEIGHT: u32 = 52;
 const ROW_HEADING_HEIGHT: u32 = 30;
