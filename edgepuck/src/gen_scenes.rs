@@ -1,5 +1,7 @@
 //! `edgepuck gen-scenes`: scans street scenes and packs their clusters as a training set.
 
+mod sweep_file;
+
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -8,14 +10,13 @@ use edgepuck_assets::SCENE_RECIPES;
 use edgepuck_scenes::{LabelledScene, Recipe, Stage, generate};
 use edgepuck_segment::Settings;
 use formats::atomic;
-use formats::hash::Hashing;
-use formats::scan_file::{ScanFormat, write_scan};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
+use sweep_file::SweepFormat;
 
 use crate::caster::CasterArgs;
 use crate::overwrite::Overwrite;
-use crate::{Outcome, preview, segment};
+use crate::{Outcome, Usage, preview, segment};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -44,6 +45,11 @@ pub(crate) struct Args {
     #[arg(long, default_value_t = 10, value_name = "N")]
     save: u32,
 
+    /// Format of these sweeps: npz; or with the class and the object of each point semantickitti
+    /// (velodyne/N.bin and labels/N.label), pcd (fields label and instance) or las
+    #[arg(long, default_value = "npz")]
+    format: SweepFormat,
+
     /// Seed of all random numbers
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -56,6 +62,9 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
+    if args.format == SweepFormat::Las && !cfg!(feature = "las") {
+        return Err(Usage("--format: this build does not include las".to_owned()).into());
+    }
     let mut recipe = read_recipe(&args.recipe)?;
     let outputs = ["packed", "sweeps"].map(|folder| args.out.join(folder));
     args.overwrite.clear(outputs.iter().map(PathBuf::as_path))?;
@@ -83,7 +92,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
                 &args.out.join("preview.png"),
             )?;
         }
-        if done.scene.number < args.save { save(&stage, done, &args.out) } else { Ok(()) }
+        if done.scene.number < args.save { save(&stage, done, args) } else { Ok(()) }
     })?;
     bar.finish_and_clear();
     let seconds = started.elapsed().as_secs_f64();
@@ -118,13 +127,16 @@ pub fn read_recipe(recipe: &Path) -> anyhow::Result<Recipe> {
     })
 }
 
-/// Writes the sweep as a scan, and the objects of the scene as JSON.
-fn save(stage: &Stage, done: &LabelledScene, out: &Path) -> anyhow::Result<()> {
-    let name = format!("sweeps/{:06}", done.scene.number);
-    let file = out.join(format!("{name}.npz"));
-    write_scan(&file, ScanFormat::Npz, Hashing::None, &done.sweep.scan)?;
-    let json = serde_json::to_vec_pretty(&description(stage, done)).context("writing JSON")?;
-    atomic::write_bytes(&out.join(format!("{name}.json")), json)?;
+/// Writes the sweep, and the objects of the scene as JSON.
+fn save(stage: &Stage, done: &LabelledScene, args: &Args) -> anyhow::Result<()> {
+    let sweeps = args.out.join("sweeps");
+    sweep_file::write(stage, done, args.format, &sweeps)?;
+    let mut described = description(stage, done);
+    if args.format != SweepFormat::Npz {
+        described["classes"] = json!(sweep_file::classes(stage));
+    }
+    let file = sweeps.join(format!("{:06}.json", done.scene.number));
+    atomic::write_bytes(&file, serde_json::to_vec_pretty(&described).context("writing JSON")?)?;
     Ok(())
 }
 

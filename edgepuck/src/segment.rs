@@ -3,9 +3,10 @@ use crate::points::SweepArgs;
 use crate::{Outcome, Usage, preview};
 use edgepuck_segment::{Label, Segmentation, Segmenter, Settings, Sweep};
 use formats::cloud_file::write_cloud;
-use formats::{FormatError, Scan, atomic};
+use formats::hash::Hashing;
+use formats::scan::Column;
+use formats::{FormatError, Scan, rows};
 use plotters::style::{Color, HSLColor, RGBColor};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -91,15 +92,14 @@ fn write_clusters(folder: &Path, scan: &Scan, found: &Segmentation) -> Result<()
 }
 
 fn write_ply(file: &Path, points: &[[f32; 3]], tints: &[RGBColor]) -> Result<(), FormatError> {
-    atomic::write(file, |writer| {
-        write!(writer, "ply\nformat binary_little_endian 1.0\nelement vertex {}\n", points.len())?;
-        write!(writer, "property float x\nproperty float y\nproperty float z\n")?;
-        write!(writer, "property uchar red\nproperty uchar green\nproperty uchar blue\n")?;
-        writeln!(writer, "end_header")?;
-        for (point, tint) in points.iter().zip(tints) {
-            point.iter().try_for_each(|x| writer.write_all(&x.to_le_bytes()))?;
-            writer.write_all(&[tint.0, tint.1, tint.2])?;
-        }
-        Ok(())
-    })
+    let [red, green, blue] =
+        [0, 1, 2].map(|of| tints.iter().map(|t| [t.0, t.1, t.2][of]).collect::<Vec<_>>());
+    let columns = [
+        (rows::AXES.to_vec(), Column::Vector(points)),
+        (vec!["red"], Column::U8(&red)),
+        (vec!["green"], Column::U8(&green)),
+        (vec!["blue"], Column::U8(&blue)),
+    ];
+    let header = rows::ply_header([0.0; 3], &columns);
+    rows::write(file, Hashing::None, &header, &columns).map(|_| ())
 }

@@ -71,6 +71,9 @@ pub mod outcome;
 #[cfg(feature = "ply")]
 pub mod ply;
 #[doc(hidden)]
+#[cfg(feature = "dataset")]
+pub mod rows;
+#[doc(hidden)]
 pub mod split;
 #[doc(hidden)]
 pub mod trajectory;

@@ -1,4 +1,4 @@
-//! Writes LAS: version 1.2, point format 0, coordinates only.
+//! Writes LAS: version 1.2, point format 0.
 //!
 //! LAS holds coordinates as whole multiples of a step, from an offset. The step
 //! is the finest power of ten, a nanometre at least, in which half the cloud's
@@ -17,12 +17,29 @@ const FINEST: i32 = -9;
 /// Most steps from the centre of the cloud to its end, somewhat fewer than `i32` can count.
 const MOST_STEPS: f64 = 2e9;
 
-/// The other fields of a point of format 0, which are unknown.
-const UNKNOWN: [u8; 8] = {
-    // Return 1 of 1 (LAS 1.2, table 5), after an intensity of two bytes.
-    const RETURN_1_OF_1: u8 = 0b001_001;
-    [0, 0, RETURN_1_OF_1, 0, 0, 0, 0, 0]
-};
+/// What a point has besides its coordinates; 0 is unknown.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LasPoint {
+    /// The intensity, of which 65535 is the most.
+    pub intensity: u16,
+    /// The ASPRS's code of its class, below 32.
+    pub class: u8,
+    /// The user's own number.
+    pub user_data: u8,
+    /// The number of its source.
+    pub source: u16,
+}
+
+impl LasPoint {
+    /// The fields behind the coordinates in point format 0.
+    fn bytes(self) -> [u8; 8] {
+        // Return 1 of 1 (LAS 1.2, table 5).
+        const RETURN_1_OF_1: u8 = 0b001_001;
+        let ([i, intensity], [s, source]) =
+            (self.intensity.to_le_bytes(), self.source.to_le_bytes());
+        [i, intensity, RETURN_1_OF_1, self.class, 0, self.user_data, s, source]
+    }
+}
 
 #[derive(Clone, Copy)]
 struct Axis {
@@ -32,7 +49,15 @@ struct Axis {
     offset: f64,
 }
 
-pub(super) fn write(path: &Path, points: &[[f64; 3]]) -> Result<(), FormatError> {
+/// Writes `points` with the other fields that `of` returns for the index of each, atomically.
+///
+/// # Errors
+/// A coordinate that is not finite; errors of the system.
+pub fn write_las(
+    path: &Path,
+    points: &[[f64; 3]],
+    of: impl Fn(usize) -> LasPoint,
+) -> Result<(), FormatError> {
     let infinite = |point: &[f64; 3]| point.iter().any(|x| !x.is_finite());
     if let Some(i) = points.iter().position(infinite) {
         let cause = format!("{:?} is not finite, and LAS holds whole numbers", points[i]);
@@ -44,11 +69,11 @@ pub(super) fn write(path: &Path, points: &[[f64; 3]]) -> Result<(), FormatError>
     let axes = [0, 1, 2].map(|axis| Axis::around(points.iter().map(|point| point[axis])));
     atomic::write(path, |writer: &mut BufWriter<_>| {
         header(n, &axes).write_to(&mut *writer).map_err(io::Error::other)?;
-        for point in points {
+        for (i, point) in points.iter().enumerate() {
             for (axis, &x) in axes.iter().zip(point) {
                 writer.write_all(&axis.steps(x).to_le_bytes())?;
             }
-            writer.write_all(&UNKNOWN)?;
+            writer.write_all(&of(i).bytes())?;
         }
         Ok(())
     })

@@ -44,6 +44,8 @@ use crate::atomic;
 use crate::error::FormatError;
 use crate::records;
 pub use format::CloudFormat;
+#[cfg(feature = "las")]
+pub use las_write::{LasPoint, write_las};
 pub use plausible::check_sweep;
 use precision::Precision;
 
@@ -217,7 +219,7 @@ pub fn write_cloud(path: &Path, points: &[[f64; 3]]) -> Result<(), FormatError> 
         #[cfg(feature = "npz")]
         CloudFormat::Npz => atomic::write(path, |writer| npz::write(writer, points, precision)),
         #[cfg(feature = "las")]
-        CloudFormat::Las => las_write::write(path, points),
+        CloudFormat::Las => write_las(path, points, |_| LasPoint::default()),
         #[allow(unreachable_patterns, reason = "a build may leave no format out")]
         left_out => Err(not_in_this_build(left_out, path)),
     }

@@ -7,13 +7,13 @@
 //! skips the others; from NPZ it reads all of them.
 
 use std::fs::File;
-use std::io::{BufReader, Write};
+use std::io::BufReader;
 use std::path::Path;
 
 use super::elements::read_elements;
-use crate::atomic;
 use crate::error::FormatError;
 use crate::hash::{FileHash, Hashing};
+use crate::rows;
 use crate::scan::{Attribute, Column, ColumnSlot, Scan};
 
 /// Writes `scan` to `path`, atomically, and returns the file's hash.
@@ -22,50 +22,10 @@ pub fn write_scan(
     hashing: Hashing,
     scan: &Scan,
 ) -> Result<Option<FileHash>, FormatError> {
-    scan.check_lengths()?;
-    let columns: Vec<_> = scan.columns().map(|(_, column)| column).collect();
-    atomic::write_hashed(path, hashing, |writer| {
-        writer.write_all(header(scan).as_bytes())?;
-        for (i, position) in scan.positions.iter().enumerate() {
-            write_vector(writer, position)?;
-            for column in &columns {
-                match column {
-                    Column::F32(values) => writer.write_all(&values[i].to_le_bytes())?,
-                    Column::U8(values) => writer.write_all(&[values[i]])?,
-                    Column::U16(values) => writer.write_all(&values[i].to_le_bytes())?,
-                    Column::U32(values) => writer.write_all(&values[i].to_le_bytes())?,
-                    Column::Vector(values) => write_vector(writer, &values[i])?,
-                }
-            }
-        }
-        Ok(())
-    })
-}
-
-fn write_vector(writer: &mut impl Write, vector: &[f32; 3]) -> std::io::Result<()> {
-    vector.iter().try_for_each(|component| writer.write_all(&component.to_le_bytes()))
-}
-
-fn header(scan: &Scan) -> String {
-    let mut header = "ply\nformat binary_little_endian 1.0\n".to_owned();
-    if scan.origin != [0.0; 3] {
-        let [x, y, z] = scan.origin;
-        header += &format!("comment origin {x} {y} {z}\n");
-    }
-    header += &format!("element vertex {}\n", scan.len());
-    header += "property float x\nproperty float y\nproperty float z\n";
-    for (attribute, column) in scan.columns() {
-        let number = match column {
-            Column::F32(_) | Column::Vector(_) => "float",
-            Column::U8(_) => "uchar",
-            Column::U16(_) => "ushort",
-            Column::U32(_) => "uint",
-        };
-        for name in attribute.column_names() {
-            header += &format!("property {number} {name}\n");
-        }
-    }
-    header + "end_header\n"
+    let attributes = scan.columns().map(|(attribute, column)| (attribute.column_names(), column));
+    let positions = (rows::AXES.to_vec(), Column::Vector(&scan.positions));
+    let columns: Vec<_> = std::iter::once(positions).chain(attributes).collect();
+    rows::write(path, hashing, &rows::ply_header(scan.origin, &columns), &columns)
 }
 
 /// Reads a scan, ASCII or binary, with properties in any order. Other properties are skipped.

@@ -1,0 +1,142 @@
+//! Sweeps as files, of which all formats but NPZ have the class and the object of each point.
+
+use std::path::Path;
+
+use anyhow::ensure;
+use edgepuck_scenes::{DrawnScene, LabelledScene, Stage};
+use formats::hash::Hashing;
+use formats::rows;
+use formats::scan::Column;
+use formats::scan_file::{ScanFormat, write_scan};
+
+formats::named! {
+    /// A file format of sweeps.
+    pub enum SweepFormat: "format of sweeps" {
+        /// NumPy's archive, as of `edgepuck scan`.
+        Npz = "npz",
+        /// SemanticKITTI's pairs of files.
+        SemanticKitti = "semantickitti",
+        /// The Point Cloud Library's format.
+        Pcd = "pcd",
+        /// The ASPRS's format.
+        Las = "las",
+    }
+}
+
+/// SemanticKITTI's label (semantic-kitti.yaml of semantic-kitti-api) and the ASPRS's code (LAS 1.4
+/// R15, table 17) of kinds of objects, and of classes of the user's meshes by these names.
+const CODES: [(&[&str], u16, u8); 17] = [
+    (&["air"], 1, 7),
+    (&["ground"], 49, 2),
+    (&["car"], 10, 1),
+    (&["bicycle"], 11, 1),
+    (&["bus"], 13, 1),
+    (&["motorcycle"], 15, 1),
+    (&["truck"], 18, 1),
+    (&["person", "child"], 30, 1),
+    (&["cyclist"], 31, 1),
+    (&["motorcyclist"], 32, 1),
+    (&["house-front", "building"], 50, 6),
+    (&["wall", "fence", "barrier"], 51, 1),
+    (&["bush", "hedge"], 70, 4),
+    (&["tree"], 70, 5),
+    (&["trunk"], 71, 5),
+    (&["pole", "lamp-post", "traffic-light"], 80, 1),
+    (&["traffic-sign", "sign"], 81, 1),
+];
+/// Other objects, and unclassified points.
+const OTHER: (u16, u8) = (99, 1);
+
+/// What a point lies on.
+#[derive(Clone, Copy)]
+struct Surface {
+    /// The number of its class in [`classes`].
+    class: u16,
+    /// The number of its object; 0 for the ground and the air.
+    object: u16,
+    /// As in [`CODES`].
+    codes: (u16, u8),
+}
+
+/// The classes by the numbers that points have in PCD and LAS.
+pub fn classes(stage: &Stage) -> Vec<&str> {
+    ["air", "ground"].into_iter().chain(stage.classes().iter().map(String::as_str)).collect()
+}
+
+/// Writes the sweep into the folder `sweeps`.
+pub fn write(
+    stage: &Stage,
+    done: &LabelledScene,
+    format: SweepFormat,
+    sweeps: &Path,
+) -> anyhow::Result<()> {
+    let (scan, number) = (&done.sweep.scan, done.scene.number);
+    let file = |end: &str| sweeps.join(format!("{number:06}.{end}"));
+    if format == SweepFormat::Npz {
+        write_scan(&file("npz"), ScanFormat::Npz, Hashing::None, scan)?;
+        return Ok(());
+    }
+    let n_objects = done.scene.objects.len();
+    ensure!(n_objects < 1 << 16, "{format}: expected at most 65535 objects, found {n_objects}");
+    let surfaces = surfaces(stage, &done.scene);
+    let air = n_objects + 1;
+    let of_points = done.sweep.surfaces().iter().map(|&i| surfaces[air.min(i as usize)]);
+    let of_points: Vec<Surface> = of_points.collect();
+    let column = |of: fn(&Surface) -> u32| of_points.iter().map(of).collect::<Vec<u32>>();
+    let intensity = scan.intensity.as_deref().expect("invariant: sweeps have intensities");
+    let mut columns = vec![
+        (rows::AXES.to_vec(), Column::Vector(&scan.positions)),
+        (vec!["intensity"], Column::F32(intensity)),
+    ];
+    let write = |file: &Path, header: &str, columns: &rows::Columns<'_>| {
+        rows::write(file, Hashing::None, header, columns).map(|_| ())
+    };
+    match format {
+        SweepFormat::SemanticKitti => {
+            let of_pair = |folder, end| sweeps.join(format!("{folder}/{number:06}.{end}"));
+            let labels = column(|s| u32::from(s.object) << 16 | u32::from(s.codes.0));
+            write(&of_pair("velodyne", "bin"), "", &columns)?;
+            write(&of_pair("labels", "label"), "", &[(vec!["label"], Column::U32(&labels))])?;
+        }
+        SweepFormat::Pcd => {
+            let [label, instance] = [column(|s| s.class.into()), column(|s| s.object.into())];
+            columns.push((vec!["ring"], Column::U16(done.sweep.rings())));
+            columns.push((vec!["label"], Column::U32(&label)));
+            columns.push((vec!["instance"], Column::U32(&instance)));
+            write(&file("pcd"), &rows::pcd_header(&columns), &columns)?;
+        }
+        #[cfg(feature = "las")]
+        SweepFormat::Las => {
+            let points: Vec<_> = scan.positions.iter().map(|at| at.map(f64::from)).collect();
+            formats::cloud_file::write_las(&file("las"), &points, |i| {
+                formats::cloud_file::LasPoint {
+                    intensity: (intensity[i] * f32::from(u16::MAX)) as u16,
+                    class: of_points[i].codes.1,
+                    user_data: u8::try_from(of_points[i].class).unwrap_or(u8::MAX),
+                    source: of_points[i].object,
+                }
+            })?;
+        }
+        _ => unreachable!("invariant: NPZ is written above, and builds without LAS refuse it"),
+    }
+    Ok(())
+}
+
+/// The air, last, the ground, first, and the objects of `scene` between them.
+fn surfaces(stage: &Stage, scene: &DrawnScene) -> Vec<Surface> {
+    let classes = classes(stage);
+    let surface = |object: u16, kind: &str, class: &str| {
+        let class = classes.iter().position(|known| *known == class);
+        let codes = CODES.iter().find(|(names, ..)| names.contains(&kind));
+        let codes = codes.map_or(OTHER, |&(_, label, code)| (label, code));
+        let class = class.expect("invariant: a stage has the classes of all its objects") as u16;
+        Surface { class, object, codes }
+    };
+    let objects = (1..).zip(&scene.objects).map(|(number, object)| {
+        let entry = &stage.recipe().object[object.entry];
+        let kind = entry.built_in().map_or(&*entry.class, |_| &entry.kind);
+        surface(number, kind, &entry.class)
+    });
+    let ground = surface(0, "ground", "ground");
+    std::iter::once(ground).chain(objects).chain([surface(0, "air", "air")]).collect()
+}

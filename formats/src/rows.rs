@@ -1,0 +1,102 @@
+//! Points as binary rows of numbers, little-endian, behind a header of PLY, of PCD, or none.
+
+use std::io::Write;
+use std::path::Path;
+
+use crate::atomic;
+use crate::error::FormatError;
+use crate::hash::{FileHash, Hashing};
+use crate::scan::Column;
+
+/// Columns with their names, of which a vector has three.
+pub type Columns<'a> = [(Vec<&'static str>, Column<'a>)];
+
+/// The names of positions.
+pub const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// Writes `columns` to `path` behind `header`, atomically, and returns the file's hash.
+///
+/// # Errors
+/// Columns of different lengths; errors of the system.
+pub fn write(
+    path: &Path,
+    hashing: Hashing,
+    header: &str,
+    columns: &Columns<'_>,
+) -> Result<Option<FileHash>, FormatError> {
+    let n = n_points(columns);
+    if let Some((names, column)) = columns.iter().find(|(_, column)| column.len() != n) {
+        let (attribute, found) = (names[0], column.len());
+        return Err(FormatError::Length { attribute, expected: n, found });
+    }
+    atomic::write_hashed(path, hashing, |writer| {
+        writer.write_all(header.as_bytes())?;
+        for i in 0..n {
+            for (_, column) in columns {
+                match column {
+                    Column::F32(values) => writer.write_all(&values[i].to_le_bytes())?,
+                    Column::U8(values) => writer.write_all(&[values[i]])?,
+                    Column::U16(values) => writer.write_all(&values[i].to_le_bytes())?,
+                    Column::U32(values) => writer.write_all(&values[i].to_le_bytes())?,
+                    Column::Vector(values) => {
+                        values[i].iter().try_for_each(|x| writer.write_all(&x.to_le_bytes()))?;
+                    }
+                }
+            }
+        }
+        Ok(())
+    })
+}
+
+/// The header of PLY, with an origin other than 0 as a comment.
+#[must_use]
+pub fn ply_header(origin: [f64; 3], columns: &Columns<'_>) -> String {
+    let mut header = "ply\nformat binary_little_endian 1.0\n".to_owned();
+    if origin != [0.0; 3] {
+        let [x, y, z] = origin;
+        header += &format!("comment origin {x} {y} {z}\n");
+    }
+    header += &format!("element vertex {}\n", n_points(columns));
+    for (names, column) in columns {
+        let number = match column {
+            Column::F32(_) | Column::Vector(_) => "float",
+            Column::U8(_) => "uchar",
+            Column::U16(_) => "ushort",
+            Column::U32(_) => "uint",
+        };
+        names.iter().for_each(|name| header += &format!("property {number} {name}\n"));
+    }
+    header + "end_header\n"
+}
+
+/// The header of PCD 0.7.
+#[must_use]
+pub fn pcd_header(columns: &Columns<'_>) -> String {
+    let lines = ["FIELDS", "SIZE", "TYPE", "COUNT"].map(|key| {
+        let words = columns.iter().flat_map(|(names, column)| {
+            let (size, kind) = match column {
+                Column::F32(_) | Column::Vector(_) => ("4", "F"),
+                Column::U8(_) => ("1", "U"),
+                Column::U16(_) => ("2", "U"),
+                Column::U32(_) => ("4", "U"),
+            };
+            names.iter().map(move |name| match key {
+                "FIELDS" => *name,
+                "SIZE" => size,
+                "TYPE" => kind,
+                _ => "1",
+            })
+        });
+        format!("{key} {}\n", words.collect::<Vec<_>>().join(" "))
+    });
+    let n = n_points(columns);
+    format!(
+        "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\n{}WIDTH {n}\nHEIGHT 1\n\
+         VIEWPOINT 0 0 0 1 0 0 0\nPOINTS {n}\nDATA binary\n",
+        lines.concat()
+    )
+}
+
+fn n_points(columns: &Columns<'_>) -> usize {
+    columns.first().map_or(0, |(_, column)| column.len())
+}
