@@ -59,10 +59,8 @@ pub(crate) struct DetectArgs {
 pub(crate) fn run(args: &DetectArgs) -> anyhow::Result<Outcome> {
     need_extension("--out", &args.out, &["json", "txt"])?;
     let is_json = args.out.extension().is_some_and(|found| found.eq_ignore_ascii_case("json"));
-    if is_json && args.calib.is_some() {
-        let cause = "--calib applies to KITTI's labels: expected --out with the extension .txt";
-        return Err(Usage(cause.to_owned()).into());
-    }
+    let cause = "--calib applies to KITTI's labels: expected --out with the extension .txt";
+    anyhow::ensure!(!is_json || args.calib.is_none(), Usage(cause.to_owned()));
     let picture = args.out.with_extension("png");
     args.overwrite.check([&*args.out, &picture])?;
     let camera = args.calib.as_deref().map(Camera::read).transpose()?;

@@ -5,7 +5,7 @@ mod sweep_file;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
 use edgepuck_assets::SCENE_RECIPES;
 use edgepuck_scenes::{LabelledScene, Recipe, Stage, generate};
 use edgepuck_segment::Settings;
@@ -62,9 +62,8 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
-    if args.format == SweepFormat::Las && !cfg!(feature = "las") {
-        return Err(Usage("--format: this build does not include las".to_owned()).into());
-    }
+    let cause = "--format: this build does not include las".to_owned();
+    ensure!(args.format != SweepFormat::Las || cfg!(feature = "las"), Usage(cause));
     let mut recipe = read_recipe(&args.recipe)?;
     let outputs = ["packed", "sweeps"].map(|folder| args.out.join(folder));
     args.overwrite.clear(outputs.iter().map(PathBuf::as_path))?;

@@ -58,12 +58,7 @@ pub fn ply_header(origin: [f64; 3], columns: &Columns<'_>) -> String {
     }
     header += &format!("element vertex {}\n", n_points(columns));
     for (names, column) in columns {
-        let number = match column {
-            Column::F32(_) | Column::Vector(_) => "float",
-            Column::U8(_) => "uchar",
-            Column::U16(_) => "ushort",
-            Column::U32(_) => "uint",
-        };
+        let [number, ..] = types(column);
         names.iter().for_each(|name| header += &format!("property {number} {name}\n"));
     }
     header + "end_header\n"
@@ -74,12 +69,7 @@ pub fn ply_header(origin: [f64; 3], columns: &Columns<'_>) -> String {
 pub fn pcd_header(columns: &Columns<'_>) -> String {
     let lines = ["FIELDS", "SIZE", "TYPE", "COUNT"].map(|key| {
         let words = columns.iter().flat_map(|(names, column)| {
-            let (size, kind) = match column {
-                Column::F32(_) | Column::Vector(_) => ("4", "F"),
-                Column::U8(_) => ("1", "U"),
-                Column::U16(_) => ("2", "U"),
-                Column::U32(_) => ("4", "U"),
-            };
+            let [_, kind, size] = types(column);
             names.iter().map(move |name| match key {
                 "FIELDS" => *name,
                 "SIZE" => size,
@@ -95,6 +85,16 @@ pub fn pcd_header(columns: &Columns<'_>) -> String {
          VIEWPOINT 0 0 0 1 0 0 0\nPOINTS {n}\nDATA binary\n",
         lines.concat()
     )
+}
+
+/// The type of a column's numbers in PLY, and the type and the size in PCD.
+fn types(column: &Column<'_>) -> [&'static str; 3] {
+    match column {
+        Column::F32(_) | Column::Vector(_) => ["float", "F", "4"],
+        Column::U8(_) => ["uchar", "U", "1"],
+        Column::U16(_) => ["ushort", "U", "2"],
+        Column::U32(_) => ["uint", "U", "4"],
+    }
 }
 
 fn n_points(columns: &Columns<'_>) -> usize {

@@ -1,7 +1,6 @@
 //! Reads labelled sets from their archives.
 
 use std::collections::BTreeSet;
-use std::io::{Read, Seek};
 use std::path::Path;
 
 use super::{LabelledSet, equal_offsets};
@@ -31,64 +30,53 @@ pub fn read_labelled(path: &Path) -> Result<LabelledSet, FormatError> {
         count_from_sensor(&mut npz, offsets, points.as_chunks_mut().0)?;
     }
     let m = ragged.as_ref().map_or(shape[0], |offsets| offsets.len() - 1);
-    let classes = column(&mut npz, "classes", NpzReader::text)?;
+    let classes = npz.has("classes").then(|| npz.text("classes")).transpose()?;
     let (labels, classes) = read_labels(&mut npz, classes)?;
-    let names = column(&mut npz, "names", NpzReader::text)?;
-    let n_raw = column(&mut npz, "n_raw", read_whole_numbers)?;
-    let is_ragged = ragged.is_some();
-    let mut words = |key| if is_ragged { column(&mut npz, key, NpzReader::text) } else { Ok(None) };
-    let (sensor, ids, raw_labels) = (words("sensor")?, words("ids")?, words("raw_labels")?);
-    let fold = if is_ragged { column(&mut npz, "fold", read_whole_numbers)? } else { None };
+    check_count(&npz, "labels", &labels, m)?;
+    let (of_all, of_ragged) = (Some(m), ragged.as_ref().map(|_| m));
     let numbers = |npz: &mut NpzReader, key: &str| read_list(npz, key, |x| x as f32);
-    let range_m = if is_ragged { column(&mut npz, "range_m", numbers)? } else { None };
-    let height_m = if is_ragged { column(&mut npz, "height_m", numbers)? } else { None };
-    let lengths = [
-        ("labels", Some(labels.len())),
-        ("names", names.as_ref().map(Vec::len)),
-        ("n_raw", n_raw.as_ref().map(Vec::len)),
-        ("range_m", range_m.as_ref().map(Vec::len)),
-        ("height_m", height_m.as_ref().map(Vec::len)),
-        ("sensor", sensor.as_ref().map(Vec::len)),
-        ("ids", ids.as_ref().map(Vec::len)),
-        ("raw_labels", raw_labels.as_ref().map(Vec::len)),
-        ("fold", fold.as_ref().map(Vec::len)),
-    ];
-    for (key, length) in lengths {
-        if let Some(found) = length.filter(|&length| length != m) {
-            let cause = format!("expected {m} values, one for each cloud, found {found}");
-            return Err(npz.error(key, cause));
-        }
-    }
-    // Only once the file is known to hold a label for each cloud: a shape may state any
-    // number of clouds without points.
-    let offsets = ragged.unwrap_or_else(|| equal_offsets(m, shape[1]));
-    let columns = LabelledSet {
-        names,
-        n_raw,
+    Ok(LabelledSet {
+        points,
+        // Only once the file is known to hold a label for each cloud: a shape may state any
+        // number of clouds without points.
+        offsets: ragged.unwrap_or_else(|| equal_offsets(m, shape[1])),
+        labels,
         classes,
-        range_m,
-        height_m,
-        sensor,
-        ids,
-        raw_labels,
-        fold,
-        ..LabelledSet::default()
-    };
-    Ok(LabelledSet { points, offsets, labels, ..columns })
+        names: column(&mut npz, "names", of_all, NpzReader::text)?,
+        n_raw: column(&mut npz, "n_raw", of_all, read_whole_numbers)?,
+        range_m: column(&mut npz, "range_m", of_ragged, numbers)?,
+        height_m: column(&mut npz, "height_m", of_ragged, numbers)?,
+        sensor: column(&mut npz, "sensor", of_ragged, NpzReader::text)?,
+        ids: column(&mut npz, "ids", of_ragged, NpzReader::text)?,
+        raw_labels: column(&mut npz, "raw_labels", of_ragged, NpzReader::text)?,
+        fold: column(&mut npz, "fold", of_ragged, read_whole_numbers)?,
+    })
 }
 
-fn column<R: Read + Seek, T>(
-    npz: &mut NpzReader<R>,
+/// The `count` values of `key`; `None` if the file does not have it, or without a count.
+fn column<T>(
+    npz: &mut NpzReader,
     key: &str,
-    read: impl FnOnce(&mut NpzReader<R>, &str) -> Result<T, FormatError>,
-) -> Result<Option<T>, FormatError> {
-    npz.has(key).then(|| read(npz, key)).transpose()
+    count: Option<usize>,
+    read: impl FnOnce(&mut NpzReader, &str) -> Result<Vec<T>, FormatError>,
+) -> Result<Option<Vec<T>>, FormatError> {
+    let Some(count) = count.filter(|_| npz.has(key)) else { return Ok(None) };
+    let values = read(npz, key)?;
+    check_count(npz, key, &values, count)?;
+    Ok(Some(values))
+}
+
+fn check_count<T>(npz: &NpzReader, key: &str, values: &[T], m: usize) -> Result<(), FormatError> {
+    match values.len() {
+        found if found == m => Ok(()),
+        found => {
+            Err(npz.error(key, format!("expected {m} values, one for each cloud, found {found}")))
+        }
+    }
 }
 
 /// The shape of the points, `[m, n, 3]` or `[total, 3]`, and their coordinates.
-fn read_points<R: Read + Seek>(
-    npz: &mut NpzReader<R>,
-) -> Result<(Vec<usize>, Vec<f32>), FormatError> {
+fn read_points(npz: &mut NpzReader) -> Result<(Vec<usize>, Vec<f32>), FormatError> {
     let (key, scale) =
         if npz.has("points_i16") { ("points_i16", I16_SCALE) } else { ("points", 1.0) };
     let may_be_ragged = npz.has("offsets");
@@ -116,10 +104,7 @@ fn read_points<R: Read + Seek>(
 }
 
 /// The offsets of clouds of `total` points together.
-fn read_offsets<R: Read + Seek>(
-    npz: &mut NpzReader<R>,
-    total: usize,
-) -> Result<Vec<usize>, FormatError> {
+fn read_offsets(npz: &mut NpzReader, total: usize) -> Result<Vec<usize>, FormatError> {
     const KEY: &str = "offsets";
     let offsets: Vec<usize> = read_whole_numbers(npz, KEY)?;
     let ends = [("first", offsets.first(), 0), ("last", offsets.last(), total)];
@@ -138,8 +123,8 @@ fn read_offsets<R: Read + Seek>(
 }
 
 /// Moves the clouds that begin at `offsets` so that the sensor is at 0.
-fn count_from_sensor<R: Read + Seek>(
-    npz: &mut NpzReader<R>,
+fn count_from_sensor(
+    npz: &mut NpzReader,
     offsets: &[usize],
     points: &mut [[f32; 3]],
 ) -> Result<(), FormatError> {
@@ -160,8 +145,8 @@ fn count_from_sensor<R: Read + Seek>(
     Ok(())
 }
 
-fn read_labels<R: Read + Seek>(
-    npz: &mut NpzReader<R>,
+fn read_labels(
+    npz: &mut NpzReader,
     classes: Option<Vec<String>>,
 ) -> Result<(Vec<usize>, Option<Vec<String>>), FormatError> {
     const KEY: &str = "labels";
@@ -187,8 +172,8 @@ fn read_labels<R: Read + Seek>(
     Ok((labels, Some(classes)))
 }
 
-fn read_whole_numbers<R: Read + Seek, T: TryFrom<u64>>(
-    npz: &mut NpzReader<R>,
+fn read_whole_numbers<T: TryFrom<u64>>(
+    npz: &mut NpzReader,
     key: &str,
 ) -> Result<Vec<T>, FormatError> {
     let numbers = read_list(npz, key, |number| number)?;
@@ -202,8 +187,8 @@ fn read_whole_numbers<R: Read + Seek, T: TryFrom<u64>>(
     numbers.into_iter().map(|number| whole(number).ok_or_else(|| expected(number))).collect()
 }
 
-fn read_list<R: Read + Seek, T: Copy>(
-    npz: &mut NpzReader<R>,
+fn read_list<T: Copy>(
+    npz: &mut NpzReader,
     key: &str,
     convert: impl Fn(f64) -> T,
 ) -> Result<Vec<T>, FormatError> {
