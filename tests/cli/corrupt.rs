@@ -12,6 +12,16 @@ const STREET: &str = "attributes = [\"range\", \"ring\", \"time\", \"intensity\"
 const GROUND: &str = "OFF\n4 1 0\n-50 -50 0\n50 -50 0\n50 50 0\n-50 50 0\n4 0 1 2 3\n";
 const WALL: &str = "OFF\n4 1 0\n20 -30 0\n20 30 0\n20 30 6\n20 -30 6\n4 0 3 2 1\n";
 
+/// A folder with a sweep, sweep.npz.
+fn with_sweep() -> Folder {
+    let folder = Folder::new();
+    folder.write("ground.off", GROUND);
+    folder.write("wall.off", WALL);
+    folder.write("street.toml", STREET);
+    folder.succeeds("scan street.toml --adapter cpu --out sweep.npz");
+    folder
+}
+
 fn counts(folder: &Folder, file: &str) -> BTreeMap<String, usize> {
     let text = folder.text(file);
     let line = |line: &str| {
@@ -23,11 +33,7 @@ fn counts(folder: &Folder, file: &str) -> BTreeMap<String, usize> {
 
 #[test]
 fn a_sweep_is_corrupted_in_every_way_and_twice_alike() {
-    let folder = Folder::new();
-    folder.write("ground.off", GROUND);
-    folder.write("wall.off", WALL);
-    folder.write("street.toml", STREET);
-    folder.succeeds("scan street.toml --adapter cpu --out sweep.npz");
+    let folder = with_sweep();
     let sweep = folder.scan("sweep.npz");
     for out in ["one", "other"] {
         folder.succeeds(&format!("corrupt sweep.npz --sensor 0 0 1.8 --out {out}"));
@@ -87,11 +93,7 @@ fn sweeps_of_the_default_commands_have_the_intensities_that_corruptions_need() {
 
 #[test]
 fn intensities_stay_in_the_numbers_of_the_file() {
-    let folder = Folder::new();
-    folder.write("ground.off", GROUND);
-    folder.write("wall.off", WALL);
-    folder.write("street.toml", STREET);
-    folder.succeeds("scan street.toml --adapter cpu --out sweep.npz");
+    let folder = with_sweep();
     let mut sweep = folder.scan("sweep.npz");
     sweep.intensity.iter_mut().flatten().for_each(|intensity| *intensity *= 128.0);
     let hashing = formats::hash::Hashing::None;
@@ -161,27 +163,18 @@ fn corruptions_of_one_s_own_and_what_is_refused() {
     folder.write("empty/readme.txt", "");
     let list = folder.succeeds("corrupt --list");
     assert!(list.contains("wet-ground") && list.contains("left out of ModelNet-C"), "{list}");
-    folder.refuses(
-        1,
-        &[
-            ("corrupt cloud.xyz --reflectivity 1 --plan typo.toml", "typo.toml: TOML parse error"),
-            (
-                "corrupt cloud.xyz --reflectivity 1 --plan many.toml",
-                "many.toml: sweep[0].severity[0].transmission: expected a number within 0..=1",
-            ),
-            (
-                "corrupt cloud.xyz --reflectivity 1 --plan path.toml",
-                "expected letters, digits and -",
-            ),
-            ("corrupt cloud.xyz --reflectivity 1 --plan twice.toml", "is the name of sweep[0] too"),
-            (
-                "corrupt cloud.xyz --reflectivity 1 --plan wet.toml",
-                "wet.toml: sweep[0].severity[0].effects.weather.rain_mm_h: expected",
-            ),
-            ("corrupt empty", "no mesh found"),
-            ("corrupt nowhere.npz", "nowhere.npz"),
-        ],
-    );
+    for (plan, cause) in [
+        ("typo", "typo.toml: TOML parse error"),
+        ("many", "sweep[0].severity[0].transmission: expected a number within 0..=1"),
+        ("path", "expected letters, digits and -"),
+        ("twice", "is the name of sweep[0] too"),
+        ("wet", "wet.toml: sweep[0].severity[0].effects.weather.rain_mm_h: expected"),
+    ] {
+        let words = format!("corrupt cloud.xyz --reflectivity 1 --plan {plan}.toml");
+        folder.refuses(1, &[(&words, cause)]);
+    }
+    folder
+        .refuses(1, &[("corrupt empty", "no mesh found"), ("corrupt nowhere.npz", "nowhere.npz")]);
     folder.refuses(
         2,
         &[

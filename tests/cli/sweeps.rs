@@ -78,21 +78,20 @@ fn a_sweep_is_cut_and_its_clusters_are_named() {
     assert!(said.contains("warning: edge-64: expected a model of clusters in metres"), "{said}");
 }
 
-/// Where a PCD's or LAS's points begin, the bytes of a point, and where its class, two bytes, and
-/// its object, two bytes, lie in it.
-fn layout_of_points(name: &str, file: &[u8]) -> [usize; 4] {
-    if name.ends_with("las") {
-        // LAS 1.2, tables 3 and 5: the user data and the point source of format 0.
-        let begin = u32::from_le_bytes(file[96..100].try_into().unwrap()) as usize;
-        return [begin, 20, 17, 18];
+/// SemanticKITTI's labels and the ASPRS's code of a class of the street.
+fn codes(class: &str) -> (&'static [u16], u8) {
+    match class {
+        "ground" => (&[49], 2),
+        "car" => (&[10], 1),
+        "truck" => (&[18], 1),
+        "person" => (&[30], 1),
+        "two-wheeler" => (&[11, 15, 31, 32], 1),
+        "building" => (&[50], 6),
+        "bush" => (&[70], 4),
+        "tree" => (&[70, 71], 5),
+        "clutter" => (&[99], 1),
+        _ => (&[13, 51, 80, 81], 1),
     }
-    let data = b"DATA binary\n";
-    let begin = file.windows(data.len()).position(|part| part == data).unwrap() + data.len();
-    let header = std::str::from_utf8(&file[..begin]).unwrap();
-    let fields = "FIELDS x y z intensity ring label instance\nSIZE 4 4 4 4 2 4 4\n\
-                  TYPE F F F F U U U\nCOUNT 1 1 1 1 1 1 1\n";
-    assert!(header.contains(fields), "{header}");
-    [begin, 26, 18, 22]
 }
 
 #[test]
@@ -103,59 +102,36 @@ fn sweeps_name_the_class_and_the_object_of_each_point() {
         folder.succeeds(&format!("{scenes} {format} --format {format}"));
     }
     let scan = folder.scan("npz/sweeps/000000.npz");
-    let of_object: Vec<u16> = scan.object.iter().flatten().map(|&object| object as u16).collect();
     let said: Value = serde_json::from_slice(&folder.bytes("las/sweeps/000000.json")).unwrap();
-    let facts = |object: u16| &said["objects"][usize::from(object) - 1];
     let classes: Vec<String> = serde_json::from_value(said["classes"].clone()).unwrap();
     assert_eq!(classes[..2], ["air", "ground"]);
-    let class_of = |object: u16| match object {
-        0 => "ground",
-        _ => facts(object)["class"].as_str().unwrap(),
-    };
-
-    let cloud = folder.bytes("semantickitti/sweeps/velodyne/000000.bin");
-    let labels = folder.bytes("semantickitti/sweeps/labels/000000.label");
-    assert_eq!((cloud.len(), labels.len()), (16 * scan.len(), 4 * scan.len()));
-    for (i, label) in labels.as_chunks::<4>().0.iter().enumerate() {
-        let [label, object] = [0, 2].map(|at| u16::from_le_bytes([label[at], label[at + 1]]));
-        assert_eq!(object, of_object[i]);
-        // By semantic-kitti.yaml: other-ground, car, truck, person, building, vegetation or trunk.
-        let expected: &[u16] = match class_of(object) {
-            "ground" => &[49],
-            "car" => &[10],
-            "truck" => &[18],
-            "person" => &[30],
-            "building" => &[50],
-            "two-wheeler" => &[11, 15, 31, 32],
-            "tree" => &[70, 71],
-            "clutter" => &[99],
-            _ => &[13, 51, 70, 80, 81],
-        };
-        assert!(expected.contains(&label), "{label} of {}", class_of(object));
-        let row: Vec<u8> = scan.positions[i].iter().flat_map(|x| x.to_le_bytes()).collect();
-        assert_eq!(cloud[16 * i..16 * i + 12], row[..]);
-    }
-
-    for name in ["pcd/sweeps/000000.pcd", "las/sweeps/000000.las"] {
+    let pcd = folder.bytes("pcd/sweeps/000000.pcd");
+    let fields = "FIELDS x y z intensity ring label instance\nSIZE 4 4 4 4 2 4 4\n\
+                  TYPE F F F F U U U\nCOUNT 1 1 1 1 1 1 1\n";
+    assert!(String::from_utf8_lossy(&pcd[..300]).contains(fields));
+    // The bytes of a point, and where its class and object lie in it; LAS 1.2, table 5.
+    for (name, size, class_at, object_at) in [
+        ("semantickitti/sweeps/labels/000000.label", 4, 0, 2),
+        ("pcd/sweeps/000000.pcd", 26, 18, 22),
+        ("las/sweeps/000000.las", 20, 17, 18),
+    ] {
         let file = folder.bytes(name);
-        let [begin, size, class, object] = layout_of_points(name, &file);
-        let points = file[begin..].chunks_exact(size);
-        assert_eq!(points.len(), scan.len(), "{name}");
-        for (point, &expected) in points.zip(&of_object) {
-            assert_eq!(u16::from_le_bytes([point[object], point[object + 1]]), expected, "{name}");
-            assert_eq!(classes[usize::from(point[class])], class_of(expected), "{name}");
-            if size == 20 {
-                let code = match class_of(expected) {
-                    "ground" => 2,
-                    "building" => 6,
-                    "bush" => 4,
-                    "tree" => 5,
-                    _ => 1,
-                };
-                assert_eq!(point[15], code);
+        let points = file[file.len() - size * scan.len()..].chunks_exact(size);
+        for (point, &object) in points.zip(scan.object.as_ref().unwrap()) {
+            let number = |at: usize| u16::from_le_bytes([point[at], point[at + 1]]);
+            assert_eq!(u32::from(number(object_at)), object, "{name}");
+            let of_object = (object as usize).checked_sub(1).map(|i| &said["objects"][i]["class"]);
+            let class = of_object.map_or("ground", |class| class.as_str().unwrap());
+            match size {
+                4 => assert!(codes(class).0.contains(&number(class_at)), "{class}"),
+                _ => assert_eq!(classes[usize::from(point[class_at])], class, "{name}"),
             }
+            assert!(size != 20 || point[15] == codes(class).1, "{class}: {}", point[15]);
         }
-        folder.succeeds(&format!("segment {name} --out clusters --overwrite"));
+    }
+    for name in ["semantickitti/sweeps/velodyne/000000.bin", "pcd/sweeps/000000.pcd"] {
+        let said = folder.succeeds(&format!("preview {name} --overwrite"));
+        assert!(said.contains(&format!("{} points", scan.len())), "{said}");
     }
 }
 
