@@ -16,7 +16,7 @@ use sim_gpu::glam;
 use crate::flags::{need_extension, probability};
 use crate::overwrite::Overwrite;
 use crate::points::SweepArgs;
-use crate::preview::from_above::Outline;
+use crate::preview::panel::Outline;
 use crate::segment::tint;
 use crate::{Outcome, Usage, preview};
 use kitti::{Camera, label};

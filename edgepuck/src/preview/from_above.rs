@@ -6,25 +6,13 @@ use plotters::prelude::*;
 
 use super::canvas::draw_png;
 use super::frame::{Frame, View};
-use super::panel;
+use super::panel::{self, Outline};
 
 const EDGE: u32 = 1200;
 const TITLE_HEIGHT: u32 = 44;
 
 /// What is farther from the sensor is left out: the picture would be all road.
 const FARTHEST_M: f64 = 50.0;
-
-/// The box around an object, seen from above.
-pub struct Outline<'a> {
-    /// Its corners (x, y) in order, metres.
-    pub corners: [[f64; 2]; 4],
-    /// The object's class.
-    pub class: &'a str,
-    /// The confidence in the class, 0 to 1.
-    pub score: f64,
-    /// The colour of the class.
-    pub tint: RGBColor,
-}
 
 /// Draws the points of `scan` around its origin, each in its tint, and `outlines` with
 /// their classes and scores, to the PNG file `out`, atomically.

@@ -4,8 +4,8 @@
 mod canvas;
 mod colours;
 mod frame;
-pub mod from_above;
-mod panel;
+mod from_above;
+pub mod panel;
 
 use std::path::Path;
 

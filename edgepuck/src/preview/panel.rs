@@ -6,7 +6,6 @@ use plotters::prelude::*;
 
 use super::canvas::{Area, metres, text};
 use super::frame::{Frame, View};
-use super::from_above::Outline;
 
 /// Edge of the square that shows the frame, in pixels.
 const SQUARE: u32 = 380;
@@ -22,6 +21,18 @@ pub const HEIGHT: u32 = CAPTION + SQUARE + AXIS_X + 2 * MARGIN;
 
 const AXIS_NAMES: [&str; 3] = ["x (m)", "y (m)", "z (m)"];
 const GRID: RGBColor = RGBColor(232, 232, 232);
+
+/// The box around an object, seen from above.
+pub struct Outline<'a> {
+    /// Its corners (x, y) in order, metres.
+    pub corners: [[f64; 2]; 4],
+    /// The object's class.
+    pub class: &'a str,
+    /// The confidence in the class, 0 to 1.
+    pub score: f64,
+    /// The colour of the class.
+    pub tint: RGBColor,
+}
 
 /// Draws what `view` shows of `scan`, nearer points over farther ones, each in
 /// its tint, and `outlines` with a legend of their classes.
