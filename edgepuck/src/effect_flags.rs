@@ -3,7 +3,7 @@
 use crate::Usage;
 use crate::flags::first_given;
 use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel, Quantum};
-use sim_gpu::internals::config;
+use sim_gpu::internals::config::{self, InvalidValue};
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -49,7 +49,8 @@ impl EffectFlags {
     pub fn effects(&self, noise_m: f64, with_intensity: bool) -> anyhow::Result<Effects> {
         let intensity = with_intensity.then_some(Intensity);
         if let Some(file) = &self.effects {
-            let EffectsFile { mut effects } = config::read(file)?;
+            let mut effects =
+                config::read(file, |EffectsFile { effects }| Ok::<_, InvalidValue>(effects))?;
             if let Some(weather) = &mut effects.weather {
                 weather.empty_beams.get_or_insert(false);
             }

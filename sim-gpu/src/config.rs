@@ -7,6 +7,10 @@ use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 
+use mistakes::Mistakes;
+
+mod mistakes;
+
 /// The limit of files, beyond any that people write, so that a wrong path (a mesh, a device) does
 /// not fill the memory.
 const MAX_FILE_BYTES: u64 = 16 << 20;
@@ -29,12 +33,12 @@ pub enum ConfigError {
         /// The file as named by the user.
         file: PathBuf,
     },
-    /// The text is not TOML, or a key is unknown, missing or of another type.
+    /// The text cannot be used.
     #[error("{}: {message}", file.display())]
     Syntax {
         /// The file as named by the user.
         file: PathBuf,
-        /// Line, column, key and cause.
+        /// All that is wrong, each with its line, key and cause.
         message: String,
     },
     /// A value cannot be used.
@@ -79,8 +83,30 @@ impl InvalidValue {
     }
 }
 
-/// Reads `file` and parses it.
-pub fn read<T: DeserializeOwned>(file: &Path) -> Result<T, ConfigError> {
+impl From<InvalidValue> for Vec<InvalidValue> {
+    fn from(invalid: InvalidValue) -> Self {
+        vec![invalid]
+    }
+}
+
+/// All values, or all that is wrong.
+pub fn all<T>(
+    results: impl IntoIterator<Item = Result<T, InvalidValue>>,
+) -> Result<Vec<T>, Vec<InvalidValue>> {
+    let mut wrong = Vec::new();
+    let sound = results.into_iter().filter_map(|one| one.map_err(|error| wrong.push(error)).ok());
+    let sound = sound.collect();
+    if wrong.is_empty() { Ok(sound) } else { Err(wrong) }
+}
+
+/// Reads `file`, parses it, and makes of it what is wanted by `check`.
+///
+/// # Errors
+/// As [`parse`]'s.
+pub fn read<T: DeserializeOwned, U, E: Into<Vec<InvalidValue>>>(
+    file: &Path,
+    check: impl Fn(T) -> Result<U, E>,
+) -> Result<U, ConfigError> {
     let failed = |source| ConfigError::Read { file: file.to_owned(), source };
     let opened = std::fs::File::open(file).map_err(failed)?;
     let mut text = String::new();
@@ -88,30 +114,39 @@ pub fn read<T: DeserializeOwned>(file: &Path) -> Result<T, ConfigError> {
     if text.len() as u64 > MAX_FILE_BYTES {
         return Err(ConfigError::TooLong { file: file.to_owned() });
     }
-    parse(&text, file)
+    parse(&text, file, check)
 }
 
-/// Parses `text`, which is in `file`.
-pub fn parse<T: DeserializeOwned>(text: &str, file: &Path) -> Result<T, ConfigError> {
-    toml::from_str(text).map_err(|error| {
-        let message = error.to_string();
-        let message = format!("{}{}", message.trim_end(), suggestion(error.message()));
-        ConfigError::Syntax { file: file.to_owned(), message }
+/// Parses `text`, which is in `file`, and makes of it what is wanted by `check`.
+///
+/// # Errors
+/// All mistakes of the file at once: unknown and missing keys, values of other types, and those that
+/// `check` refuses.
+pub fn parse<T: DeserializeOwned, U, E: Into<Vec<InvalidValue>>>(
+    text: &str,
+    file: &Path,
+    check: impl Fn(T) -> Result<U, E>,
+) -> Result<U, ConfigError> {
+    // Windows' editors begin files with a byte order mark.
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    Mistakes::find(text, |value| check(value).map_err(Into::into)).map_err(|mistakes| {
+        ConfigError::Syntax { file: file.to_owned(), message: mistakes.to_string() }
     })
 }
 
-/// The likely word, where serde says "unknown field `nois`, expected one of `noise`, `dropout`".
-fn suggestion(message: &str) -> String {
-    let mut words = message.split('`').skip(1).step_by(2);
-    let is_unknown = message.starts_with("unknown field") || message.starts_with("unknown variant");
-    let word = words.next().filter(|_| is_unknown);
-    word.map(|word| did_you_mean(word, words)).unwrap_or_default()
+/// `expected one of range, ring, found "rnig"; did you mean "ring"?`
+pub(crate) fn one_of(word: &str, known: &[&str]) -> String {
+    let meant = did_you_mean(word, known.iter().copied());
+    format!("expected one of {}, found \"{word}\"{meant}", known.join(", "))
 }
 
 /// `; did you mean "noise"?` if one of `known` is close to `word`, and nothing otherwise.
 pub(crate) fn did_you_mean<'a>(word: &str, known: impl Iterator<Item = &'a str>) -> String {
-    // As clap and git: at most a third of the word is wrong.
-    let distance = |known: &&str| strsim::damerau_levenshtein(word, known);
+    // As clap and git: at most a third of the word is wrong, or its unit is missing.
+    let distance = |known: &&str| match known.strip_prefix(word) {
+        Some(unit) if unit.starts_with('_') => 0,
+        _ => strsim::damerau_levenshtein(word, known),
+    };
     let closest = known.min_by_key(distance);
     let closest = closest.filter(|known| 3 * distance(known) <= word.chars().count());
     closest.map(|known| format!("; did you mean \"{known}\"?")).unwrap_or_default()

@@ -119,7 +119,7 @@ pub(crate) fn azimuth_on_ring(view: u32, count: u32, first_azimuth_rad: f64) -> 
 ///
 /// An empty file is an empty list.
 pub fn load_poses(file: &Path) -> Result<Vec<Pose>, ConfigError> {
-    poses(config::read(file)?, file)
+    config::read(file, poses)
 }
 
 #[derive(Deserialize)]
@@ -129,11 +129,8 @@ struct PosesFile {
     pose: Vec<PoseKeys>,
 }
 
-fn poses(PosesFile { pose }: PosesFile, file: &Path) -> Result<Vec<Pose>, ConfigError> {
-    let tables = pose.iter().enumerate();
-    let poses: Result<_, InvalidValue> =
-        tables.map(|(i, keys)| keys.pose(&format!("pose[{i}]"))).collect();
-    poses.map_err(|invalid| invalid.in_file(file))
+fn poses(PosesFile { pose }: PosesFile) -> Result<Vec<Pose>, Vec<InvalidValue>> {
+    config::all(pose.iter().enumerate().map(|(i, keys)| keys.pose(&format!("pose[{i}]"))))
 }
 
 /// The rotation of a sensor at this elevation and azimuth from its target that looks at the target

@@ -164,11 +164,11 @@ fn corruptions_of_one_s_own_and_what_is_refused() {
     let list = folder.succeeds("corrupt --list");
     assert!(list.contains("wet-ground") && list.contains("left out of ModelNet-C"), "{list}");
     for (plan, cause) in [
-        ("typo", "typo.toml: TOML parse error"),
-        ("many", "sweep[0].severity[0].transmission: expected a number within 0..=1"),
+        ("typo", "did you mean \"transmission\"?"),
+        ("many", "line 4: sweep[0].severity[0].transmission: expected a number within 0..=1"),
         ("path", "expected letters, digits and -"),
         ("twice", "is the name of sweep[0] too"),
-        ("wet", "wet.toml: sweep[0].severity[0].effects.weather.rain_mm_h: expected"),
+        ("wet", "sweep[0].severity[0].effects.weather.rain_mm_h: expected"),
     ] {
         let words = format!("corrupt cloud.xyz --reflectivity 1 --plan {plan}.toml");
         folder.refuses(1, &[(&words, cause)]);

@@ -244,10 +244,7 @@ fn what_cannot_be_used_is_named_and_nothing_is_written() {
         1,
         &[
             ("gen-scenes missing.toml --out out", "missing.toml"),
-            (
-                "gen-scenes recipe.toml --out out",
-                "recipe.toml: object: expected at least one [[object]]",
-            ),
+            ("gen-scenes recipe.toml --out out", "object: expected at least one [[object]]"),
             ("gen-scenes street --sensor vlp99 --out out", "vlp99"),
             (
                 "gen-scenes own.toml --out out",

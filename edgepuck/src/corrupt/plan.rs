@@ -1,4 +1,3 @@
-use anyhow::{Context, bail, ensure};
 use edgepuck_assets::CORRUPTIONS;
 use edgepuck_dataset::ObjectCorruption;
 use serde::Deserialize;
@@ -44,16 +43,14 @@ pub struct LeftOut {
 impl Plan {
     /// The plan in `file`, or the built-in one.
     pub fn read(file: Option<&Path>) -> anyhow::Result<Self> {
-        let plan: Self = match file {
-            Some(file) => config::read(file)?,
-            None => config::parse(CORRUPTIONS, Path::new("corruptions.toml"))?,
-        };
-        let name = file.unwrap_or(Path::new("corruptions.toml")).display();
-        plan.check().with_context(|| name.to_string())?;
-        Ok(plan)
+        let checked = |plan: Self| plan.check().map(|()| plan);
+        Ok(match file {
+            Some(file) => config::read(file, checked)?,
+            None => config::parse(CORRUPTIONS, Path::new("corruptions.toml"), checked)?,
+        })
     }
 
-    fn check(&self) -> anyhow::Result<()> {
+    fn check(&self) -> Result<(), InvalidValue> {
         check_all("sweep", &self.sweep, Corruption::validate)?;
         check_all("object", &self.object, ObjectCorruption::validate)
     }
@@ -64,17 +61,21 @@ fn check_all<T>(
     kind: &str,
     entries: &[Entry<T>],
     validate: impl Fn(&T, &str) -> Result<(), InvalidValue>,
-) -> anyhow::Result<()> {
+) -> Result<(), InvalidValue> {
     for (i, Entry { name, severity, .. }) in entries.iter().enumerate() {
+        let wrong = |field: &str, cause: String| {
+            Err(InvalidValue::new(format!("{kind}[{i}].{field}"), cause))
+        };
         let is_allowed = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-        ensure!(
-            !name.is_empty() && name.chars().all(is_allowed),
-            "{kind}[{i}].name: expected letters, digits and -, found \"{name}\""
-        );
-        if let Some(first) = entries[..i].iter().position(|other| other.name == *name) {
-            bail!("{kind}[{i}].name: \"{name}\" is the name of {kind}[{first}] too");
+        if name.is_empty() || !name.chars().all(is_allowed) {
+            return wrong("name", format!("expected letters, digits and -, found \"{name}\""));
         }
-        ensure!(!severity.is_empty(), "{kind}[{i}].severity: expected one at least, found none");
+        if let Some(first) = entries[..i].iter().position(|other| other.name == *name) {
+            return wrong("name", format!("\"{name}\" is the name of {kind}[{first}] too"));
+        }
+        if severity.is_empty() {
+            return wrong("severity", "expected one at least, found none".to_owned());
+        }
         for (n, corruption) in severity.iter().enumerate() {
             validate(corruption, &format!("{kind}[{i}].severity[{n}]"))?;
         }

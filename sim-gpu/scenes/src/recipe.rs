@@ -233,7 +233,7 @@ impl Recipe {
     /// # Errors
     /// The file is missing or invalid; the error names the key and the cause.
     pub fn load(file: &Path) -> Result<Self, SceneError> {
-        config::read::<Self>(file)?.checked(file)
+        Ok(config::read(file, Self::checked)?)
     }
 
     /// Parses the recipe `text`. Errors name `file`, which need not exist.
@@ -241,11 +241,46 @@ impl Recipe {
     /// # Errors
     /// The recipe is invalid; the error names the key and the cause.
     pub fn parse(text: &str, file: &Path) -> Result<Self, SceneError> {
-        config::parse::<Self>(text, file)?.checked(file)
+        Ok(config::parse(text, file, Self::checked)?)
     }
 
-    fn checked(self, file: &Path) -> Result<Self, SceneError> {
-        self.check().map_err(|invalid| invalid.in_file(file))?;
+    fn checked(self) -> Result<Self, Vec<InvalidValue>> {
+        let Self { ground, mount, sensor, object, .. } = &self;
+        let variants = match self.variants {
+            0 => Err(InvalidValue::new("variants", "expected at least 1, found 0")),
+            _ => Ok(()),
+        };
+        let clearance_m = self.ground_clearance_m.unwrap_or_default();
+        let several = |key: &str, is_empty: bool| match is_empty {
+            true => {
+                let cause = format!("expected at least one [[{key}]], found none");
+                Err(InvalidValue::new(key, cause))
+            }
+            false => Ok(()),
+        };
+        let numbers = [
+            variants,
+            within("ground.half_m", ground.half_m, 1.0..=MOST_M),
+            ground.slope_deg.check("ground.slope_deg", 0.0, 45.0),
+            ground.roughness_m.check("ground.roughness_m", 0.0, 1.0),
+            ground.road_width_m.check("ground.road_width_m", 0.0, MOST_M),
+            ground.kerb_m.check("ground.kerb_m", 0.0, 1.0),
+            ground.reflectivity.check("ground.reflectivity", 0.0, 1.0),
+            mount.height_m.check("mount.height_m", -10.0, 100.0),
+            mount.tilt_deg.check("mount.tilt_deg", 0.0, 45.0),
+            mount.off_road_m.check("mount.off_road_m", 0.0, MOST_M),
+            mount.speed_m_s.check("mount.speed_m_s", 0.0, 100.0),
+            mount.sway_deg.check("mount.sway_deg", 0.0, 10.0),
+            self.glass_returned.check("glass_returned", 0.0, 1.0),
+            clearance_m.check("ground_clearance_m", 0.0, 1.0),
+            several("sensor", sensor.is_empty()),
+            several("object", object.is_empty()),
+        ];
+        let sensors = sensor.iter().enumerate();
+        let sensors = sensors.map(|(i, sensor)| sensor.check(&format!("sensor[{i}]")));
+        let objects = object.iter().enumerate();
+        let objects = objects.map(|(i, objects)| objects.check(&format!("object[{i}]")));
+        config::all(numbers.into_iter().chain(sensors).chain(objects))?;
         Ok(self)
     }
 
@@ -280,40 +315,6 @@ impl Recipe {
             .iter()
             .map(|sensor| SensorProfile::resolve_in(folder, &sensor.profile))
             .collect()
-    }
-
-    fn check(&self) -> Result<(), InvalidValue> {
-        let Self { ground, mount, sensor, object, .. } = self;
-        if self.variants == 0 {
-            return Err(InvalidValue::new("variants", "expected at least 1, found 0"));
-        }
-        within("ground.half_m", ground.half_m, 1.0..=MOST_M)?;
-        ground.slope_deg.check("ground.slope_deg", 0.0, 45.0)?;
-        ground.roughness_m.check("ground.roughness_m", 0.0, 1.0)?;
-        ground.road_width_m.check("ground.road_width_m", 0.0, MOST_M)?;
-        ground.kerb_m.check("ground.kerb_m", 0.0, 1.0)?;
-        ground.reflectivity.check("ground.reflectivity", 0.0, 1.0)?;
-        mount.height_m.check("mount.height_m", -10.0, 100.0)?;
-        mount.tilt_deg.check("mount.tilt_deg", 0.0, 45.0)?;
-        mount.off_road_m.check("mount.off_road_m", 0.0, MOST_M)?;
-        mount.speed_m_s.check("mount.speed_m_s", 0.0, 100.0)?;
-        mount.sway_deg.check("mount.sway_deg", 0.0, 10.0)?;
-        self.glass_returned.check("glass_returned", 0.0, 1.0)?;
-        let clearance_m = self.ground_clearance_m.unwrap_or_default();
-        clearance_m.check("ground_clearance_m", 0.0, 1.0)?;
-        for (i, sensor) in sensor.iter().enumerate() {
-            sensor.check(&format!("sensor[{i}]"))?;
-        }
-        for (i, objects) in object.iter().enumerate() {
-            objects.check(&format!("object[{i}]"))?;
-        }
-        for (key, is_empty) in [("sensor", sensor.is_empty()), ("object", object.is_empty())] {
-            if is_empty {
-                let cause = format!("expected at least one [[{key}]], found none");
-                return Err(InvalidValue::new(key, cause));
-            }
-        }
-        Ok(())
     }
 }
 

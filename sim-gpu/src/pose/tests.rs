@@ -97,8 +97,7 @@ fn look_at_refuses_what_has_no_direction() {
 }
 
 fn parse(text: &str) -> Result<Vec<Pose>, ConfigError> {
-    let file = Path::new("poses.toml");
-    poses(config::parse(text, file)?, file)
+    config::parse(text, Path::new("poses.toml"), poses)
 }
 
 #[test]

@@ -92,47 +92,37 @@ pub struct SceneSensor {
 impl SceneFile {
     /// Reads a scene and its sensor profiles.
     pub fn load(file: &Path) -> Result<Self, ConfigError> {
-        let table: table::SceneTable = config::read(file)?;
-        Self::from_table(table, file)
+        config::read(file, |table| Self::from_table(table, file))
     }
 
     /// Parses a scene in `file`, which need not exist; relative paths start from its folder.
     pub fn parse(text: &str, file: &Path) -> Result<Self, ConfigError> {
-        Self::from_table(config::parse(text, file)?, file)
+        config::parse(text, file, |table| Self::from_table(table, file))
     }
 
-    fn from_table(table: table::SceneTable, file: &Path) -> Result<Self, ConfigError> {
-        let in_file = |invalid: InvalidValue| invalid.in_file(file);
+    fn from_table(table: table::SceneTable, file: &Path) -> Result<Self, Vec<InvalidValue>> {
         let folder = file.parent().unwrap_or(Path::new(""));
-        let effects = table.effects.clone();
-        let attributes = table::check_attributes(&table.attributes, &effects).map_err(in_file)?;
-
-        let mut objects = Vec::new();
-        for (i, object) in table.object.into_iter().enumerate() {
-            objects.push(object.validate(i, folder).map_err(in_file)?);
-        }
-        check_names("object", objects.iter().map(|object| &object.name)).map_err(in_file)?;
-
-        let mut sensors = Vec::new();
-        for (i, sensor) in table.sensor.into_iter().enumerate() {
-            let profile =
-                SensorProfile::resolve_in(folder, &sensor.profile).map_err(
-                    |error| match error {
-                        ConfigError::UnknownSensor { .. } => {
-                            let key = format!("sensor[{i}].profile");
-                            in_file(InvalidValue::new(key, error.to_string()))
-                        }
-                        in_profile => in_profile,
-                    },
-                )?;
-            effects.for_sensor(&profile).map_err(in_file)?;
-            sensors.push(sensor.validate(i, folder, profile).map_err(in_file)?);
-        }
-        check_names("sensor", sensors.iter().map(|sensor| &sensor.name)).map_err(in_file)?;
+        let effects = table.effects;
+        let attributes = table::check_attributes(&table.attributes, &effects);
+        let object = |(i, object): (_, table::ObjectTable)| object.validate(i, folder);
+        let objects = config::all(table.object.into_iter().enumerate().map(object));
+        let sensor = |(i, sensor): (_, table::SensorTable)| sensor.validate(i, folder, &effects);
+        let sensors = config::all(table.sensor.into_iter().enumerate().map(sensor));
+        let (attributes, objects, sensors) = match (attributes, objects, sensors) {
+            (Ok(attributes), Ok(objects), Ok(sensors)) => (attributes, objects, sensors),
+            (attributes, objects, sensors) => {
+                let wrong = [attributes.err(), objects.err(), sensors.err()];
+                return Err(wrong.into_iter().flatten().flatten().collect());
+            }
+        };
+        config::all([
+            check_names("object", objects.iter().map(|object| &object.name)),
+            check_names("sensor", sensors.iter().map(|sensor| &sensor.name)),
+        ])?;
         for (i, object) in objects.iter().enumerate() {
             if let Some(trajectory) = &object.motion {
                 let key = format!("object[{i}].trajectory");
-                table::check_moves(&key, trajectory, &sensors).map_err(in_file)?;
+                table::check_moves(&key, trajectory, &sensors)?;
             }
         }
 
@@ -144,7 +134,7 @@ impl SceneFile {
             attributes,
             simplify: table.simplify,
         };
-        scene.check_triangles().map_err(in_file)?;
+        scene.check_triangles()?;
         Ok(scene)
     }
 }

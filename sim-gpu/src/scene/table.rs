@@ -10,7 +10,7 @@ use glam::{DQuat, DVec3};
 use serde::Deserialize;
 
 use super::{SceneObject, SceneSensor};
-use crate::config::{InvalidValue, positive, within};
+use crate::config::{self, InvalidValue, one_of, positive, within};
 use crate::effects::Effects;
 use crate::material::{ColourSource, MaterialChoice, MaterialTable};
 use crate::mesh::frame::{Normalize, Unit, Up};
@@ -65,7 +65,7 @@ pub(super) struct ObjectTable {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SensorTable {
-    pub profile: String,
+    profile: String,
     name: Option<String>,
     position_m: Option<[f64; 3]>,
     look_at_m: Option<[f64; 3]>,
@@ -285,11 +285,16 @@ impl SensorTable {
         self,
         index: usize,
         folder: &Path,
-        sensor: SensorProfile,
+        effects: &Effects,
     ) -> Result<SceneSensor, InvalidValue> {
         let table = format!("sensor[{index}]");
         let key = |field: &str| format!("{table}.{field}");
+        let sensor = SensorProfile::resolve_in(folder, &self.profile)
+            .map_err(|error| InvalidValue::new(key("profile"), error.to_string()))?;
         let name = named(&table, self.name.unwrap_or_else(|| sensor.name.clone()))?;
+        effects.for_sensor(&sensor).map_err(|InvalidValue { key, cause }| {
+            InvalidValue::new(key, format!("{cause}: {table}, \"{name}\""))
+        })?;
         let sensor = match self.revolutions {
             None => sensor,
             Some(revolutions) => sensor
@@ -330,21 +335,23 @@ impl SensorTable {
 pub(super) fn check_attributes(
     attributes: &[String],
     effects: &Effects,
-) -> Result<AttributeSet, InvalidValue> {
+) -> Result<AttributeSet, Vec<InvalidValue>> {
     let mut set = AttributeSet::new();
-    for (i, word) in attributes.iter().enumerate() {
-        let wrong = |cause: String| Err(InvalidValue::new(format!("attributes[{i}]"), cause));
-        let attribute = match word.parse() {
-            Ok(attribute) => attribute,
-            Err(error) => return wrong(format!("{error}")),
-        };
+    let checked = attributes.iter().enumerate().map(|(i, word)| {
+        let wrong = |cause: String| InvalidValue::new(format!("attributes[{i}]"), cause);
+        let attribute = word.parse().map_err(|_| {
+            let known = Attribute::ALL.map(Attribute::name);
+            wrong(one_of(word, &known))
+        })?;
         if attribute == Attribute::Intensity && effects.intensity.is_none() {
-            return wrong("intensity requires effects.intensity = true".to_owned());
+            return Err(wrong("intensity requires effects.intensity = true".to_owned()));
         }
         if !set.insert(attribute) {
-            return wrong(format!("found \"{word}\" in the list twice"));
+            return Err(wrong(format!("found \"{word}\" in the list twice")));
         }
-    }
+        Ok(())
+    });
+    config::all(checked)?;
     Ok(set)
 }
 

@@ -10,7 +10,7 @@ use std::path::Path;
 use edgepuck_assets::SENSORS;
 use serde::{Deserialize, Serialize};
 
-use crate::config::{self, ConfigError, InvalidValue};
+use crate::config::{ConfigError, InvalidValue};
 
 pub use cone::Cone;
 pub use detection_limit::DetectionLimit;
@@ -154,9 +154,7 @@ impl SensorProfile {
         if file.extension().is_some_and(|extension| extension == "json") {
             return ouster::load(file);
         }
-        let mut profile: profile::Profile = config::read(file)?;
-        profile.load_table(file)?;
-        Self::try_from(profile).map_err(|invalid| invalid.in_file(file))
+        profile::load(file)
     }
 
     /// A built-in sensor by name, or else a profile by path.

@@ -43,49 +43,57 @@ fn one() -> NonZeroU32 {
 
 impl Profile {
     /// Reads the table of directions that the profile names, relative to its own `file`.
-    pub(super) fn load_table(&mut self, file: &Path) -> Result<(), ConfigError> {
+    fn load_table(&mut self, file: &Path) -> Result<(), InvalidValue> {
         self.table.as_mut().map_or(Ok(()), |table| table.load(file))
     }
 }
 
 pub(super) fn parse(text: &str, file: &Path) -> Result<SensorProfile, ConfigError> {
-    let profile: Profile = config::parse(text, file)?;
-    SensorProfile::try_from(profile).map_err(|invalid| invalid.in_file(file))
+    config::parse(text, file, Profile::checked)
+}
+
+pub(super) fn load(file: &Path) -> Result<SensorProfile, ConfigError> {
+    config::read(file, |mut profile: Profile| {
+        profile.load_table(file)?;
+        profile.checked()
+    })
 }
 
 impl TryFrom<Profile> for SensorProfile {
     type Error = InvalidValue;
 
     fn try_from(profile: Profile) -> Result<Self, InvalidValue> {
-        if profile.name.trim().is_empty() {
-            return Err(InvalidValue::new("name", "expected a name, found none"));
-        }
-        check_range(&profile.range)?;
+        profile.checked().map_err(|mut all| all.swap_remove(0))
+    }
+}
+
+impl Profile {
+    fn checked(self) -> Result<SensorProfile, Vec<InvalidValue>> {
+        let profile = self;
+        let name = match profile.name.trim() {
+            "" => Err(InvalidValue::new("name", "expected a name, found none")),
+            _ => Ok(()),
+        };
         let sigma_m = profile.noise.map(|noise| noise.typical_sigma_m);
-        within("noise.typical_sigma_m", sigma_m, 0.0..=f64::MAX)?;
-        if let Some(limit) = &profile.detection {
-            limit.validate("detection")?;
-        }
-        if let Some(footprint) = &profile.footprint {
-            footprint.validate("footprint")?;
-        }
-        if let Some(rings) = &profile.rings {
-            rings.validate()?;
-        }
-        if let Some(sample) = &profile.sample {
-            sample.validate()?;
-        }
-        if let Some(views) = &profile.views {
-            views.validate()?;
-        }
-        let layouts = [
+        let layout = only_layout([
             profile.rotating.map(Layout::Rotating),
             profile.uniform.map(Layout::Uniform),
             profile.grid.map(Layout::Grid),
             profile.risley.map(Layout::Risley),
             profile.table.map(Layout::Table),
-        ];
-        let layout = only_layout(layouts)?;
+        ]);
+        config::all([
+            name,
+            check_range(&profile.range),
+            within("noise.typical_sigma_m", sigma_m, 0.0..=f64::MAX),
+            profile.detection.map_or(Ok(()), |limit| limit.validate("detection")),
+            profile.footprint.map_or(Ok(()), |footprint| footprint.validate("footprint")),
+            profile.rings.as_ref().map_or(Ok(()), Rings::validate),
+            profile.sample.as_ref().map_or(Ok(()), Sample::validate),
+            profile.views.as_ref().map_or(Ok(()), Views::validate),
+            layout.as_ref().map_err(Clone::clone).map(|_| ()),
+        ])?;
+        let layout = layout?;
         if let (Layout::Rotating(rotating), Some(_)) = (&layout, &profile.rings)
             && (rotating.beam_crossing_m.is_some() || rotating.beam_start_m.is_some())
         {
@@ -95,9 +103,9 @@ impl TryFrom<Profile> for SensorProfile {
                 Some(_) => "rotating.beam_crossing_m",
                 None => "rotating.beam_start_m",
             };
-            return Err(InvalidValue::new(key, cause));
+            return Err(InvalidValue::new(key, cause).into());
         }
-        let sensor = Self {
+        let sensor = SensorProfile {
             name: profile.name,
             description: profile.description,
             sources: profile.sources,

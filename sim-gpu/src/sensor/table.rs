@@ -38,14 +38,15 @@ fn one_line() -> u16 {
 
 impl Table {
     /// Reads the CSV file, if there is one, relative to the `profile`.
-    pub(super) fn load(&mut self, profile: &Path) -> Result<(), ConfigError> {
+    pub(super) fn load(&mut self, profile: &Path) -> Result<(), InvalidValue> {
         if let Some(file) = self.file.take() {
             if !self.directions_deg.is_empty() {
                 let cause = "cannot stand beside table.directions_deg";
-                return Err(InvalidValue::new("table.file", cause).in_file(profile));
+                return Err(InvalidValue::new("table.file", cause));
             }
             let folder = profile.parent().unwrap_or(Path::new(""));
-            self.directions_deg = read(&folder.join(file))?;
+            self.directions_deg = read(&folder.join(file))
+                .map_err(|error| InvalidValue::new("table.file", error.to_string()))?;
         }
         Ok(())
     }

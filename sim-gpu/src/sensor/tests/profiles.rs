@@ -104,9 +104,9 @@ max_m = 10 -> max_m = 1e10 -> range.max_m
 max_m = 10 -> min_m = 10, max_m = 10 -> range.max_m: expected a number above range.min_m
 max_m = 10 -> min_m = -1, max_m = 10 -> range.min_m
 max_m = 10 -> max_m = 10, quantum_m = 0 -> range.quantum_m
-max_m = 10 -> max_m = "far" -> line 3
+max_m = 10 -> max_m = "far" -> line 3: range.max_m: expected a number, found "far"
 [rotating] -> [noise]\ntypical_sigma_m = -1\n[rotating] -> noise.typical_sigma_m
-rpm = 60 -> rmp = 60 -> unknown field `rmp`
+rpm = 60 -> rmp = 60 -> found "rmp"; did you mean "rpm"?
 rpm = 60 -> rpm = 0 -> rotating.rpm
 rpm = 60 -> rpm = 1e300 -> rotating: expected at least one ray
 rpm = 60 -> rpm = 1e-300 -> expected at most 67108864 rays
@@ -155,9 +155,9 @@ step_deg = 1.0 -> step_deg = 0 -> rings.step_deg
 keep_to = 0.75 -> keep_to = 0.25 -> rings.keep_to
 points = 768 -> points = 0 -> sample.points
 before_rings = 1024 -> before_rings = 0 -> sample.before_rings
-count = 5 -> count = 4294967296 -> expected u32
+count = 5 -> count = 4294967296 -> views.count: expected a whole number within 0..=4294967295
 distance_m = 5.0 -> distance_m = 0 -> views.distance_m
-normalize = "bbox" -> normalize = "box" -> unknown variant `box`
+normalize = "bbox" -> normalize = "box" -> views.normalize: expected one of
 "#;
 
 #[test]
