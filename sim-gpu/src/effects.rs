@@ -65,7 +65,7 @@ pub struct Noise {
     pub mean_m: f64,
     /// Standard deviation in metres, 0 or more.
     pub sigma_m: f64,
-    /// The quantity that the noise is added to; default [`NoiseModel::Range`].
+    /// The quantity that the noise is added to.
     #[serde(default)]
     pub model: NoiseModel,
 }
@@ -312,6 +312,7 @@ struct EffectsTable {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     motion: Option<Box<EvenMotion>>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// The quantum to multiples of which ranges are rounded, metres.
     quantise_m: Option<SwitchOrMetres>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     intensity: Option<bool>,

@@ -192,6 +192,12 @@ impl Reader<'_> {
             let word = words.next().unwrap_or_default();
             return one_of(word, &words.collect::<Vec<_>>());
         }
+        if let Some((word, known)) = message
+            .strip_prefix("unexpected keys in table: ")
+            .and_then(|words| words.split_once(", available keys: "))
+        {
+            return one_of(word, &known.split(", ").collect::<Vec<_>>());
+        }
         if message.contains(", found ") {
             return message.to_owned();
         }

@@ -48,12 +48,16 @@ pub(super) enum Table {
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Numbers {
+    /// The reflectivity of the weakest surface that is detected at `range_m`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     reflectivity: Option<f64>,
+    /// The range up to which that surface is detected, metres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     range_m: Option<f64>,
+    /// The threshold divided by the standard deviation of the receiver's noise; without noise if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     threshold_to_noise: Option<f64>,
+    /// The standard deviation of the range of a return at the limit, metres; 0 if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     range_sigma_m: Option<f64>,
 }

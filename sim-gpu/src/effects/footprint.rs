@@ -87,10 +87,13 @@ pub(super) enum Table {
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Numbers {
+    /// Rays of each beam: 1, 7, 19 or 37.
     #[serde(default = "usual_samples")]
     samples: u32,
+    /// The beam's full angles, horizontal and vertical; the sensor's own if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     divergence_deg: Option<[f64; 2]>,
+    /// Surfaces whose ranges differ by less than this give one return; the sensor's own if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     separation_m: Option<f64>,
 }

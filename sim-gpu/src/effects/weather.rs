@@ -28,8 +28,8 @@ pub struct Weather {
     /// Dust and spray.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub volumes: Vec<Volume>,
-    /// Whether beams that meet no surface may return from the air; `None` is yes. For `gen-dataset`
-    /// `None` is no: clouds of single objects are cut out of scans, without such returns.
+    /// Whether beams that meet no surface may return from the air; `None` is yes, but no for
+    /// `gen-dataset`, which cuts clouds of single objects out of scans without such returns.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub empty_beams: Option<bool>,
 }

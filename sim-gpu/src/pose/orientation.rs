@@ -11,7 +11,9 @@ use crate::config::{InvalidValue, finite};
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct PoseKeys {
+    /// The position, metres.
     pub position_m: [f64; 3],
+    /// The point that the x axis points at, metres, instead of the angles.
     pub look_at_m: Option<[f64; 3]>,
     /// Angle about z, counterclockwise seen from above, applied last.
     pub yaw_deg: Option<f64>,
@@ -19,7 +21,7 @@ pub(crate) struct PoseKeys {
     pub pitch_deg: Option<f64>,
     /// Angle about x, applied first.
     pub roll_deg: Option<f64>,
-    /// A quaternion of any length but 0.
+    /// A quaternion of any length but 0, instead of the angles.
     pub quaternion_xyzw: Option<[f64; 4]>,
 }
 

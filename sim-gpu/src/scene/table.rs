@@ -23,12 +23,17 @@ use crate::simplify::Simplify;
 pub(super) struct SceneTable {
     #[serde(default)]
     pub seed: u64,
+    /// The objects, at least one.
     #[serde(default)]
     pub object: Vec<ObjectTable>,
+    /// The sensors, at least one; each makes a scan.
     #[serde(default)]
     pub sensor: Vec<SensorTable>,
     #[serde(default)]
     pub effects: Effects,
+    /// The attributes of points besides positions, of `range`, `beam`, `ring`, `time`, `triangle`,
+    /// `object`, `intensity`, `power`, `reflectivity`, `return`, `medium`, `sensor`, `attitude` and
+    /// `normal`.
     #[serde(default)]
     pub attributes: Vec<String>,
     pub simplify: Option<Simplify>,
@@ -37,10 +42,12 @@ pub(super) struct SceneTable {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ObjectTable {
+    /// The mesh's file, from the folder of the scene's file.
     mesh: PathBuf,
     name: Option<String>,
     label: Option<String>,
     up: Option<Up>,
+    /// The scale and the place of the mesh; by default those of its file.
     normalize: Option<Normalize>,
     #[serde(default)]
     units: Unit,
@@ -54,19 +61,24 @@ pub(super) struct ObjectTable {
     trajectory: Option<toml::Value>,
     scale: Option<Scale>,
     reflectivity: Option<f64>,
+    /// The quality as a retro-reflector, such as a road sign: up to 1, which is ideal.
     #[serde(default)]
     retroreflection: f64,
+    /// The source of the colours of an OBJ file's faces, which give reflectivities.
     colours: Option<ColourSource>,
     #[serde(default)]
     materials: BTreeMap<String, MaterialTable>,
+    /// The simplification of the mesh; by default the scene's. `false` switches it off.
     simplify: Option<OwnSimplify>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SensorTable {
+    /// The name of a built-in sensor, or the path of a sensor's file from the scene's.
     profile: String,
     name: Option<String>,
+    /// The sensor's position, metres; required without a trajectory.
     position_m: Option<[f64; 3]>,
     look_at_m: Option<[f64; 3]>,
     yaw_deg: Option<f64>,
@@ -75,6 +87,7 @@ pub(super) struct SensorTable {
     quaternion_xyzw: Option<[f64; 4]>,
     /// The poses over time, instead of the keys above.
     trajectory: Option<toml::Value>,
+    /// The revolutions of the scan; by default those of the profile.
     revolutions: Option<NonZeroU32>,
     #[serde(default)]
     start_s: f64,
@@ -89,6 +102,7 @@ const PERIOD_S: f64 = 0.1;
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct TimedPose {
+    /// The time of the pose, on the clock of `start_s`.
     time_s: f64,
     position_m: [f64; 3],
     look_at_m: Option<[f64; 3]>,

@@ -16,11 +16,12 @@ pub struct Grid {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// The angle from the centres of the leftmost pixels to those of the rightmost: BLAINDER's
+    /// The angle, above 0 and below 180, from the centres of the leftmost pixels to those of the rightmost: BLAINDER's
     /// static scanner puts pixel centres on the edges of the view.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fov_x_deg: Option<f64>,
-    /// The angle from the centres of the top pixels to those of the bottom pixels.
+    /// The angle, above 0 and below 180, from the centres of the top pixels to those of the bottom
+    /// pixels.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fov_y_deg: Option<f64>,
     /// Horizontal focal length in pixels.

@@ -23,10 +23,15 @@ pub(super) struct Profile {
     noise: Option<TypicalNoise>,
     detection: Option<DetectionLimit>,
     footprint: Option<BeamShape>,
+    /// A head of lasers that turns. Each profile has this layout or one of the next four.
     rotating: Option<Rotating>,
+    /// A regular grid of angles.
     uniform: Option<Uniform>,
+    /// The pixels of a camera.
     grid: Option<Grid>,
+    /// Lines of lasers behind turning prisms.
     risley: Option<Risley>,
+    /// A table of directions.
     table: Option<Table>,
     #[serde(default = "one")]
     decimation: NonZeroU32,

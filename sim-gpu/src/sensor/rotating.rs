@@ -44,9 +44,9 @@ pub struct Rotating {
 pub struct Beam {
     /// The clockwise angle from the beam to the encoder's azimuth.
     pub azimuth_offset_deg: f64,
-    /// Angle above the sensor's x-y plane.
+    /// Angle above the sensor's x-y plane, -90 to 90 degrees; with `beam_crossing_m`, -89 to 89.
     pub elevation_deg: f64,
-    /// Time since the start of the sequence.
+    /// Time since the start of the sequence, from 0 to below `sequence_us`.
     pub firing_us: f64,
 }
 

@@ -3,6 +3,7 @@
 use formats::rng::StreamKey;
 use serde::{Deserialize, Serialize};
 
+use super::MAX_RAYS;
 use crate::config::{InvalidValue, within};
 
 /// The number of points to sample from a scan.
@@ -43,9 +44,8 @@ impl Sample {
     }
 
     pub(super) fn validate(&self) -> Result<(), InvalidValue> {
-        let most = super::MAX_RAYS as f64;
-        within("sample.points", f64::from(self.points), 1.0..=most)?;
-        within("sample.before_rings", self.before_rings.map(f64::from), 1.0..=most)
+        within("sample.points", f64::from(self.points), 1.0..=MAX_RAYS as f64)?;
+        within("sample.before_rings", self.before_rings.map(f64::from), 1.0..=MAX_RAYS as f64)
     }
 }
 

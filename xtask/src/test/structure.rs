@@ -5,6 +5,8 @@
 mod circles;
 mod links;
 mod modules;
+#[cfg(test)]
+mod reference;
 mod tokens;
 
 use crate::summary::{Counts, Summary};
