@@ -43,7 +43,7 @@ pub fn normalize_unit_sphere(points: &mut [[f32; 3]]) {
 /// and appends uniformly drawn repetitions. It returns `None` if there are no points and `n` is not
 /// 0.
 #[must_use]
-pub fn resample(points: &[[f32; 3]], n: usize, key: StreamKey) -> Option<Vec<[f32; 3]>> {
+pub fn resample<T: Copy>(points: &[T], n: usize, key: StreamKey) -> Option<Vec<T>> {
     if points.len() > n {
         return Some(draw_without_replacement(points, n, key));
     }
@@ -59,7 +59,7 @@ pub fn resample(points: &[[f32; 3]], n: usize, key: StreamKey) -> Option<Vec<[f3
 
 /// The first `n` steps of a Fisher-Yates shuffle. It stores only the indices that were swapped, at
 /// most `n`.
-fn draw_without_replacement(points: &[[f32; 3]], n: usize, key: StreamKey) -> Vec<[f32; 3]> {
+fn draw_without_replacement<T: Copy>(points: &[T], n: usize, key: StreamKey) -> Vec<T> {
     let mut moved = HashMap::with_capacity(n);
     (0..n)
         .map(|i| {
@@ -118,8 +118,8 @@ mod tests {
 
     #[test]
     fn nothing_cannot_be_repeated() {
-        assert_eq!(resample(&[], 4, key(0)), None);
-        assert_eq!(resample(&[], 0, key(0)), Some(vec![]));
+        assert_eq!(resample::<[f32; 3]>(&[], 4, key(0)), None);
+        assert_eq!(resample::<[f32; 3]>(&[], 0, key(0)), Some(vec![]));
         assert_eq!(resample(&numbered(3), 0, key(0)), Some(vec![]));
     }
 

@@ -21,7 +21,7 @@ class Dataset:
     """The meshes of a folder as point clouds, cast on demand.
 
     It is a map-style dataset for PyTorch, but needs no PyTorch: `dataset[i]` is a cloud of shape
-    [points, 3] in the unit sphere, and its class. A cloud depends only on the seed, the epoch and `i`,
+    [points, 3] in the unit sphere, and its class. `attributes` adds columns. A cloud depends only on the seed, the epoch and `i`,
     not on batches or workers; on the same adapter, it does not depend on the machine. In epoch 0, the
     clouds are those that `edgepuck gen-dataset` packs with the same settings; a view of too few points,
     which `gen-dataset` leaves out, is replaced by another view.
@@ -48,6 +48,10 @@ class Dataset:
         min_points: A view with fewer points is replaced by another view.
         cache_mb: The size of the cache of meshes in each process, MiB.
         adapter: The adapter, as in `Sensor`.
+        attributes: The attributes of each point besides its position, as in `Sensor.scan`. A cloud then
+            has the shape [points, 3 + k], with the attributes in this order after x, y and z: one
+            column for each, but three for sensor, attitude and normal. Positions are in the unit
+            sphere; attributes keep their units, such as metres of range.
         transform: A function that `dataset[i]` applies to each cloud; `batch` does not.
 
     Raises:
@@ -75,6 +79,7 @@ class Dataset:
         min_points: int = 64,
         cache_mb: int = 1024,
         adapter: str = "cpu",
+        attributes: Sequence[str] = (),
         transform: Callable[[NDArray[np.float32]], Any] | None = None,
     ) -> None:
         flags = {
@@ -95,7 +100,9 @@ class Dataset:
         words = [f"--{flag}={value}" for flag, value in flags.items() if value is not None]
         self._seed, self._transform = seed, transform
         cache = whole("cache_mb", cache_mb, 0, 2**30) << 20
-        self._arguments = (os.path.abspath(meshes), split, words, cache, adapter)
+        if isinstance(attributes, str):
+            raise _edgepuck.Error(f"attributes: expected a list of names, found {attributes!r}")
+        self._arguments = (os.path.abspath(meshes), split, words, list(attributes), cache, adapter)
         self._clouds = _edgepuck.Clouds(*self._arguments)
         # Shared memory, so that workers that persist over epochs see the current epoch.
         self._epoch = multiprocessing.RawValue("Q", 0)
@@ -129,7 +136,7 @@ class Dataset:
         return self._clouds.source(self._number(index))
 
     def batch(self, indices: Sequence[int]) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
-        """The clouds at `indices`, [n, points, 3], and their labels, [n]."""
+        """The clouds at `indices`, [n, points, 3 + k], and their labels, [n]."""
         seed = _edgepuck.seed_of_epoch(self._seed, self.epoch)
         return self._clouds.draw(seed, [self._number(index) for index in indices])
 

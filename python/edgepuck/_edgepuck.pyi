@@ -94,6 +94,7 @@ class Clouds:
         meshes: str,
         split: str | None,
         flags: Sequence[str],
+        attributes: Sequence[str],
         cache_bytes: int,
         adapter: str,
     ) -> Clouds: ...

@@ -2,12 +2,13 @@ use crate::error::{raised, raised_with_causes};
 use crate::process::{self, LazyCaster};
 use edgepuck_dataset as dataset;
 use formats::Split;
+use formats::scan::Attribute;
 use numpy::ndarray::Array3;
 use numpy::{IntoPyArray, PyArray1, PyArray3};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 
-/// Clouds, `[n, points, 3]`, and their classes, `[n]`.
+/// Clouds, `[n, points, 3 + columns of attributes]`, and their classes, `[n]`.
 type Batch<'py> = (Bound<'py, PyArray3<f32>>, Bound<'py, PyArray1<i64>>);
 
 /// The clouds of a folder of meshes, scanned from viewpoints around each.
@@ -15,32 +16,39 @@ type Batch<'py> = (Bound<'py, PyArray3<f32>>, Bound<'py, PyArray1<i64>>);
 pub struct Clouds {
     clouds: dataset::Clouds,
     n_points: usize,
+    attributes: Vec<Attribute>,
     caster: LazyCaster,
 }
 
 #[pymethods]
 impl Clouds {
     /// The clouds that `gen-dataset` makes with `flags` of the meshes in a folder, of one split or
-    /// of both.
+    /// of both. Points have these attributes, in this order.
     #[new]
     fn new(
         py: Python<'_>,
         meshes: PathBuf,
         split: Option<&str>,
-        flags: Vec<String>,
+        mut flags: Vec<String>,
+        attributes: Vec<String>,
         cache_bytes: usize,
         adapter: &str,
     ) -> PyResult<Self> {
         let split: Option<Split> = split.map(str::parse).transpose().map_err(raised)?;
+        if !attributes.is_empty() {
+            flags.push(format!("--attributes={}", attributes.join(",")));
+        }
         let config = edgepuck_program::gen_dataset::config(&flags);
         let config = config.map_err(|error| raised(argument_error(&error)))?;
         let n_points = config.packed_points as usize;
+        let attributes = attributes.iter().map(|name| name.parse());
+        let attributes = attributes.collect::<Result<_, _>>().map_err(raised)?;
         let clouds = process::run(py, || {
             let meshes = dataset::discover(&meshes, config.seed)?;
             Ok(dataset::Clouds::new(config, &meshes, split, cache_bytes)?)
         })?;
         let clouds = clouds.map_err(raised_with_causes)?;
-        Ok(Self { clouds, n_points, caster: LazyCaster::new(adapter) })
+        Ok(Self { clouds, n_points, attributes, caster: LazyCaster::new(adapter) })
     }
 
     fn __len__(&self) -> usize {
@@ -66,17 +74,20 @@ impl Clouds {
         Ok(&self.clouds.mesh(index).relative)
     }
 
-    /// The clouds at `indices`, `[n, points, 3]`, and their classes, `[n]`.
+    /// The clouds at `indices`, and their classes.
     fn draw<'py>(&self, py: Python<'py>, seed: u64, indices: Vec<usize>) -> PyResult<Batch<'py>> {
         indices.iter().try_for_each(|&index| self.check(index))?;
         let caster = self.caster.open()?;
-        let drawn = process::run(py, || self.clouds.draw(&caster, seed, &indices))?;
-        let drawn = drawn.map_err(raised)?;
-        let labels: Vec<i64> = drawn.iter().map(|cloud| cloud.label as i64).collect();
-        let mut points = Vec::with_capacity(drawn.len() * self.n_points * 3);
-        drawn.iter().for_each(|cloud| points.extend_from_slice(cloud.points.as_flattened()));
-        let shape = (drawn.len(), self.n_points, 3);
-        let points = Array3::from_shape_vec(shape, points).map_err(raised)?;
+        let draw = || self.clouds.draw_rows(&caster, seed, &indices, &self.attributes);
+        let rows = process::run(py, draw)?.map_err(raised)?;
+        let labels = indices.iter().map(|&index| self.clouds.label(index) as i64);
+        let labels: Vec<i64> = labels.collect();
+        let width = self.attributes.iter().map(|attribute| match attribute {
+            Attribute::Sensor | Attribute::Attitude | Attribute::Normal => 3,
+            _ => 1,
+        });
+        let shape = (rows.len(), self.n_points, 3 + width.sum::<usize>());
+        let points = Array3::from_shape_vec(shape, rows.concat()).map_err(raised)?;
         Ok((points.into_pyarray(py), labels.into_pyarray(py)))
     }
 }

@@ -88,6 +88,30 @@ def test_epochs_differ_and_come_back(dataset: ep.Dataset) -> None:
     np.testing.assert_array_equal(dataset[5][0], first)
 
 
+def test_attributes_are_columns_behind_the_positions(shapes: Path) -> None:
+    import pickle
+
+    settings = {"points": 128, "seed": 1, "noise": 0.0}
+    plain = ep.Dataset(shapes, "vlp32c", **settings)
+    attributes = ["ring", "range", "normal"]
+    dataset = pickle.loads(pickle.dumps(ep.Dataset(shapes, "vlp32c", attributes=attributes, **settings)))
+    clouds, labels = dataset.batch([0, 3])
+    expected, expected_labels = plain.batch([0, 3])
+    assert clouds.shape == (2, 128, 8) and clouds.dtype == np.float32
+    np.testing.assert_array_equal(clouds[..., :3], expected)
+    np.testing.assert_array_equal(labels, expected_labels)
+    ring, distance, normal = clouds[..., 3], clouds[..., 4], clouds[..., 5:]
+    assert np.array_equal(ring, ring.round()) and 0 <= ring.min() < ring.max() <= 31
+    # The sensor is 3 m from the centre of a mesh of radius 1 m.
+    assert 2 <= distance.min() < distance.max() <= 4
+    np.testing.assert_allclose(np.linalg.norm(normal, axis=-1), 1, atol=1e-5)
+    assert dataset[3][0].shape == (128, 8)
+    assert dataset.batch([])[0].shape == (0, 128, 8)
+    for wrong in ["ring", ["colour"]]:
+        with pytest.raises(ep.Error, match="attributes|colour"):
+            ep.Dataset(shapes, attributes=wrong)
+
+
 def test_a_pickled_dataset_draws_the_same(dataset: ep.Dataset) -> None:
     import pickle
 

@@ -10,6 +10,7 @@ use crate::manifest::LeftOut;
 use crate::record::{Cloud, Entry, MeshRecord, VariantRecord};
 use formats::cloud::{normalize_unit_sphere, resample};
 use formats::rng::StreamKey;
+use formats::scan::{Attribute, Column};
 use formats::scan_file::{ScanFormat, read_scan};
 use formats::{Scan, Split};
 use rayon::prelude::*;
@@ -40,9 +41,7 @@ impl Cloud {
         if (scan.len() as u64) < u64::from(config.min_points) {
             return None;
         }
-        let Source { set, variant, entry, view } = source;
-        let stream = format!("pack/{}/{variant}/{}", set.name, entry.id());
-        let key = StreamKey::new(config.seed, &stream, view);
+        let key = Self::key(config, source);
         let n = config.packed_points as usize;
         let mut points = resample(&scan.positions, n, key)?;
         normalize_unit_sphere(&mut points);
@@ -50,6 +49,43 @@ impl Cloud {
         let normals = scan.normal.as_ref().filter(|_| config.layouts.contains(&Layout::Yanx27));
         let normals = normals.and_then(|normals| resample(normals, n, key));
         Some(Self { points, normals })
+    }
+
+    fn key(config: &DatasetConfig, source: Source) -> StreamKey {
+        let Source { set, variant, entry, view } = source;
+        let stream = format!("pack/{}/{variant}/{}", set.name, entry.id());
+        StreamKey::new(config.seed, &stream, view)
+    }
+
+    /// The points of [`Cloud::draw`], each followed by its `attributes`.
+    pub(crate) fn rows(
+        config: &DatasetConfig,
+        source: Source,
+        scan: &Scan,
+        attributes: &[Attribute],
+    ) -> Option<Vec<f32>> {
+        let points = Self::draw(config, source, scan)?.points;
+        if attributes.is_empty() {
+            return Some(points.into_flattened());
+        }
+        let columns = attributes.iter().map(|&attribute| scan.column(attribute));
+        let columns: Vec<Column> = columns.collect::<Option<_>>()?;
+        let all: Vec<u32> = (0..scan.len() as u32).collect();
+        let drawn = resample(&all, points.len(), Self::key(config, source))?;
+        let mut rows = Vec::with_capacity(points.len() * (3 + columns.len()));
+        for (point, i) in points.into_iter().zip(drawn.into_iter().map(|i| i as usize)) {
+            rows.extend(point);
+            for column in &columns {
+                match column {
+                    Column::F32(of) => rows.push(of[i]),
+                    Column::U8(of) => rows.push(of[i].into()),
+                    Column::U16(of) => rows.push(of[i].into()),
+                    Column::U32(of) => rows.push(of[i] as f32),
+                    Column::Vector(of) => rows.extend(of[i]),
+                }
+            }
+        }
+        Some(rows)
     }
 
     /// The cloud of a scan that was just written, unless the clouds in memory, whose bytes `kept`

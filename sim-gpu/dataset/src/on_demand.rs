@@ -6,6 +6,7 @@ use crate::record::{Cloud, Entry};
 use crate::view::{self, Rig, View, patterns};
 use formats::hash::Hashing;
 use formats::rng::StreamKey;
+use formats::scan::Attribute;
 use formats::{Scan, Split};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -154,6 +155,24 @@ impl Clouds {
         indices: &[usize],
     ) -> Result<Vec<Labelled>, DatasetError> {
         self.draw_each(caster, seed, indices)?.into_iter().collect()
+    }
+
+    /// The clouds of [`Clouds::draw`] as rows of numbers: each point and its `attributes`, which the
+    /// settings must have. Attributes keep the units that they have in scans.
+    ///
+    /// # Errors
+    /// As [`Clouds::draw`].
+    pub fn draw_rows(
+        &self,
+        caster: &Caster,
+        seed: u64,
+        indices: &[usize],
+        attributes: &[Attribute],
+    ) -> Result<Vec<Vec<f32>>, DatasetError> {
+        let drawn = self.make_each(caster, seed, indices, |config, source, scan| {
+            Cloud::rows(config, source, &scan, attributes)
+        })?;
+        drawn.into_iter().collect()
     }
 
     /// What is doubtful about the files of the meshes that were drawn, for the user.

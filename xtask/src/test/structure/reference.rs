@@ -9,8 +9,11 @@ use syn::visit::Visit;
 use syn::{Attribute, Expr, Item, Lit, Meta, Type};
 use xtask::workspace::root;
 
-/// Each page: its beginning, and the headings of its tables and the types that read them.
-const PAGES: [(&str, &str, &[(&str, &str, &str)]); 2] = [
+/// A table: its heading, and the file and the name of the type that reads it.
+type Table = (&'static str, &'static str, &'static str);
+
+/// Each page: its beginning, and its tables.
+const PAGES: [(&str, &str, &[Table]); 2] = [
     (
         "scene-reference.md",
         "# Keys of scenes\n\nA scene is a TOML file: [First scan](first-scan.md) has an example, and \
@@ -25,7 +28,7 @@ const PAGES: [(&str, &str, &[(&str, &str, &str)]); 2] = [
     ),
 ];
 
-/// What is on each page.
+/// What each page says.
 const UNITS: &str = "The end of a key names its unit: `_m` is metres, `_deg` degrees, `_s` seconds, `_us` \
                      microseconds, `_hz` 1/s.";
 
@@ -223,12 +226,7 @@ impl Code {
         all.replace("above 0, 0 to", "above 0, up to")
     }
 
-    fn page(
-        &self,
-        heading: &str,
-        tables: &[(&str, &str, &str)],
-        faults: &mut Vec<String>,
-    ) -> String {
+    fn page(&self, heading: &str, tables: &[Table], faults: &mut Vec<String>) -> String {
         let mut page = format!(
             "{heading} {UNITS}\n\n<!-- Made from the code: UPDATE_GOLDEN=1 cargo test -p xtask -->\n"
         );
