@@ -8,8 +8,8 @@ pub const HOW_TO_GET_VULKAN: &str = "a GPU needs a Vulkan driver, which on Debia
 /// Flags of every command that casts.
 #[derive(clap::Args)]
 pub struct CasterArgs {
-    /// Adapter that casts the rays: auto (a GPU if there is one, or else the CPU), cpu, or part
-    /// of an adapter's name
+    /// What casts the rays: auto (a GPU if there is one, or else the CPU), cpu, or part of a GPU's
+    /// name, as `edgepuck adapters` lists them
     #[arg(long, default_value = "auto", value_name = "ADAPTER")]
     adapter: String,
 

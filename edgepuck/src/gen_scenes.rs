@@ -72,6 +72,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let caster = args.caster.caster()?;
     let stage = Stage::with_caster(recipe, &args.recipe, meshes, args.seed, &caster)?;
     let stage = stage.with_culling(args.caster.culling());
+    stage.warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
     let started = Instant::now();
     let style = ProgressStyle::with_template("{bar:40} {pos}/{len} scenes, {per_sec}, {eta} left")?;
     let bar = ProgressBar::new(args.sweeps.into()).with_style(style);

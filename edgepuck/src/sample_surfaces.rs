@@ -1,7 +1,7 @@
 use crate::Outcome;
-use crate::gen_dataset::{listed, report_failures};
+use crate::gen_dataset::{listed, print_notes, report_failures};
 use crate::overwrite::Overwrite;
-use edgepuck_dataset::{SurfaceConfig, write_surfaces};
+use edgepuck_dataset::{Progress, SurfaceConfig, write_surfaces};
 use sim_gpu::internals::mesh::frame::{Normalize, Up};
 use sim_gpu::internals::sensor::Views;
 use std::path::PathBuf;
@@ -52,7 +52,9 @@ pub fn run(args: &SampleSurfacesArgs) -> anyhow::Result<Outcome> {
         min_points: args.min_points,
         views: Views::ROTATING,
     };
-    let failures = write_surfaces(&args.out, &config, &meshes)?;
+    let progress = Progress::default();
+    let failures = write_surfaces(&args.out, &config, &meshes, &progress)?;
+    print_notes(&progress.notes());
     report_failures(&failures);
     eprintln!("{} meshes: {}", meshes.len() - failures.len(), args.out.display());
     Ok(if failures.is_empty() { Outcome::Success } else { Outcome::SomeRefused })

@@ -1,4 +1,4 @@
-use crate::error::{raised, raised_with_causes};
+use crate::error::{raised, raised_with_causes, warn};
 use crate::process::{self, LazyCaster};
 use edgepuck_dataset as dataset;
 use formats::Split;
@@ -79,7 +79,11 @@ impl Clouds {
         indices.iter().try_for_each(|&index| self.check(index))?;
         let caster = self.caster.open()?;
         let draw = || self.clouds.draw_rows(&caster, seed, &indices, &self.attributes);
-        let rows = process::run(py, draw)?.map_err(raised)?;
+        let rows = process::run(py, draw)?;
+        let warnings = self.clouds.warnings();
+        let warnings = warnings.iter().map(|told| told.trim_start_matches("warning: "));
+        warn(py, &warnings.collect::<Vec<_>>())?;
+        let rows = rows.map_err(raised)?;
         let labels = indices.iter().map(|&index| self.clouds.label(index) as i64);
         let labels: Vec<i64> = labels.collect();
         let width = self.attributes.iter().map(|attribute| match attribute {

@@ -39,6 +39,32 @@ fn surfaces_are_sampled_whole_and_as_a_sensor_sees_them() {
 }
 
 #[test]
+fn what_is_doubtful_about_a_mesh_is_told_once_by_every_command() {
+    let folder = with_shapes();
+    // The edges of its second face cross.
+    let crossed = "v 0 0 0\nv 1 1 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 5\nf 1 2 3 4\n";
+    folder.write("shapes/cup/test/crossed.obj", crossed);
+    folder.write("own/cups/crossed.obj", crossed);
+    folder.write(
+        "own.toml",
+        "sensor = [{ profile = \"vlp16\" }]\nmount = { height_m = [2, 2] }\n[[object]]\n\
+         kind = \"mesh\"\nclass = \"cup\"\ncount = [1, 1]\nplace = \"anywhere\"\n\
+         distance_m = [2, 3]\nmeshes = \"cups\"\nheight_m = [1, 1]\n",
+    );
+    for words in [
+        "sample-surfaces shapes --out surfaces --points 50",
+        "corrupt shapes --views 1 --points 50 --severity 1 --only jitter --out corrupted",
+        "gen-scenes own.toml --meshes own --sweeps 1 --out scenes",
+        "gen-dataset shapes --views 1 --out data",
+    ] {
+        let said = folder.succeeds(words);
+        let told = said.lines().filter(|line| line.contains("crossed.obj"));
+        let told: Vec<&str> = told.filter(|line| line.contains("warning")).collect();
+        assert!(matches!(told[..], [one] if one.contains("cross")), "{words}: {said}");
+    }
+}
+
+#[test]
 fn a_bad_mesh_is_named_and_the_others_go_on() {
     let folder = with_shapes();
     folder.write("shapes/cup/test/flat.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2");

@@ -1,9 +1,9 @@
 use super::plan::{Plan, chosen};
 use super::{CorruptArgs, Written, usage, write_list};
 use crate::Outcome;
-use crate::gen_dataset::{listed, report_failures};
+use crate::gen_dataset::{listed, print_notes, report_failures};
 use anyhow::Context;
-use edgepuck_dataset::{Corrupted, CorruptedSet, ObjectCorruption, Up, Views};
+use edgepuck_dataset::{Corrupted, CorruptedSet, ObjectCorruption, Progress, Up, Views};
 use formats::Split;
 use indicatif::{ProgressBar, ProgressStyle};
 use sim_gpu::Sensor;
@@ -56,8 +56,10 @@ pub(super) fn run(
     let bar = ProgressBar::new(tested as u64).with_style(style);
     let (out, seed) = (&*args.out, args.seed);
     let corrupted = Corrupted { out, sensor, views, up, points, seed };
-    let written = corrupted.write(&meshes, &sets, || bar.inc(1))?;
+    let progress = Progress::default();
+    let written = corrupted.write(&meshes, &sets, &progress, || bar.inc(1))?;
     bar.finish_and_clear();
+    print_notes(&progress.notes());
     report_failures(&written.failures);
 
     let clean = ("clean", 0, "nothing");

@@ -27,6 +27,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering::SeqCst;
 use std::time::Instant;
+pub use summary::print_notes;
 
 /// Folder of the built-in shapes, to which the seed is appended.
 const DEFAULT_SHAPES: &str = "data/default-shapes";

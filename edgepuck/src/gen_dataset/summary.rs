@@ -48,7 +48,8 @@ fn print_costs(progress: &Progress) {
     let count = |counter: &AtomicU64| counter.load(Relaxed);
     let (cast, culled) = (count(&progress.rays_cast), count(&progress.rays_culled));
     eprintln!(
-        "{cast} rays cast, {culled} culled, {} decided in f64",
+        "{cast} rays cast, {culled} left out because they cannot hit a mesh, {} decided in double \
+         precision",
         count(&progress.rays_decided_in_f64)
     );
     let stages: Vec<String> = Stage::ALL

@@ -2,8 +2,9 @@
 //! robust a network is, as ModelNet-C does.
 
 use crate::error::DatasetError;
-use crate::mesh::read;
+use crate::mesh::{read, warnings};
 use crate::packed_sets::{Drawn, classes, write_packed_sets};
+use crate::progress::Progress;
 use crate::record::{Entry, MeshFailure};
 use formats::Split;
 use formats::cloud::{normalize_unit_sphere, resample};
@@ -115,7 +116,7 @@ impl CorruptedSet {
 
 impl Corrupted<'_> {
     /// Writes `sets` of those of `meshes` that are for testing. Labels are indices into the classes
-    /// of all meshes. Calls `each` after each mesh.
+    /// of all meshes. Notes what is doubtful about meshes in `progress`, and calls `each` after each.
     ///
     /// # Errors
     /// A caster that fails; a file that cannot be written.
@@ -123,6 +124,7 @@ impl Corrupted<'_> {
         &self,
         meshes: &[MeshEntry],
         sets: &[CorruptedSet],
+        progress: &Progress,
         each: impl Fn() + Sync,
     ) -> Result<Written, DatasetError> {
         let path = |set: &CorruptedSet| self.out.join(format!("{}-test.npz", set.name));
@@ -130,7 +132,7 @@ impl Corrupted<'_> {
         let tested: Vec<&MeshEntry> =
             meshes.iter().filter(|entry| entry.split == Split::Test).collect();
         let draw = |entry: &MeshEntry| {
-            let drawn = self.draw(entry, sets);
+            let drawn = self.draw(entry, sets, progress);
             each();
             drawn
         };
@@ -141,9 +143,15 @@ impl Corrupted<'_> {
     }
 
     /// The clouds of one mesh, by view and by set.
-    fn draw(&self, entry: &MeshEntry, sets: &[CorruptedSet]) -> Result<Vec<Drawn>, DatasetError> {
-        let (_, mesh, kept) =
+    fn draw(
+        &self,
+        entry: &MeshEntry,
+        sets: &[CorruptedSet],
+        progress: &Progress,
+    ) -> Result<Vec<Drawn>, DatasetError> {
+        let (record, mesh, kept) =
             read(entry, self.up, Unit::Metre, Normalize::UnitSphere, Hashing::None)?;
+        warnings(&record, None).for_each(|warning| progress.note(warning));
         if kept.is_empty() {
             let cause = "expected a triangle with an area, found none";
             return Err(MeshFailure::new(entry, cause).into());

@@ -13,7 +13,6 @@ use formats::hash::Hashing;
 use formats::scan_file::{ScanFormat, write_scan};
 use formats::vlp32c;
 use glam::{DAffine3, DVec3};
-use sim_gpu::Scene;
 use sim_gpu::internals::bvh::Builder;
 use sim_gpu::internals::job::{Cast, CastJob};
 use sim_gpu::internals::material::{Material, MaterialChoice, MaterialError, Materials};
@@ -25,6 +24,7 @@ use sim_gpu::internals::ray::RayFrame;
 use sim_gpu::internals::scan::ObjectHits;
 use sim_gpu::internals::simplify::{Simplified, Viewpoint, resolved_m, simplified_surface};
 use sim_gpu::internals::target::{Surface, Target};
+use sim_gpu::{Mesh, Scene};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 /// What all meshes of a run share.
@@ -78,7 +78,8 @@ pub(crate) fn prepare<'a>(run: &Run<'a>, entry: &MeshEntry) -> Result<Prepared<'
     let target = progress.time(Stage::Build, || Target::new(surface, builder));
     let scene = view::scene(config, target, centre, materials);
     if config.normalize == Normalize::None {
-        note_doubts(progress, &record.source, &scene, &views);
+        let sensors_m: Vec<DVec3> = views.iter().map(|view| view.pose().position_m).collect();
+        doubts(&record.source, &scene, &sensors_m).for_each(|doubt| progress.note(doubt));
     }
     let placed = view::placed(&scene);
     let jobs: Vec<CastJob> =
@@ -90,19 +91,21 @@ pub(crate) fn prepare<'a>(run: &Run<'a>, entry: &MeshEntry) -> Result<Prepared<'
     Ok(Prepared { record, views, jobs, scene })
 }
 
-/// Notes what is probably wrong with the unit of a mesh or with the place of a sensor.
-fn note_doubts(progress: &Progress, source: &str, scene: &Scene, views: &[View]) {
-    let [instance] = scene.instances() else { return };
-    let sensors_m: Vec<DVec3> = views.iter().map(|view| view.pose().position_m).collect();
-    if let Some(doubt) = instance.mesh.doubtful_size() {
-        progress.note(format!("{source}: {doubt}; --units names another unit"));
-    }
-    if instance.mesh.surrounds(&sensors_m) {
-        progress.note(format!(
-            "{source}: a sensor stands inside its bounding box: expected a larger --distance, or \
-             another of --units"
-        ));
-    }
+/// What is probably wrong with the unit of a mesh or with the place of a sensor.
+pub(crate) fn doubts(
+    source: &str,
+    scene: &Scene,
+    sensors_m: &[DVec3],
+) -> impl Iterator<Item = String> {
+    let mesh = scene.instances().first().map(|instance| &instance.mesh);
+    let size = mesh
+        .and_then(Mesh::doubtful_size)
+        .map(|doubt| format!("{doubt}; --units names another unit"));
+    let inside = mesh.is_some_and(|mesh| mesh.surrounds(sensors_m)).then(|| {
+        "a sensor stands inside its bounding box: expected a larger --distance, or another of --units"
+            .to_owned()
+    });
+    size.into_iter().chain(inside).map(move |doubt| format!("{source}: {doubt}"))
 }
 
 /// What is doubtful about the files of a mesh, for the user.

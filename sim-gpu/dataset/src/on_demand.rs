@@ -1,7 +1,7 @@
 use crate::clouds::Source;
 use crate::config::{DatasetConfig, Variant, Viewpoints};
 use crate::error::DatasetError;
-use crate::mesh::{materials, read, warnings};
+use crate::mesh::{doubts, materials, read, warnings};
 use crate::record::{Cloud, Entry};
 use crate::view::{self, Rig, View, patterns};
 use formats::hash::Hashing;
@@ -13,6 +13,7 @@ use rayon::prelude::*;
 use sim_gpu::internals::bvh::Builder;
 use sim_gpu::internals::config::InvalidValue;
 use sim_gpu::internals::job::{CastJob, Culling};
+use sim_gpu::internals::mesh::frame::Normalize;
 use sim_gpu::internals::mesh::tree::MeshEntry;
 use sim_gpu::internals::scan::ObjectHits;
 use sim_gpu::internals::sensor::BeamPattern;
@@ -35,8 +36,11 @@ pub struct Clouds {
     classes: Vec<String>,
     patterns: Vec<Arc<BeamPattern>>,
     cache: Mutex<Cache>,
-    warnings: Mutex<BTreeSet<String>>,
+    warnings: Mutex<Warnings>,
 }
+
+/// What is doubtful about the meshes: all that is known, and of it what was not told yet.
+type Warnings = (BTreeSet<String>, Vec<String>);
 
 /// A mesh in memory.
 struct Ready {
@@ -175,11 +179,11 @@ impl Clouds {
         drawn.into_iter().collect()
     }
 
-    /// What is doubtful about the files of the meshes that were drawn, for the user.
+    /// What is doubtful about the meshes that were drawn, for the user: what no call returned before.
     #[must_use]
     pub fn warnings(&self) -> Vec<String> {
-        let told = self.warnings.lock().unwrap_or_else(PoisonError::into_inner);
-        told.iter().cloned().collect()
+        let mut warnings = self.warnings.lock().unwrap_or_else(PoisonError::into_inner);
+        std::mem::take(&mut warnings.1)
     }
 
     /// As [`Clouds::draw`], with a result for each cloud.
@@ -312,12 +316,18 @@ impl Clouds {
         let (record, mesh, kept) =
             read(entry, config.up, config.units, config.normalize, Hashing::None)?;
         let materials = materials(entry, config)?;
-        let told = &mut *self.warnings.lock().unwrap_or_else(PoisonError::into_inner);
-        told.extend(warnings(&record, materials.as_ref()));
+        let mut told: Vec<String> = warnings(&record, materials.as_ref()).collect();
         // Rays are cast at it in every epoch, which pays for the better tree.
         let target = Target::new(Surface::new(mesh, kept), Builder::Sah);
         let centre = DVec3::from_array(record.views_around);
         let scene = view::scene(config, target, centre, materials);
+        if config.normalize == Normalize::None {
+            let poses = config.sets[0].poses(config.seed, &record.entry.id(), centre);
+            let sensors_m: Vec<DVec3> = poses.iter().map(|pose| pose.position_m).collect();
+            told.extend(doubts(&record.source, &scene, &sensors_m));
+        }
+        let (known, new) = &mut *self.warnings.lock().unwrap_or_else(PoisonError::into_inner);
+        new.extend(told.into_iter().filter(|warning| known.insert(warning.clone())));
         let ready = Arc::new(Ready { entry: record.entry, centre, scene });
         lock().put(number, &ready);
         Ok(ready)

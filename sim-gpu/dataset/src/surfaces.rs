@@ -2,8 +2,9 @@
 //! sensor could see: clouds between those of ModelNet40 and scans.
 
 use crate::error::DatasetError;
-use crate::mesh::read;
+use crate::mesh::{read, warnings};
 use crate::packed_sets::{Drawn, classes, write_packed_sets};
+use crate::progress::Progress;
 use crate::record::{Entry, MeshFailure};
 use formats::Split;
 use formats::cloud::{normalize_unit_sphere, resample};
@@ -51,13 +52,14 @@ pub fn write_surfaces(
     out: &Path,
     config: &SurfaceConfig,
     meshes: &[MeshEntry],
+    progress: &Progress,
 ) -> Result<Vec<MeshFailure>, DatasetError> {
     let (n, classes) = (config.points as usize, classes(meshes));
     let mut all_failures = Vec::new();
     for split in Split::ALL {
         let paths = ["surface", "seen"].map(|name| out.join(format!("{name}-{split}.npz")));
         let own: Vec<&MeshEntry> = meshes.iter().filter(|mesh| mesh.split == split).collect();
-        let draw = |mesh: &MeshEntry| Ok(draw(mesh, config)?);
+        let draw = |mesh: &MeshEntry| Ok(draw(mesh, config, progress)?);
         let (_, failures) = write_packed_sets(&paths, n, &classes, &own, draw)?;
         all_failures.extend(failures);
     }
@@ -65,8 +67,14 @@ pub fn write_surfaces(
 }
 
 /// The clouds of one mesh: of set 0 its whole surface, of set 1 what each view sees of it.
-fn draw(mesh: &MeshEntry, config: &SurfaceConfig) -> Result<Vec<Drawn>, MeshFailure> {
-    let (_, in_world, kept) = read(mesh, config.up, Unit::Metre, config.normalize, Hashing::None)?;
+fn draw(
+    mesh: &MeshEntry,
+    config: &SurfaceConfig,
+    progress: &Progress,
+) -> Result<Vec<Drawn>, MeshFailure> {
+    let (record, in_world, kept) =
+        read(mesh, config.up, Unit::Metre, config.normalize, Hashing::None)?;
+    warnings(&record, None).for_each(|warning| progress.note(warning));
     let surface = Surface::new(in_world, kept);
     let n = config.points as usize;
     let id = Entry::from(mesh).id();

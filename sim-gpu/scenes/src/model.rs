@@ -60,6 +60,7 @@ pub(crate) fn user_models(
     objects: &Objects,
     meshes: Option<&Path>,
     seed: u64,
+    warnings: &mut Vec<String>,
 ) -> Result<Vec<OnceLock<Model>>, SceneError> {
     let name = objects.meshes.as_deref().unwrap_or_default();
     let missing =
@@ -76,6 +77,8 @@ pub(crate) fn user_models(
     let stream = StreamKey::new(seed, &format!("meshes/{name}"), 0);
     let models = files.iter().zip(0..).map(|(file, n)| {
         let loaded = mesh::load(file)?;
+        let doubts = loaded.warnings.iter();
+        warnings.extend(doubts.map(|doubt| format!("{}: {doubt}", file.display())));
         let world = to_world(&loaded.mesh, loaded.format.default_up(), Normalize::None);
         let model = Model::scaled(world.mesh, span.at(stream.unit(n)));
         let flat = || SceneError::FlatMesh { file: file.clone() };

@@ -25,6 +25,7 @@ pub struct Stage {
     pub(crate) culling: Culling,
     /// By entry of the recipe and by variant; built-in models are built when first used.
     models: Vec<Vec<OnceLock<Model>>>,
+    warnings: Vec<String>,
 }
 
 pub(crate) struct StageSensor {
@@ -75,12 +76,20 @@ impl Stage {
             sensor.rays(&effects).map_err(in_file)?;
             sensors.push(StageSensor { sensor, caster: caster.for_effects(&effects)? });
         }
+        let mut warnings = Vec::new();
         let models = recipe.object.iter().map(|objects| match objects.built_in() {
             Some(_) => Ok((0..recipe.variants).map(|_| OnceLock::new()).collect()),
-            None => user_models(objects, meshes, seed),
+            None => user_models(objects, meshes, seed, &mut warnings),
         });
         let models = models.collect::<Result<_, SceneError>>()?;
-        Ok(Self { classes: recipe.classes(), recipe, seed, sensors, culling: Culling::On, models })
+        let (classes, culling) = (recipe.classes(), Culling::On);
+        Ok(Self { classes, recipe, seed, sensors, culling, models, warnings })
+    }
+
+    /// What is doubtful about the files of the user's meshes.
+    #[must_use]
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
     }
 
     /// The same stage with another `culling`, which changes the time of a sweep, not its points.

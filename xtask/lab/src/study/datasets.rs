@@ -80,7 +80,7 @@ pub fn surfaces(
             min_points: config.min_points,
             views: Views { count: if views { of_set.count } else { 0 }, ..of_set },
         };
-        Ok(write_surfaces(out, &surfaces, meshes)?.len())
+        Ok(write_surfaces(out, &surfaces, meshes, &Progress::default())?.len())
     })
 }
 
