@@ -133,3 +133,36 @@ fn run(command: &Command) -> anyhow::Result<Outcome> {
         }
     }
 }
+
+#[cfg(all(test, feature = "models"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_commands_in_the_readmes_are_understood() {
+        let mut n_commands = 0;
+        for page in ["README.md", "edgepuck/README.md", "infer-cpu/README.md", "sim-gpu/EFFECTS.md"]
+        {
+            let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(page);
+            let text = std::fs::read_to_string(file).unwrap().replace("\\\n", " ");
+            for line in text.lines().filter_map(|line| line.strip_prefix("    ")) {
+                let command = line.split(" #").next().unwrap_or(line);
+                let command = command.split(" | ").next().unwrap_or(command);
+                // `edgepuck` has the commands of `infer-cpu`, too.
+                if command.starts_with("edgepuck ") || command.starts_with("infer-cpu ") {
+                    // The number of `auto` is in the environment of a job.
+                    let command = command.replace(" auto/", " 1/");
+                    let quoted = command.split('\'').enumerate();
+                    let words = quoted.flat_map(|(i, part)| match i % 2 {
+                        0 => part.split_whitespace().collect(),
+                        _ => vec![part],
+                    });
+                    let parsed = Cli::try_parse_from(words);
+                    assert!(parsed.is_ok(), "{page}: {command}: {}", parsed.err().unwrap());
+                    n_commands += 1;
+                }
+            }
+        }
+        assert!(n_commands > 30, "{n_commands}");
+    }
+}

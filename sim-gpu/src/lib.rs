@@ -94,3 +94,8 @@ pub mod internals {
     #[cfg(feature = "gpu")]
     modules! { gpu }
 }
+
+/// The README's example is compiled.
+#[cfg(all(doctest, feature = "gpu"))]
+#[doc = include_str!("../README.md")]
+struct Readme;
