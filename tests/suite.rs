@@ -2,6 +2,7 @@
 
 mod analytic;
 mod bvh_properties;
+mod combined_effects;
 mod dataset_finish;
 mod dataset_merge;
 mod dataset_on_demand;
