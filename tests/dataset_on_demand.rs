@@ -60,10 +60,10 @@ fn clouds_on_demand_are_those_of_the_packed_set() {
     let clouds = clouds(&meshes, settings(7), CACHE_BYTES);
     assert_eq!(clouds.len(), expected.len(), "no view of this seed has too few points");
     let all: Vec<usize> = (0..clouds.len()).collect();
-    let drawn = clouds.draw(&Caster::cpu(), seed_of_epoch(7, 2), &all).unwrap();
+    let drawn = clouds.draw(&Caster::cpu(), seed_of_epoch(7, 2), &all, &[]).unwrap();
     for (i, found) in drawn.iter().enumerate() {
-        assert_eq!(found.label, expected.labels[i] as usize, "{i}");
-        assert_eq!(found.points, expected.cloud(i), "{i}");
+        assert_eq!(clouds.label(i), expected.labels[i] as usize, "{i}");
+        assert_eq!(found, expected.cloud(i).as_flattened(), "{i}");
     }
 }
 
@@ -74,14 +74,14 @@ fn a_cloud_depends_on_its_number_and_the_seed_alone() {
     let whole = clouds(&meshes, settings(7), usize::MAX);
     let uncached = clouds(&meshes, settings(7), 0);
     let numbers = [5, 0, 11, 5, 38];
-    let together = whole.draw(&Caster::cpu(), 7, &numbers).unwrap();
+    let together = whole.draw(&Caster::cpu(), 7, &numbers, &[]).unwrap();
     for (number, together) in numbers.into_iter().zip(together) {
-        let [alone] = &uncached.draw(&Caster::cpu(), 7, &[number]).unwrap()[..] else {
+        let [alone] = &uncached.draw(&Caster::cpu(), 7, &[number], &[]).unwrap()[..] else {
             panic!("one cloud was asked for");
         };
-        assert_eq!(alone.points, together.points, "{number}");
-        let others = whole.draw(&Caster::cpu(), 8, &[number]).unwrap();
-        assert_ne!(others[0].points, together.points, "{number}");
+        assert_eq!(*alone, together, "{number}");
+        let others = whole.draw(&Caster::cpu(), 8, &[number], &[]).unwrap();
+        assert_ne!(others[0], together, "{number}");
     }
 }
 
@@ -91,7 +91,7 @@ fn a_mesh_whose_views_all_have_too_few_points_is_named() {
     let meshes = meshes(folder.path());
     let config = DatasetConfig { min_points: 1 << 20, ..settings(7) };
     let clouds = clouds(&meshes, config, CACHE_BYTES);
-    match clouds.draw(&Caster::cpu(), 7, &[3]) {
+    match clouds.draw(&Caster::cpu(), 7, &[3], &[]) {
         Err(error @ DatasetError::Sparse { .. }) => {
             let text = error.to_string();
             assert!(text.starts_with("airplane/train/airplane_"), "{text}");

@@ -78,7 +78,7 @@ impl Clouds {
     fn draw<'py>(&self, py: Python<'py>, seed: u64, indices: Vec<usize>) -> PyResult<Batch<'py>> {
         indices.iter().try_for_each(|&index| self.check(index))?;
         let caster = self.caster.open()?;
-        let draw = || self.clouds.draw_rows(&caster, seed, &indices, &self.attributes);
+        let draw = || self.clouds.draw(&caster, seed, &indices, &self.attributes);
         let rows = process::run(py, draw)?;
         let warnings = self.clouds.warnings();
         let warnings = warnings.iter().map(|told| told.trim_start_matches("warning: "));

@@ -29,8 +29,11 @@ pub fn draw(out: &Path, manifest: &Manifest) -> anyhow::Result<Option<PathBuf>> 
     let has_noisy = manifest.config.variants.contains(&Variant::Noisy);
     let noisy = has_noisy.then(|| all_views(Variant::Noisy)).transpose()?;
     let (name, sensor, n_views) = (&record.entry.name, set.sensor.name(), poses.len());
-    let from = if n_views == 1 { "one side".to_owned() } else { format!("{n_views} sides") };
-    let title = format!("{name} as {sensor} sees it from {from}");
+    let views = match n_views {
+        1 => "one view".to_owned(),
+        _ => format!("{n_views} views together"),
+    };
+    let title = format!("{name} as {sensor} sees it, {views}");
     let picture = layout::example(out);
     preview::draw(&clean, noisy.as_ref(), &title, &picture)?;
     Ok(Some(picture))

@@ -62,7 +62,7 @@ pub use export_layouts::check_layouts;
 pub use make::make;
 pub use manifest::{LayoutFile, LeftOut, Manifest, MeshPoses, PackedRecord, Poses, SetPoses};
 pub use merge::merge;
-pub use on_demand::{Clouds, Labelled, seed_of_epoch};
+pub use on_demand::{Clouds, seed_of_epoch};
 pub use plan::{Begin, Plan};
 pub use progress::{Progress, Stage};
 pub use publish::{Publication, publish};

@@ -42,6 +42,9 @@ pub struct Clouds {
 /// What is doubtful about the meshes: all that is known, and of it what was not told yet.
 type Warnings = (BTreeSet<String>, Vec<String>);
 
+/// The points of a cloud in the unit sphere, or why there is none.
+type Points = Result<Vec<[f32; 3]>, DatasetError>;
+
 /// A mesh in memory.
 struct Ready {
     entry: Entry,
@@ -55,14 +58,6 @@ impl Ready {
     fn bytes(&self) -> usize {
         self.scene.instances().iter().map(|instance| instance.mesh.target().bytes()).sum()
     }
-}
-
-/// A cloud and its class.
-pub struct Labelled {
-    /// `[packed_points]`, in the unit sphere.
-    pub points: Vec<[f32; 3]>,
-    /// The class, as an index into [`Clouds::classes`].
-    pub label: usize,
 }
 
 impl Clouds {
@@ -147,26 +142,14 @@ impl Clouds {
         (index % self.views()) as u32
     }
 
-    /// The clouds at `indices`, with the random numbers of `seed`. A view that has too few points
-    /// for a cloud is replaced by a view of another seed.
+    /// The clouds at `indices`, with the random numbers of `seed`, as rows of numbers: each point, in
+    /// the unit sphere, and its `attributes`, which the settings must have and which keep the units
+    /// that they have in scans. A view that has too few points for a cloud is replaced by a view of
+    /// another seed.
     ///
     /// # Errors
     /// A mesh that cannot be read, or none of whose views has enough points; an adapter that fails.
     pub fn draw(
-        &self,
-        caster: &Caster,
-        seed: u64,
-        indices: &[usize],
-    ) -> Result<Vec<Labelled>, DatasetError> {
-        self.draw_each(caster, seed, indices)?.into_iter().collect()
-    }
-
-    /// The clouds of [`Clouds::draw`] as rows of numbers: each point and its `attributes`, which the
-    /// settings must have. Attributes keep the units that they have in scans.
-    ///
-    /// # Errors
-    /// As [`Clouds::draw`].
-    pub fn draw_rows(
         &self,
         caster: &Caster,
         seed: u64,
@@ -186,7 +169,7 @@ impl Clouds {
         std::mem::take(&mut warnings.1)
     }
 
-    /// As [`Clouds::draw`], with a result for each cloud.
+    /// The points of [`Clouds::draw`], with a result for each cloud.
     ///
     /// # Errors
     /// An adapter that fails.
@@ -195,14 +178,10 @@ impl Clouds {
         caster: &Caster,
         seed: u64,
         indices: &[usize],
-    ) -> Result<Vec<Result<Labelled, DatasetError>>, DatasetError> {
-        let drawn = self.make_each(caster, seed, indices, |config, source, scan| {
+    ) -> Result<Vec<Points>, DatasetError> {
+        self.make_each(caster, seed, indices, |config, source, scan| {
             Cloud::draw(config, source, &scan).map(|cloud| cloud.points)
-        })?;
-        let labelled = |(made, &index): (Result<Vec<[f32; 3]>, _>, _)| {
-            made.map(|points| Labelled { points, label: self.label(index) })
-        };
-        Ok(drawn.into_iter().zip(indices).map(labelled).collect())
+        })
     }
 
     /// The scans of those clouds, with a result for each.

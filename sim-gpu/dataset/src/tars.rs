@@ -325,8 +325,9 @@ impl Maker<'_> {
             Sample::Clouds => {
                 let drawn = self.clouds.draw_each(caster, config.seed, &indices)?;
                 let drawn = self.kept(drawn, &indices, filled)?;
+                let label = |nth: usize| self.clouds.label(indices[nth]);
                 let clouds: Vec<_> =
-                    drawn.into_iter().map(|(_, cloud)| (cloud.points, cloud.label)).collect();
+                    drawn.into_iter().map(|(nth, points)| (points, label(nth))).collect();
                 let npz = npz_of_clouds(&clouds, config.packed_points as usize);
                 Ok(vec![(format!("{name}.npz"), npz.map_err(in_memory)?)])
             }
