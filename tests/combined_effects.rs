@@ -420,8 +420,9 @@ const ASKED: [(&str, Ask); 11] = [
     ("dual returns", |e| e.returns = Some(ReturnMode::Dual)),
     ("the last return", |e| e.returns = Some(ReturnMode::Last)),
     ("weather", |e| {
-        let min_m = [3.0, -4.0, -2.0];
-        let dust = Volume { min_m, max_m: [6.0, 0.5, 2.0], visibility_m: 60.0 };
+        // Around the sensor, too, where it measures nothing.
+        let min_m = [-2.0, -4.0, -2.0];
+        let dust = Volume { min_m, max_m: [6.0, 0.5, 2.0], visibility_m: 100.0 };
         let (rain_mm_h, haze_visibility_m) = (Some(80.0), Some(3000.0));
         let volumes = vec![dust];
         let weather = Weather { rain_mm_h, haze_visibility_m, volumes, ..Weather::default() };

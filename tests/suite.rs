@@ -20,5 +20,6 @@ mod scan_effects;
 mod shaders_valid;
 #[cfg(feature = "simplify")]
 mod simplified;
+mod streams;
 mod watertight;
 mod weather;
