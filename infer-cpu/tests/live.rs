@@ -7,6 +7,9 @@
 #[allow(dead_code, reason = "the tests of the program use all of it")]
 mod street;
 
+#[path = "live/content.rs"]
+mod content;
+
 use std::collections::BTreeMap;
 use std::path::Path;
 

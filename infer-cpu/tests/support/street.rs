@@ -74,7 +74,9 @@ fn packet(things: &[Thing], first_stamp_us: u32, number: usize) -> [u8; PACKET] 
             at[6 + 3 * i] = 50;
         }
     }
-    let stamp_us = first_stamp_us.wrapping_add((start_s * 1e6).round() as u32);
+    // Stamps count from the hour.
+    let stamp_us = (u64::from(first_stamp_us) + (start_s * 1e6).round() as u64) % 3_600_000_000;
+    let stamp_us = stamp_us as u32;
     bytes[1200..1204].copy_from_slice(&stamp_us.to_le_bytes());
     bytes[1204..].copy_from_slice(&[0x37, 0x22]);
     bytes

@@ -1,0 +1,344 @@
+//! What an answer says: each field against the segmentation and the classifier called by hand for the
+//! same packets, against closed forms of the sensor's motion, and across the hour of the stamps.
+
+use super::street::{PACKET, PACKET_S, PACKETS_PER_S, Thing, packets, street};
+use super::{START_S, on_time, run};
+use edgepuck_segment::{OrientedBox, Settings, Stream};
+use formats::returns::Return;
+use formats::velodyne;
+use glam::{DQuat, DVec3, Vec3};
+use infer_cpu::live::{Arrival, EgoMotion, LiveOptions, Object, Pipeline, Pose};
+use infer_cpu::{Classifier, Options, Prediction};
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+use std::path::{Path, PathBuf};
+
+const TURN_S: f64 = 0.1;
+
+/// A cluster, found by hand.
+struct Found {
+    points: Vec<[f32; 3]>,
+    ground_z_m: Option<f32>,
+    times_s: Vec<f64>,
+    turn: u64,
+}
+
+/// The returns of each packet, with their times, as the pipeline reports them.
+fn decoded(pipeline: &mut Pipeline, sent: &[[u8; PACKET]]) -> Vec<(f64, Vec<Return>)> {
+    let decoded = on_time(sent).map(|(since_s, packet)| {
+        pipeline.take(packet, Arrival { time_s: START_S + since_s, moment: None });
+        let found = pipeline.decoded().unwrap();
+        // The stamps are rounded to microseconds, and f64 holds Unix time within 0.24.
+        assert!((found.time_s - START_S - since_s).abs() < 1.5e-6, "{}", found.time_s);
+        assert_eq!(found.turn, ((since_s + 1e-9) / TURN_S) as u64, "at {since_s} s");
+        (found.time_s, found.returns.to_vec())
+    });
+    decoded.collect()
+}
+
+/// The clusters of the packets of a VLP-16, in the order in which they are complete.
+fn clusters(sent: &[[u8; PACKET]], decoded: &[(f64, Vec<Return>)]) -> Vec<Found> {
+    let step_deg = 360.0 * 10.0 * 55.296e-6;
+    let mut settings = Settings::default();
+    settings.ring_elevations_deg = Some((0..16).map(|i| 2.0 * i as f32 - 15.0).collect());
+    settings.column_width_deg = settings.column_width_deg.max(step_deg as f32);
+    let mut stream = Stream::new(settings, 200_000).unwrap();
+    let mut all = Vec::new();
+    for (packet, (time_s, returns)) in sent.iter().zip(decoded) {
+        let azimuth = u16::from_le_bytes([packet[2], packet[3]]);
+        let turn = stream.n_turns();
+        // No laser of a VLP-16 is off the head's azimuth.
+        stream.advance((f64::from(azimuth) * TAU / 36_000.0) as f32, |cluster| {
+            all.push(Found {
+                points: cluster.points.to_vec(),
+                ground_z_m: cluster.ground_z_m,
+                times_s: cluster.tags.to_vec(),
+                turn,
+            });
+        });
+        for found in returns {
+            stream.push(found.point_m, found.ring, time_s + found.after_us * 1e-6);
+        }
+    }
+    all
+}
+
+fn classifier(model: &Path) -> Classifier {
+    Classifier::load(model, &Options::default()).unwrap()
+}
+
+fn street_model() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/weights/street-128.safetensors")
+}
+
+/// The same model with another energy above which an object is unknown.
+fn with_unknown_energy(folder: &Path, energy: f64) -> PathBuf {
+    let bytes = std::fs::read(street_model()).unwrap();
+    let end = 8 + u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize;
+    let mut header: serde_json::Value = serde_json::from_slice(&bytes[8..end]).unwrap();
+    header["__metadata__"]["unknown_energy"] = energy.to_string().into();
+    let header = serde_json::to_vec(&header).unwrap();
+    let path = folder.join("model.safetensors");
+    let length = (header.len() as u64).to_le_bytes();
+    std::fs::write(&path, [&length[..], &header, &bytes[end..]].concat()).unwrap();
+    path
+}
+
+/// Objects that the pipeline answers without its last clusters, which only the end completes.
+fn answers(pipeline: &mut Pipeline, sent: &[[u8; PACKET]]) -> Vec<Object> {
+    let mut objects = Vec::new();
+    for (since_s, packet) in on_time(sent) {
+        pipeline.take(packet, Arrival { time_s: START_S + since_s, moment: None });
+        pipeline.answer(|object| objects.push(object.clone()));
+    }
+    objects
+}
+
+/// The mean of the log-probabilities of a track: each view counts as much as the others, at first,
+/// and later at least a twentieth.
+#[derive(Default)]
+struct Mean {
+    n: f64,
+    log_probabilities: Vec<f64>,
+    energy: f64,
+}
+
+impl Mean {
+    fn add(&mut self, view: &Prediction) {
+        self.n += 1.0;
+        self.log_probabilities.resize(view.logits.len(), 0.0);
+        let weight = (1.0 / self.n).max(0.05);
+        for (class, mean) in self.log_probabilities.iter_mut().enumerate() {
+            *mean += weight * (view.log_probability(class) - *mean);
+        }
+        self.energy += weight * (view.energy - self.energy);
+    }
+
+    /// The likeliest class, and its probability.
+    fn best(&self) -> (usize, f64) {
+        let of = |class: &usize| self.log_probabilities[*class];
+        let best =
+            (0..self.log_probabilities.len()).max_by(|a, b| of(a).total_cmp(&of(b))).unwrap();
+        let sum: f64 = self.log_probabilities.iter().map(|x| (x - of(&best)).exp()).sum();
+        (best, 1.0 / sum)
+    }
+}
+
+/// The median energy of these clusters.
+fn median_energy(found: &[Found]) -> f64 {
+    let mut classifier = classifier(&street_model());
+    let mut energy = |found: &Found| {
+        classifier.classify_on_ground(&found.points, found.ground_z_m).unwrap().energy
+    };
+    let mut energies: Vec<f64> = found.iter().map(&mut energy).collect();
+    energies.sort_by(f64::total_cmp);
+    energies[energies.len() / 2]
+}
+
+#[test]
+fn an_answer_is_what_the_segmentation_and_the_classifier_say_of_its_cluster() {
+    let sent = packets(&street(), 5_000, 2 * PACKETS_PER_S);
+    let folder = tempfile::tempdir().unwrap();
+    let new = |model: &Path| Pipeline::new(classifier(model), &LiveOptions::default()).unwrap();
+    let found = clusters(&sent, &decoded(&mut new(&street_model()), &sent));
+    let most = median_energy(&found);
+    let model = with_unknown_energy(folder.path(), most);
+    let objects = answers(&mut new(&model), &sent);
+    assert_eq!(objects.len(), found.len());
+    let mut classifier = classifier(&model);
+    let classes = classifier.classes().to_vec();
+    let unknown_classes = classifier.card().unknown_classes.clone();
+    let mut tracks: BTreeMap<u64, Mean> = BTreeMap::new();
+    let mut answered = BTreeMap::<String, usize>::new();
+    for (object, found) in objects.iter().zip(&found) {
+        let OrientedBox { centre_m, size_m, yaw_rad } = OrientedBox::around(&found.points);
+        assert_eq!(object.frame, "sensor");
+        assert_eq!((object.turn, object.points), (found.turn, found.points.len()));
+        assert_eq!(object.position_m, centre_m.map(f64::from));
+        assert_eq!(object.size_m, size_m.map(f64::from));
+        assert_eq!(object.yaw_deg, f64::from(yaw_rad.to_degrees()));
+        let flat_m = f64::from(centre_m[0]).hypot(f64::from(centre_m[1]));
+        assert!((object.range_m - flat_m).abs() < 1e-5);
+        let times_s = [found.times_s[0], *found.times_s.last().unwrap()];
+        assert_eq!([object.first_s, object.last_s], times_s);
+        assert_eq!(object.latency_ms, None);
+        if found.points.len() < 20 {
+            assert_eq!(object.confidence, None);
+            continue;
+        }
+        let view = classifier.classify_on_ground(&found.points, found.ground_z_m).unwrap();
+        let mean = tracks.entry(object.track).or_default();
+        mean.add(view);
+        let (best, probability) = mean.best();
+        let near = |found: Option<f64>, expected: f64| (found.unwrap() - expected).abs() < 1e-9;
+        assert!(near(object.probability, probability), "{object:?}: {probability}");
+        assert!(near(object.confidence, view.log_probability(best).exp()), "{object:?}");
+        let resembles = &classes[best];
+        assert_eq!(object.resembles.as_ref(), Some(resembles));
+        let is_unknown = mean.energy > most || unknown_classes.contains(&resembles.to_string());
+        let answer = if is_unknown { "unknown" } else { resembles };
+        assert_eq!(object.class.as_deref(), Some(answer));
+        *answered.entry(answer.to_owned()).or_default() += 1;
+    }
+    assert!(answered.contains_key("unknown") && answered.len() > 1, "{answered:?}");
+}
+
+/// The model takes heights from the ground, which the pipeline must pass on.
+#[test]
+fn the_height_above_the_ground_decides_the_class() {
+    let sent = packets(&street(), 5_000, PACKETS_PER_S);
+    let new = || Pipeline::new(classifier(&street_model()), &LiveOptions::default()).unwrap();
+    let found = clusters(&sent, &decoded(&mut new(), &sent));
+    let mut classifier = classifier(&street_model());
+    let mut probability = |points: &[[f32; 3]], ground_z_m| {
+        classifier.classify_on_ground(points, ground_z_m).unwrap().confidence()
+    };
+    // The street is 1.2 m below the sensor, and is known but for the first turn.
+    let known = found.iter().filter(|found| found.ground_z_m.is_some() && found.points.len() >= 20);
+    let mut differ = 0;
+    for found in known {
+        assert!((found.ground_z_m.unwrap() + 1.2).abs() < 0.05, "{:?}", found.ground_z_m);
+        let (with, without) =
+            (probability(&found.points, found.ground_z_m), probability(&found.points, None));
+        differ += usize::from((with - without).abs() > 1e-6);
+    }
+    assert!(differ > 10, "{differ}");
+}
+
+/// A sensor that drives and turns: the closed form of its pose.
+fn driven(after_s: f64) -> Pose {
+    let position_m = DVec3::new(100.0, -40.0, 2.0) + DVec3::new(30.0, 4.0, 0.5) * after_s;
+    let world_from_sensor = DQuat::from_rotation_z(1.9 + 0.6 * after_s);
+    Pose { position_m, world_from_sensor }
+}
+
+#[test]
+fn points_of_a_moving_sensor_are_those_of_its_last_moment_and_answers_are_in_the_world() {
+    let sent = packets(&street(), 5_000, PACKETS_PER_S);
+    let mut options = LiveOptions::default();
+    let known_s = [-1.0, 3.0];
+    let poses = known_s.map(|after_s| (START_S + after_s, driven(after_s)));
+    options.ego_motion = Some(EgoMotion::Poses(poses.to_vec()));
+    let new = |options: &LiveOptions| Pipeline::new(classifier(&street_model()), options).unwrap();
+    let decoded = decoded(&mut new(&LiveOptions::default()), &sent);
+    let objects = answers(&mut new(&options), &sent);
+    let found = clusters(&sent, &decoded);
+    assert_eq!(objects.len(), found.len());
+    assert!(objects.len() > 20);
+    let mut moved_most_m = 0.0f64;
+    for (object, found) in objects.iter().zip(&found) {
+        let last_s = found.times_s.last().unwrap() - START_S;
+        let last = driven(last_s);
+        let compensated: Vec<[f32; 3]> = found
+            .points
+            .iter()
+            .zip(&found.times_s)
+            .map(|(point, at_s)| {
+                let at = driven(at_s - START_S);
+                let in_world = at.world_from_sensor * Vec3::from(*point).as_dvec3() + at.position_m;
+                let back = last.world_from_sensor.inverse() * (in_world - last.position_m);
+                moved_most_m = moved_most_m.max(back.distance(Vec3::from(*point).as_dvec3()));
+                back.as_vec3().to_array()
+            })
+            .collect();
+        let OrientedBox { centre_m, size_m, yaw_rad } = OrientedBox::around(&compensated);
+        let centre_m = Vec3::from(centre_m).as_dvec3();
+        let at_m = last.world_from_sensor * centre_m + last.position_m;
+        // f32 holds these points within 2 micrometres, and the times within 0.24 us of 30 m/s.
+        let off_m = DVec3::from_array(object.position_m).distance(at_m);
+        assert!(object.frame == "world" && off_m < 1e-4, "{object:?}: {at_m}");
+        assert!((object.range_m - centre_m.truncate().length()).abs() < 1e-4);
+        let size_off = DVec3::from_array(object.size_m) - Vec3::from(size_m).as_dvec3();
+        assert!(size_off.abs().max_element() < 1e-4, "{object:?}: {size_m:?}");
+        // A direction of a box is one modulo half a turn.
+        let turned_deg =
+            f64::from(yaw_rad).to_degrees() + (1.9 + 0.6 * last_s).to_degrees() - object.yaw_deg;
+        let off_deg = (turned_deg + 90.0).rem_euclid(180.0) - 90.0;
+        assert!(off_deg.abs() < 0.05 && object.yaw_deg.abs() <= 90.0, "{object:?}: {off_deg}");
+    }
+    // So that the first and the last pose of a cluster differ.
+    assert!(moved_most_m > 0.2, "{moved_most_m}");
+}
+
+#[test]
+fn a_stream_across_the_hour_of_the_stamps_is_as_any_other() {
+    let new = || super::pipeline(&LiveOptions::default());
+    let [plain, across] = [5_000, 3_599_500_000].map(|stamp_us| {
+        let mut pipeline = new();
+        let sent = packets(&street(), stamp_us, PACKETS_PER_S);
+        let objects = run(&mut pipeline, on_time(&sent));
+        let counts = *pipeline.counts();
+        assert_eq!((counts.restarts, counts.lost, counts.late, counts.duplicated), (0, 0, 0, 0));
+        objects
+    });
+    assert_eq!(plain.len(), across.len());
+    for (plain, across) in plain.iter().zip(&across) {
+        assert_eq!((plain.track, plain.position_m), (across.track, across.position_m));
+        let off_s = [plain.first_s - across.first_s, plain.last_s - across.last_s];
+        // Both are rounded to f64 of Unix time once or twice.
+        assert!(off_s.into_iter().all(|off_s| off_s.abs() < 1e-6), "{off_s:?}");
+    }
+}
+
+#[test]
+fn an_object_that_was_hidden_for_a_while_keeps_its_track_although_another_one_appears() {
+    let [car, _, person] = street()[..] else { panic!("expected three things") };
+    let n = 3 * PACKETS_PER_S;
+    let alone = packets(&[car], 5_000, n);
+    let gone = packets(&[], 5_000, n);
+    let walks = packets(&[person], 5_000, n);
+    let both = packets(&[car, person], 5_000, n);
+    // The car is hidden from 1.0 to 1.8 s, and a person appears at 1.4 s.
+    let sent: Vec<[u8; PACKET]> = (0..n)
+        .map(|i| match (i as f64 * PACKET_S / 0.2) as u32 {
+            0..5 => alone[i],
+            5..7 => gone[i],
+            7..9 => walks[i],
+            _ => both[i],
+        })
+        .collect();
+    let objects = run(&mut super::pipeline(&LiveOptions::default()), on_time(&sent));
+    let near = |object: &&Object, thing: &Thing| {
+        let since_s = object.last_s - START_S;
+        let at = [0, 1].map(|axis| thing.at[axis] + since_s * thing.velocity[axis]);
+        (object.position_m[0] - at[0]).hypot(object.position_m[1] - at[1]) < 2.4
+    };
+    let tracks = |thing: &Thing| -> Vec<u64> {
+        let mut all: Vec<u64> =
+            objects.iter().filter(|object| near(object, thing)).map(|o| o.track).collect();
+        all.dedup();
+        all
+    };
+    assert_eq!((tracks(&car).len(), tracks(&person).len()), (1, 1), "{:?}", tracks(&car));
+    assert_ne!(tracks(&car), tracks(&person));
+}
+
+/// By the manual (VLP-16, 63-9243, 9.3.2): in dual return mode the last return of a firing is in the
+/// first block of a pair, and the strongest in the second.
+#[test]
+fn the_last_and_the_strongest_return_of_a_pair_of_blocks_are_not_swapped() {
+    let mut packet = [0u8; PACKET];
+    for block in 0..12 {
+        let at = &mut packet[100 * block..];
+        at[..2].copy_from_slice(&[0xff, 0xee]);
+        let azimuth = 40 * (block as u16 / 2);
+        at[2..4].copy_from_slice(&azimuth.to_le_bytes());
+        for i in 0..32 {
+            // 10 m, of reflectivity 5, behind 4 m, of 90. Unit: 2 mm.
+            let (units, reflectivity) = if block % 2 == 0 { (5_000u16, 5) } else { (2_000, 90) };
+            at[4 + 3 * i..6 + 3 * i].copy_from_slice(&units.to_le_bytes());
+            at[6 + 3 * i] = reflectivity;
+        }
+    }
+    packet[1204..].copy_from_slice(&[0x39, 0x22]);
+    let decoder = velodyne::Decoder::new(velodyne::Model::Vlp16);
+    let mut seen = BTreeMap::<String, usize>::new();
+    decoder
+        .decode(&packet, |found| {
+            let text = format!("{:?} {} m, {}", found.kind, found.range_m, found.reflectivity);
+            *seen.entry(text).or_default() += 1;
+        })
+        .unwrap();
+    let expected = [("Last 10 m, 5", 192), ("Strongest 4 m, 90", 192)];
+    assert_eq!(seen, expected.map(|(text, n)| (text.to_owned(), n)).into());
+}
