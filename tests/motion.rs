@@ -128,6 +128,21 @@ fn culling_loses_nothing_of_what_moves() {
     };
     assert!(with(Culling::On).len() > 30);
     assert_eq!(with(Culling::On), with(Culling::Off));
+
+    // A car whose frame is far from its origin, as in a map, and turns: it passes by the sensor.
+    let turning = |culling| -> Scan {
+        let mut request = request(&sensor, &pattern);
+        request.culling = culling;
+        let mut placed = PlacedTarget::new(&targets[1]);
+        placed.world_from_object = DAffine3::from_translation(DVec3::X * 10.0);
+        placed.motion = moving(&[
+            (0.0, pose([-6.0, 0.0, 0.0], DVec3::Z, -1.0)),
+            (0.1, pose([-6.0, 0.0, 0.0], DVec3::Z, 1.0)),
+        ]);
+        scan_objects(&OpenCaster::Cpu(Effects::default()), &[placed], &request).unwrap().scan
+    };
+    assert!(turning(Culling::Off).len() > 30);
+    assert_eq!(turning(Culling::On), turning(Culling::Off));
 }
 
 #[test]

@@ -75,6 +75,15 @@ fn pixel(profile: Profile, [(first, a), (second, b)]: [(u32, u8); 2]) -> Vec<u8>
 
 /// The packet of `frame` whose first column is `start`.
 fn packet(profile: Profile, frame: u16, start: u16) -> Vec<u8> {
+    packet_of(profile, frame, start, measured)
+}
+
+fn packet_of(
+    profile: Profile,
+    frame: u16,
+    start: u16,
+    measured: impl Fn(u16, usize) -> [(u32, u8); 2],
+) -> Vec<u8> {
     let is_legacy = profile == Profile::Legacy;
     let around = if is_legacy { 0 } else { 32 };
     let mut bytes = [&[1, 0], &frame.to_le_bytes()[..], &[7; 28]].concat();
@@ -140,6 +149,25 @@ fn every_profile_is_read_to_the_bits_of_its_packets() {
             };
             assert_eq!(found, expected, "{profile}");
         }
+    }
+}
+
+/// The widths of the field RANGE in Ouster's Software User Manual ("Lidar Data Packet Format"): 20
+/// bits in the legacy format, 19 in RNG19, and 15 bits of 8 mm in RNG15.
+#[test]
+fn the_farthest_range_of_each_profile_is_read_to_its_last_bit() {
+    for profile in Profile::ALL {
+        let farthest_mm = match profile {
+            Profile::Legacy => (1 << 20) - 1,
+            Profile::Single | Profile::Dual => (1 << 19) - 1,
+            Profile::LowRate => 8 * ((1 << 15) - 1),
+        };
+        let packet = packet_of(profile, 1, 0, |_, _| [(farthest_mm, 1), (farthest_mm - 8, 2)]);
+        let mut found = Vec::new();
+        decoder(profile).decode(&packet, |it| found.push(it.range_m)).unwrap();
+        let expected = [farthest_mm, farthest_mm - 8].map(|mm| (f64::from(mm) * 1e-3) as f32);
+        let returns = if profile == Profile::Dual { 2 } else { 1 };
+        assert_eq!(found, expected[..returns].repeat(12), "{profile}");
     }
 }
 

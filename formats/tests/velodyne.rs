@@ -36,6 +36,112 @@ fn capture(folder: &Path, returns: Returns) -> PathBuf {
     path
 }
 
+/// Lasers in the order of packets: elevation and azimuth offset in degrees, and how far below a beam
+/// through the origin it lies, in tenths of a millimetre. ROS's velodyne_pointcloud,
+/// params/VLP16db.yaml, whose `vert_correction`s are exact degrees.
+const VLP16: [(f64, f64, i32); 16] = [
+    (-15.0, 0.0, -112),
+    (1.0, 0.0, 7),
+    (-13.0, 0.0, -97),
+    (3.0, 0.0, 22),
+    (-11.0, 0.0, -81),
+    (5.0, 0.0, 37),
+    (-9.0, 0.0, -66),
+    (7.0, 0.0, 51),
+    (-7.0, 0.0, -51),
+    (9.0, 0.0, 66),
+    (-5.0, 0.0, -37),
+    (11.0, 0.0, 81),
+    (-3.0, 0.0, -22),
+    (13.0, 0.0, 97),
+    (-1.0, 0.0, -7),
+    (15.0, 0.0, 112),
+];
+
+/// As [`VLP16`]: VLP-32C User Manual 63-9325, table of laser angles; beams cross 42.4 mm in front of
+/// the axis.
+const VLP32C: [(f64, f64, i32); 32] = [
+    (-25.0, -1.4, -198),
+    (-1.0, 4.2, -7),
+    (-1.667, -1.4, -12),
+    (-15.639, 1.4, -119),
+    (-11.31, -1.4, -85),
+    (0.0, 1.4, 0),
+    (-0.667, -4.2, -5),
+    (-8.843, 1.4, -66),
+    (-7.254, -1.4, -54),
+    (0.333, 4.2, 2),
+    (-0.333, -1.4, -2),
+    (-6.148, 1.4, -46),
+    (-5.333, -4.2, -40),
+    (1.333, 1.4, 10),
+    (0.667, -4.2, 5),
+    (-4.0, 1.4, -30),
+    (-4.667, -1.4, -35),
+    (1.667, 4.2, 12),
+    (1.0, -1.4, 7),
+    (-3.667, 4.2, -27),
+    (-3.333, -4.2, -25),
+    (3.333, 1.4, 25),
+    (2.333, -1.4, 17),
+    (-2.667, 1.4, -20),
+    (-3.0, -1.4, -22),
+    (7.0, 1.4, 52),
+    (4.667, -1.4, 35),
+    (-2.333, 4.2, -17),
+    (-2.0, -4.2, -15),
+    (15.0, 1.4, 114),
+    (10.333, -1.4, 77),
+    (-1.333, 1.4, -10),
+];
+
+/// A packet of a head that stands still at 30 degrees, in which every laser measures 5 m.
+fn standing(model: u8, unit_mm: u16) -> Vec<u8> {
+    let mut packet = Vec::new();
+    for _ in 0..12 {
+        packet.extend([0xff, 0xee]);
+        packet.extend(3000u16.to_le_bytes());
+        for laser in 0..32 {
+            packet.extend((5000 / unit_mm).to_le_bytes());
+            packet.push(laser);
+        }
+    }
+    packet.extend([0, 0, 0, 0, 0x37, model]);
+    packet
+}
+
+#[test]
+fn each_laser_points_where_the_manual_says_and_fires_when_it_says() {
+    let both = [
+        (Model::Vlp16, standing(0x22, 2), &VLP16[..], 1),
+        (Model::Vlp32c, standing(0x28, 4), &VLP32C, 2),
+    ];
+    for (model, packet, lasers, at_once) in both {
+        let mut found = Vec::new();
+        Decoder::new(model).decode(&packet, |it| found.push(*it)).unwrap();
+        assert_eq!(found.len(), 12 * 32, "{model}");
+        for (i, found) in found.iter().enumerate() {
+            let (sequence, laser) = (i / lasers.len(), i % lasers.len());
+            let (elevation_deg, offset_deg, below) = lasers[laser];
+            let azimuth_rad = (30.0 - offset_deg).to_radians();
+            let (flat_m, up) = (5.0 * elevation_deg.to_radians().cos(), elevation_deg.to_radians());
+            let expected = [
+                flat_m * azimuth_rad.cos(),
+                -flat_m * azimuth_rad.sin(),
+                5.0 * up.sin() - f64::from(below) * 1e-4,
+            ];
+            // The table has tenths of a millimetre.
+            let off_m = [0, 1, 2].map(|axis| f64::from(found.point_m[axis]) - expected[axis]);
+            assert!(off_m.iter().all(|m| m.abs() < 6e-5), "{model} laser {laser}: {off_m:?}");
+            let lower = lasers.iter().filter(|(other, ..)| *other < elevation_deg).count();
+            let fires_us = 55.296 * sequence as f64 + 2.304 * (laser / at_once) as f64;
+            assert_eq!((found.range_m, usize::from(found.ring)), (5.0, lower), "{model} {laser}");
+            assert_eq!(usize::from(found.reflectivity), i % 32);
+            assert!((found.after_us - fires_us).abs() < 1e-9, "{model} laser {laser}");
+        }
+    }
+}
+
 /// A range is off by half a unit of 4 mm. An azimuth is off by half a unit of 0.01 degree, and by
 /// as much as `formats::vlp32c` derives for the rate of turning: 0.0063 degree. Both, at 59 m, and
 /// f32's steps: below 7 mm.

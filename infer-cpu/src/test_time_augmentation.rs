@@ -94,3 +94,34 @@ impl TestTimeAugmentation {
         out.extend(self.sums.iter().map(|sum| (sum / f64::from(self.n)) as f32));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn four_votes_are_the_quarter_turns_about_the_up_axis_and_count_alike() {
+        for (up, quarters) in [
+            (UpAxis::Z, [[1.0, 2.0, 5.0], [-2.0, 1.0, 5.0], [-1.0, -2.0, 5.0], [2.0, -1.0, 5.0]]),
+            (UpAxis::Y, [[1.0, 2.0, 5.0], [5.0, 2.0, -1.0], [-1.0, 2.0, -5.0], [-5.0, 2.0, 1.0]]),
+        ] {
+            let options = Options { votes: 4, vote_rotations: true, up, ..Options::default() };
+            let mut votes =
+                TestTimeAugmentation::new(&options, &SamplerSpec::default(), 2).unwrap();
+            votes.begin(&[[1.0, 2.0, 5.0]]);
+            let mut mean = Vec::new();
+            for (vote, expected) in (0..).zip(quarters) {
+                let mut turned = [[0.0; 3]];
+                votes.turn(vote, &mut turned);
+                let off = [0, 1, 2].map(|axis| (turned[0][axis] - expected[axis]).abs());
+                assert!(off.iter().all(|off| *off < 1e-6), "{up:?}, vote {vote}: {turned:?}");
+                // Two votes of 3 to 1 and two of 1 to 3.
+                let logits = [3.0f32.ln(), 0.0];
+                votes.count(&if vote < 2 { logits } else { [logits[1], logits[0]] });
+            }
+            votes.result(&mut mean);
+            let expected = (0.75f32.ln() + 0.25f32.ln()) / 2.0;
+            assert!(mean.iter().all(|mean| (mean - expected).abs() < 1e-6), "{mean:?}");
+        }
+    }
+}

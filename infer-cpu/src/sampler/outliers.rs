@@ -227,7 +227,7 @@ mod tests {
         };
         let mut all: Vec<f32> = cloud.iter().map(eighth).collect();
         all.sort_by(f32::total_cmp);
-        let limit = REACH * REACH * all[cloud.len() / 2];
+        let limit = 4.0 * 4.0 * all[cloud.len() / 2];
         cloud.iter().filter(|p| eighth(p) > limit).copied().collect()
     }
 
@@ -252,6 +252,24 @@ mod tests {
         for (n, n_strays, seed) in [(9, 0, 1), (9, 1, 2), (60, 3, 3), (120, 8, 4), (100, 0, 5)] {
             let cloud = object_among(n, n_strays, seed);
             assert_eq!(outliers(&cloud), by_definition(&cloud), "{n} and {n_strays}");
+        }
+    }
+
+    /// In a lattice, the eighth neighbour is sqrt(2) steps away. That of a point at a distance d
+    /// beside the middle of a square of one face is sqrt(d^2 + 2.5) away.
+    #[test]
+    fn an_outlier_is_more_than_four_times_as_far_from_its_neighbours_as_usual() {
+        let steps = 0..10u8;
+        let lattice: Vec<[f32; 3]> = steps
+            .clone()
+            .flat_map(|x| steps.clone().map(move |y| (x, y)))
+            .flat_map(|(x, y)| steps.clone().map(move |z| [x, y, z].map(f32::from)))
+            .collect();
+        for (times, is_outlier) in [(3.5f32, false), (4.5, true)] {
+            let distance = (2.0 * times * times - 2.5).sqrt();
+            let mut cloud = lattice.clone();
+            cloud.push([-distance, 4.5, 4.5]);
+            assert_eq!(outliers(&cloud).len(), usize::from(is_outlier), "{times}");
         }
     }
 
