@@ -44,10 +44,13 @@ impl Clouds {
         let attributes = attributes.iter().map(|name| name.parse());
         let attributes = attributes.collect::<Result<_, _>>().map_err(raised)?;
         let clouds = process::run(py, || {
-            let meshes = dataset::discover(&meshes, config.seed)?;
-            Ok(dataset::Clouds::new(config, &meshes, split, cache_bytes)?)
+            let listed = dataset::discover(&meshes, config.seed)?;
+            let doubts = dataset::doubts(&meshes, &listed).into_iter();
+            let doubts = doubts.map(|doubt| format!("{}: {doubt}", meshes.display())).collect();
+            Ok((doubts, dataset::Clouds::new(config, &listed, split, cache_bytes)?))
         })?;
-        let clouds = clouds.map_err(raised_with_causes)?;
+        let (doubts, clouds): (Vec<String>, _) = clouds.map_err(raised_with_causes)?;
+        warn(py, &doubts)?;
         Ok(Self { clouds, n_points, attributes, caster: LazyCaster::new(adapter) })
     }
 

@@ -183,7 +183,7 @@ fn stop_on_signals(progress: &Progress) -> anyhow::Result<()> {
 /// The meshes in `folder`; prints what is odd about its layout.
 pub fn listed(folder: &Path, seed: u64) -> anyhow::Result<Vec<MeshEntry>> {
     let meshes = discover(folder, seed)?;
-    for doubt in doubts(&meshes) {
+    for doubt in doubts(folder, &meshes) {
         eprintln!("warning: {}: {doubt}", folder.display());
     }
     Ok(meshes)

@@ -1,6 +1,6 @@
 //! The meshes of a dataset, with their classes and splits.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::ffi::OsStr;
 use std::fs::File;
 use std::io::Read;
@@ -21,6 +21,12 @@ const TRAIN_SHARE: f64 = 0.8;
 
 /// The longest name. File systems allow 255 bytes, and file names append to it.
 const LONGEST_NAME: usize = 180;
+
+/// The extensions of files that accompany meshes: materials, images and texts.
+const COMPANIONS: [&str; 24] = [
+    "mtl", "png", "jpg", "jpeg", "bmp", "tga", "tif", "tiff", "webp", "gif", "dds", "txt", "md",
+    "rst", "json", "jsonl", "csv", "xml", "yaml", "yml", "toml", "pdf", "html", "log",
+];
 
 /// The hexadecimal digits of the hash that distinguishes equal names.
 const HASH_DIGITS: usize = 12;
@@ -72,7 +78,9 @@ pub enum TreeError {
 /// name.
 ///
 /// A mesh `CLASS/{train,test}/NAME.ext` keeps its split, and so does any mesh with such a folder
-/// between `root` and its class or its own folder. The class of a mesh is its folder. But if
+/// between `root` and its class or its own folder. Where folders of splits stand alone beside each
+/// other, the names may be in any case, and `val`, `valid` and `validation` are of the training
+/// set. The class of a mesh is its folder. But if
 /// folders deeper than those below `root` have one mesh each, as `CLASS/ID/models/model.obj`, then
 /// the class is the folder below `root` (CLASS), and the name that of the next folder (ID).
 ///
@@ -90,22 +98,14 @@ pub enum TreeError {
 pub fn discover(root: &Path, seed: u64) -> Result<Vec<MeshEntry>, TreeError> {
     let absolute =
         root.canonicalize().map_err(|source| TreeError::Read { path: root.into(), source })?;
-    let files = mesh_files(root)?;
+    let (files, _) = files(root)?;
     if files.is_empty() {
         return Err(TreeError::NoMesh(root.into()));
     }
     let mut places: Vec<Place> =
         files.into_iter().map(|path| Place::of(root, &absolute, path)).collect();
-    let begins_with = |split: Split| {
-        move |place: &Place| {
-            place.below().len() > 1 && place.below().first().is_some_and(|at| at == split.name())
-        }
-    };
-    let [train, test] = [Split::Train, Split::Test].map(begins_with);
-    let is_split_first = places.iter().any(&train)
-        && places.iter().any(&test)
-        && places.iter().all(|place| train(place) || test(place));
-    places.iter_mut().for_each(|place| place.take_split(is_split_first));
+    let words = Words::of(&places);
+    places.iter_mut().for_each(|place| place.take_split(words));
 
     let mut n_in_folder = HashMap::new();
     for place in &places {
@@ -123,19 +123,107 @@ pub fn discover(root: &Path, seed: u64) -> Result<Vec<MeshEntry>, TreeError> {
     Ok(entries)
 }
 
-/// What suggests that the folders of `entries` mean something else, for the user.
+/// What suggests that the folders of `root`, with the meshes `entries`, mean something else, and
+/// what of them is left out, for the user.
 #[must_use]
-pub fn doubts(entries: &[MeshEntry]) -> Vec<String> {
-    let classes: HashSet<&str> = entries.iter().map(|entry| &*entry.class).collect();
-    let has = |split| entries.iter().any(|entry| entry.split == split);
-    let empty = Split::ALL.into_iter().filter(|split| !has(*split));
-    let mut doubts: Vec<String> =
-        empty.map(|split| format!("no mesh is in the {split} split")).collect();
-    if classes.len() > 1 && classes.len() == entries.len() {
-        doubts.push(format!("each of the {} classes has one mesh", classes.len()));
+pub fn doubts(root: &Path, entries: &[MeshEntry]) -> Vec<String> {
+    let mut splits: BTreeMap<&str, BTreeSet<Split>> = BTreeMap::new();
+    for entry in entries {
+        splits.entry(&entry.class).or_default().insert(entry.split);
     }
-    let layouts = "expected CLASS/NAME, CLASS/{train,test}/NAME or CLASS/ID/NAME in the folder";
-    doubts.into_iter().map(|doubt| format!("{doubt}; {layouts}")).collect()
+    let layouts = "expected CLASS/NAME, CLASS/{train,test}/NAME or CLASS/ID/NAME, with one mesh in \
+                   each ID, in the folder";
+    let n_classes = splits.len();
+    let is_alone = n_classes > 1 && n_classes == entries.len();
+    let mut doubts = Vec::new();
+    for split in Split::ALL {
+        let lack = splits.iter().filter(|(_, splits)| !splits.contains(&split));
+        let lack: Vec<&str> = lack.map(|(class, _)| *class).collect();
+        if lack.len() == n_classes {
+            doubts.push(format!("no mesh is in the {split} split; {layouts}"));
+        } else if !lack.is_empty() && !is_alone {
+            let way = "another seed, or folders CLASS/{train,test}, split the meshes otherwise";
+            doubts.push(format!("no {split} mesh of {}; {way}", some_of(&lack)));
+        }
+    }
+    // The folders of each mesh, the outermost first.
+    let folders = |relative: &str| -> Vec<String> {
+        let parts: Vec<String> = relative.split('/').map(str::to_owned).collect();
+        parts[..parts.len() - 1].to_vec()
+    };
+    let is_deep = |entry: &MeshEntry| {
+        let folders = folders(&entry.relative);
+        folders.len() > 1 && folders.last().is_some_and(|last| safe_name(last) == entry.class)
+    };
+    if is_alone {
+        doubts.push(format!("each of the {n_classes} classes has one mesh; {layouts}"));
+    } else if n_classes > 1 && entries.len() <= 3 * n_classes && entries.iter().all(is_deep) {
+        let n = entries.len() as f64 / n_classes as f64;
+        doubts.push(format!("{n_classes} classes of {n:.0} meshes each; {layouts}"));
+    }
+    let is_split = |name: &&str| split_called(name).is_some();
+    let odd = splits.keys().find(|class| {
+        is_split(class) && entries.iter().any(|entry| entry.class == **class && is_deep(entry))
+    });
+    if let Some(class) = odd {
+        doubts.push(format!("the class {class} has the name of a split; {layouts}"));
+    }
+    let is_held = |entry: &&MeshEntry| {
+        let is_held =
+            |name: &String| is_validation(name) && ![&entry.class, &entry.name].contains(&name);
+        entry.split == Split::Train && folders(&entry.relative).iter().any(is_held)
+    };
+    match entries.iter().filter(is_held).count() {
+        0 => {}
+        n => doubts.push(format!(
+            "{n} meshes in folders for validation are in the train split: training holds out its \
+             own clouds for validation"
+        )),
+    }
+    doubts.extend(left_out(root, entries));
+    doubts
+}
+
+/// The files below `root` that no mesh needs and that are not read, and the classes that lack a
+/// mesh for it.
+fn left_out(root: &Path, entries: &[MeshEntry]) -> Option<String> {
+    let (_, others) = files(root).ok()?;
+    let mut extensions = BTreeSet::new();
+    let mut lack = BTreeSet::new();
+    let mut n = 0;
+    for file in &others {
+        let Some(extension) = file.extension().map(|e| text(e).to_lowercase()) else { continue };
+        if COMPANIONS.contains(&&*extension) {
+            continue;
+        }
+        n += 1;
+        extensions.insert(format!(".{extension}"));
+        let folders = file.strip_prefix(root).ok().and_then(Path::parent).into_iter();
+        let mut folders = folders.flat_map(Path::components).map(|part| text(part.as_os_str()));
+        let class = folders.find(|name| split_called(name).is_none());
+        lack.extend(class.filter(|class| {
+            !entries.iter().any(|entry| entry.relative.split('/').any(|part| part == class))
+        }));
+    }
+    let extensions: Vec<&str> = extensions.iter().map(String::as_str).collect();
+    let lack: Vec<&str> = lack.iter().map(String::as_str).collect();
+    let of = match lack.len() {
+        0 => String::new(),
+        1 => format!("; the class {} has no mesh", lack[0]),
+        _ => format!("; the classes {} have no mesh", some_of(&lack)),
+    };
+    let read = mesh_extensions().map(|extension| format!(".{extension}")).join(", ");
+    let files = if n == 1 { "1 file is" } else { &format!("{n} files are") };
+    (n > 0).then(|| format!("{files} ignored ({}){of}; expected {read}", some_of(&extensions)))
+}
+
+/// The first of `names`, and how many more there are.
+fn some_of(names: &[&str]) -> String {
+    const MOST: usize = 5;
+    match names.len().checked_sub(MOST) {
+        None | Some(0) => names.join(", "),
+        Some(more) => format!("{} and {more} more", names[..MOST].join(", ")),
+    }
 }
 
 impl MeshEntry {
@@ -148,8 +236,8 @@ impl MeshEntry {
     }
 }
 
-/// The mesh files at and below `root`, in order of their paths.
-fn mesh_files(root: &Path) -> Result<Vec<PathBuf>, TreeError> {
+/// The mesh files at and below `root`, and the others, in order of their paths.
+fn files(root: &Path) -> Result<(Vec<PathBuf>, Vec<PathBuf>), TreeError> {
     let walk = WalkDir::new(root).follow_links(true).sort_by_file_name();
     let root_is_dataset = is_dataset(root);
     let is_wanted = |item: &DirEntry| {
@@ -160,14 +248,14 @@ fn mesh_files(root: &Path) -> Result<Vec<PathBuf>, TreeError> {
                 && !(item.file_type().is_dir() && is_dataset(item.path()))
                 && !(root_is_dataset && item.depth() == 1 && is_set())
     };
-    let mut files = Vec::new();
+    let (mut files, mut others) = (Vec::new(), Vec::new());
     for item in walk.into_iter().filter_entry(is_wanted) {
         match item {
             Ok(item) if item.file_type().is_dir() => {}
             Ok(item) if MeshFormat::from_path(item.path()).is_some() => {
                 files.push(item.into_path())
             }
-            Ok(_) => {}
+            Ok(item) => others.push(item.into_path()),
             Err(error) if error.loop_ancestor().is_some() => {}
             Err(error) => {
                 let path = error.path().unwrap_or(root).to_path_buf();
@@ -180,7 +268,7 @@ fn mesh_files(root: &Path) -> Result<Vec<PathBuf>, TreeError> {
             }
         }
     }
-    Ok(files)
+    Ok((files, others))
 }
 
 /// Whether a folder holds a dataset of scans, finished or not.
@@ -191,6 +279,52 @@ fn is_dataset(folder: &Path) -> bool {
     let is_manifest =
         read.is_ok() && memchr::memmem::find(&head, br#""tool": "edgepuck""#).is_some();
     is_manifest || folder.join("journal/terms.json").exists()
+}
+
+/// The split of a folder of this name, in any case. A validation set is for training.
+fn split_called(name: &str) -> Option<Split> {
+    match is_validation(name) {
+        true => Some(Split::Train),
+        false => name.to_lowercase().parse().ok(),
+    }
+}
+
+fn is_validation(name: &str) -> bool {
+    ["val", "valid", "validation"].iter().any(|word| name.eq_ignore_ascii_case(word))
+}
+
+/// Where folders with names of splits, in any case and with those of validation, are splits: where
+/// at least two of them, and no other folders, stand beside each other.
+#[derive(Clone, Copy)]
+struct Words {
+    /// Directly below the root.
+    are_first: bool,
+    /// In the folders of classes.
+    are_deep: bool,
+}
+
+impl Words {
+    fn of(places: &[Place]) -> Self {
+        let is_split = |name: &String| split_called(name).is_some();
+        let is_first = |place: &Place| place.below().first().is_some_and(is_split);
+        let firsts: HashSet<&String> =
+            places.iter().filter_map(|place| place.below().first()).collect();
+        let (mut parents, mut words) = (HashSet::new(), HashSet::new());
+        for below in places.iter().map(Place::below) {
+            for at in (1..below.len()).filter(|&at| is_split(&below[at])) {
+                parents.insert(&below[..at]);
+                words.insert(&below[at]);
+            }
+        }
+        let are_splits = |place: &Place| {
+            let below = place.below();
+            (1..below.len()).all(|at| !parents.contains(&below[..at]) || is_split(&below[at]))
+        };
+        Self {
+            are_first: firsts.len() > 1 && places.iter().all(is_first),
+            are_deep: words.len() > 1 && places.iter().all(are_splits),
+        }
+    }
 }
 
 /// Where a mesh is.
@@ -230,14 +364,22 @@ impl Place {
     }
 
     /// Removes the last folder that is called as a split from its folders. Directly below the root
-    /// it may as well be a class, unless `is_split_first` or it is the folder of the mesh.
-    fn take_split(&mut self, is_split_first: bool) {
-        let (n, first) = (self.folders.len(), self.n_above + usize::from(!is_split_first));
-        let split = |name: &String| name.parse::<Split>().ok();
-        let at = self.folders.iter().rposition(|name| split(name).is_some());
-        let Some(at) = at.filter(|&at| n > 1 && (at + 1 == n || at >= first)) else { return };
-        let name = self.folders.remove(at);
-        self.split = split(&name).map(|split| (split, at + 1 == n));
+    /// it may as well be a class, unless all are splits or it is the folder of the mesh.
+    fn take_split(&mut self, words: Words) {
+        let n = self.folders.len();
+        let split = |at: usize| {
+            let is_own = at + 1 == n && n > 1;
+            let [is_below, is_first] = [at > self.n_above, at == self.n_above && words.are_first];
+            let name = &self.folders[at];
+            let exact = name.parse().ok().filter(|_| is_own || is_below || is_first);
+            let other = || split_called(name).filter(|_| is_below && words.are_deep || is_first);
+            exact.or_else(other)
+        };
+        let last = (0..n).rev().find_map(|at| Some((split(at)?, at)));
+        self.split = last.map(|(split, at)| {
+            self.folders.remove(at);
+            (split, at + 1 == n)
+        });
     }
 
     /// Whether the mesh could be the one of its folder, and a folder above that its class.
@@ -541,6 +683,16 @@ mod tests {
         assert_eq!(split("test/car/2.off", &train), "car test 2");
         assert_eq!(split("test/car/2/mesh.off", &["train/car/1/mesh.off"]), "car test 2");
         assert_eq!(split("car/test/2/mesh.off", &["car/train/1/mesh.off"]), "car test 2");
+        // Other names of splits, where only splits stand beside each other.
+        let others = ["Train/car/1.off", "VAL/car/3.off", "validation/car/4.off"];
+        assert_eq!(split("test/car/2.off", &others), "car test 2");
+        assert_eq!(split("VAL/car/3.off", &["train/car/1.off"]), "car train 3");
+        assert_eq!(split("car/Test/2.off", &["car/valid/1.off", "bus/Train/1.off"]), "car test 2");
+        assert!(
+            split("toys/Train/2.off", &["toys/Train/1.off", "toys/Bus/1.off"])
+                .starts_with("Train ")
+        );
+        assert_eq!(split("Test/2.off", &["Train/1.off"]), "data test 2");
         // A railway, beside other classes.
         assert!(split("train/ice/1.off", &["car/bus/1.off"]).starts_with("train "));
     }
@@ -569,12 +721,39 @@ mod tests {
     fn an_odd_layout_is_told() {
         let doubts = |paths: &[&str]| {
             let (_folder, root) = tree(paths);
-            let all = doubts(&discover(&root, 1).unwrap());
-            all.iter().map(|doubt| doubt.split(';').next().unwrap().to_owned()).collect::<Vec<_>>()
+            let all = doubts(&root, &discover(&root, 1).unwrap());
+            all.iter()
+                .map(|doubt| doubt.split("; e").next().unwrap().to_owned())
+                .collect::<Vec<_>>()
         };
-        let sound = ["a/train/1.off", "a/test/2.off", "b/train/1.off"];
-        assert!(doubts(&sound).is_empty());
-        assert_eq!(doubts(&sound[..1]), ["no mesh is in the test split"]);
-        assert_eq!(doubts(&sound[1..]), ["each of the 2 classes has one mesh"]);
+        let sound = ["a/train/1.off", "a/test/2.off", "b/train/1.off", "b/test/2.obj"];
+        let ids = ["a/1/m.obj", "a/1/n.obj", "b/2/m.obj", "b/2/n.obj", "b/3/m.obj", "b/3/n.obj"];
+        let lack = "split the meshes otherwise";
+        let held = "2 meshes in folders for validation are in the train split: training holds out \
+                    its own clouds for validation";
+        let cases: [(&[&str], &[&str]); 8] = [
+            (&sound, &[]),
+            (&sound[..1], &["no mesh is in the test split"]),
+            (&sound[1..3], &["each of the 2 classes has one mesh"]),
+            (&sound[..3], &["no test mesh of b", lack]),
+            (&["a/train/1.off", "a/val/2.off", "a/valid/3.off", "a/test/1.off"], &[held]),
+            (
+                &["x/a/val/1.off", "x/a/val/2.off", "x/a/more/1.off", "x/a/more/2.off"],
+                &["name of a split"],
+            ),
+            (
+                &[&sound[..], &["a/train/1.mtl", "b/3.glb", "c/train/a.STEP", "c/b.obj.gz"]]
+                    .concat(),
+                &["3 files are ignored (.glb, .gz, .step); the class c has no mesh"],
+            ),
+            (&ids, &["3 classes of 2 meshes each"]),
+        ];
+        for (paths, expected) in cases {
+            let found = doubts(paths).join("\n");
+            assert_eq!(found.is_empty(), expected.is_empty(), "{paths:?}: {found}");
+            for part in expected {
+                assert!(found.contains(part), "{paths:?}: {found}");
+            }
+        }
     }
 }
