@@ -13,8 +13,8 @@ use anyhow::Context;
 use clap::Parser;
 use clap::error::ErrorKind;
 use edgepuck_dataset::{
-    Begin, DatasetConfig, DatasetError, Layout, Manifest, MeshEntry, MeshFailure, Plan, Progress,
-    check_layouts, discover, doubts, make, verify,
+    Begin, DatasetConfig, DatasetError, Layout, Manifest, MeshEntry, MeshFailure, PackedRecord,
+    Plan, Progress, check_layouts, discover, doubts, make, verify,
 };
 use edgepuck_shapes as shapes;
 use formats::hash::Hashing;
@@ -126,6 +126,11 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     };
     let out = args.out.clone().unwrap_or(default_out);
     let meshes = listed(&meshes_folder, config.seed)?;
+    let absolute = |folder: &Path| folder.canonicalize().ok();
+    if absolute(&out).is_some_and(|out| absolute(&meshes_folder) == Some(out)) {
+        let out = out.display();
+        return Err(usage(format!("--out: {out} is the folder of the meshes: name another")));
+    }
     let caster = args.caster.caster()?;
     let plan = Plan {
         part: args.shard.map(|shard| (shard.number, shard.of)),
@@ -144,7 +149,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     };
     made.or_else(|error| match error.downcast_ref() {
         Some(DatasetError::Interrupted { .. }) => {
-            eprintln!("{}: {error}; --resume continues it", out.display());
+            eprintln!("{}: {error}", out.display());
             Ok(Outcome::Interrupted)
         }
         _ => Err(error),
@@ -202,8 +207,8 @@ pub(crate) fn end(out: &Path, manifest: &Manifest) -> anyhow::Result<Outcome> {
         Some(picture) => eprintln!("Open this picture to see an example: {}", picture.display()),
         None => eprintln!("No scan holds a point, so no example picture was drawn."),
     }
-    let all_have_points = report_empty_sets(manifest);
-    Ok(match manifest.failures.is_empty() && all_have_points {
+    let all_have_clouds = report_empty_sets(manifest) && report_empty_packed(manifest);
+    Ok(match manifest.failures.is_empty() && all_have_clouds {
         true => Outcome::Success,
         false => Outcome::SomeRefused,
     })
@@ -238,6 +243,21 @@ fn report_empty_sets(manifest: &Manifest) -> bool {
         );
     }
     all_have_points
+}
+
+/// Prints the packed files from which all clouds are left out. Returns whether there is none.
+fn report_empty_packed(manifest: &Manifest) -> bool {
+    let is_empty = |packed: &&PackedRecord| packed.clouds == 0 && !packed.left_out.is_empty();
+    let empty: Vec<_> = manifest.packed.iter().filter(is_empty).collect();
+    for PackedRecord { file, left_out, .. } in &empty {
+        let most = left_out.iter().map(|scan| scan.points).max().unwrap_or_default();
+        eprintln!(
+            "{file} holds no cloud: expected scans of {} points, found {most} at most. --min-points, \
+             --distance and --sensor change this.",
+            manifest.config.min_points
+        );
+    }
+    empty.is_empty()
 }
 
 /// Verifies the dataset in `folder` and prints its problems, one a line.

@@ -26,7 +26,11 @@ pub fn print(out: &Path, manifest: &Manifest, progress: &Progress, total: Durati
         eprintln!("simplified: {after} triangles cast at for {before} in the files");
     }
     for packed in &manifest.packed {
-        eprintln!("{}: {} clouds, {} left out", packed.file, packed.clouds, packed.left_out.len());
+        let left_out = match packed.left_out.len() {
+            0 => "0 left out".to_owned(),
+            n => format!("{n} left out for fewer than {} points", manifest.config.min_points),
+        };
+        eprintln!("{}: {} clouds, {left_out}", packed.file, packed.clouds);
     }
     if !manifest.failures.is_empty() {
         eprintln!("Meshes that failed are listed in {}", layout::failures(out).display());

@@ -34,7 +34,7 @@ pub enum DatasetError {
         path: PathBuf,
     },
     /// The run was stopped.
-    #[error("stopped after {done} of {of} {what}; continue with --resume")]
+    #[error("stopped after {done} of {of} {what}; --resume continues")]
     Interrupted {
         /// The number that is done.
         done: usize,

@@ -77,10 +77,8 @@ pub(crate) fn prepare<'a>(run: &Run<'a>, entry: &MeshEntry) -> Result<Prepared<'
     let builder = Builder::for_rays(surface.len(), views.iter().map(rays_of).sum());
     let target = progress.time(Stage::Build, || Target::new(surface, builder));
     let scene = view::scene(config, target, centre, materials);
-    if config.normalize == Normalize::None {
-        let sensors_m: Vec<DVec3> = views.iter().map(|view| view.pose().position_m).collect();
-        doubts(&record.source, &scene, &sensors_m).for_each(|doubt| progress.note(doubt));
-    }
+    let sensors_m: Vec<DVec3> = views.iter().map(|view| view.pose().position_m).collect();
+    doubts(&record.source, config, &scene, &sensors_m).for_each(|doubt| progress.note(doubt));
     let placed = view::placed(&scene);
     let jobs: Vec<CastJob> =
         progress.time(Stage::Aim, || views.iter().map(|view| view.aim(&placed)).collect());
@@ -94,16 +92,19 @@ pub(crate) fn prepare<'a>(run: &Run<'a>, entry: &MeshEntry) -> Result<Prepared<'
 /// What is probably wrong with the unit of a mesh or with the place of a sensor.
 pub(crate) fn doubts(
     source: &str,
+    config: &DatasetConfig,
     scene: &Scene,
     sensors_m: &[DVec3],
 ) -> impl Iterator<Item = String> {
     let mesh = scene.instances().first().map(|instance| &instance.mesh);
+    let is_scaled = config.normalize != Normalize::None;
     let size = mesh
+        .filter(|_| !is_scaled)
         .and_then(Mesh::doubtful_size)
         .map(|doubt| format!("{doubt}; --units names another unit"));
     let inside = mesh.is_some_and(|mesh| mesh.surrounds(sensors_m)).then(|| {
-        "a sensor stands inside its bounding box: expected a larger --distance, or another of --units"
-            .to_owned()
+        let units = if is_scaled { "" } else { ", or another of --units" };
+        format!("a sensor stands inside its bounding box: expected a larger --distance{units}")
     });
     size.into_iter().chain(inside).map(move |doubt| format!("{source}: {doubt}"))
 }

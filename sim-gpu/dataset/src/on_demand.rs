@@ -13,7 +13,6 @@ use rayon::prelude::*;
 use sim_gpu::internals::bvh::Builder;
 use sim_gpu::internals::config::InvalidValue;
 use sim_gpu::internals::job::{CastJob, Culling};
-use sim_gpu::internals::mesh::frame::Normalize;
 use sim_gpu::internals::mesh::tree::MeshEntry;
 use sim_gpu::internals::scan::ObjectHits;
 use sim_gpu::internals::sensor::BeamPattern;
@@ -300,11 +299,9 @@ impl Clouds {
         let target = Target::new(Surface::new(mesh, kept), Builder::Sah);
         let centre = DVec3::from_array(record.views_around);
         let scene = view::scene(config, target, centre, materials);
-        if config.normalize == Normalize::None {
-            let poses = config.sets[0].poses(config.seed, &record.entry.id(), centre);
-            let sensors_m: Vec<DVec3> = poses.iter().map(|pose| pose.position_m).collect();
-            told.extend(doubts(&record.source, &scene, &sensors_m));
-        }
+        let poses = config.sets[0].poses(config.seed, &record.entry.id(), centre);
+        let sensors_m: Vec<DVec3> = poses.iter().map(|pose| pose.position_m).collect();
+        told.extend(doubts(&record.source, config, &scene, &sensors_m));
         let (known, new) = &mut *self.warnings.lock().unwrap_or_else(PoisonError::into_inner);
         new.extend(told.into_iter().filter(|warning| known.insert(warning.clone())));
         let ready = Arc::new(Ready { entry: record.entry, centre, scene });

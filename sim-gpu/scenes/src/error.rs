@@ -27,6 +27,9 @@ pub enum SceneError {
         /// The files or the error that were found instead.
         cause: String,
     },
+    /// The recipe uses no folder of meshes, but one was named.
+    #[error("{}: no object of this recipe is of kind \"mesh\": add one to a recipe of your own, or name no meshes", .0.display())]
+    UnusedMeshes(PathBuf),
     /// The sweep cannot be segmented.
     #[error("the sweep cannot be segmented: {0}")]
     Segment(String),

@@ -59,6 +59,11 @@ impl Stage {
         seed: u64,
         caster: &Caster,
     ) -> Result<Self, SceneError> {
+        if let Some(folder) = meshes
+            && recipe.object.iter().all(|objects| objects.built_in().is_some())
+        {
+            return Err(SceneError::UnusedMeshes(folder.to_path_buf()));
+        }
         let profiles = recipe.sensors(file)?;
         let mut sensors = Vec::with_capacity(profiles.len());
         for (choice, profile) in recipe.sensor.iter().zip(profiles) {
