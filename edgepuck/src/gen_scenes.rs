@@ -106,6 +106,9 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     for ((class, train), test) in stage.classes().iter().zip(&counts.train).zip(&counts.test) {
         println!("{class:<16} {train:>9} {test:>9}");
     }
+    if counts.test.iter().all(|n| *n == 0) {
+        eprintln!("warning: no cluster is in the test part, which has every tenth of --sweeps");
+    }
     eprintln!(
         "Clusters: {}. Picture: {}.",
         packed.display(),

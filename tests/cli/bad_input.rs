@@ -60,6 +60,18 @@ fn a_mesh_of_zero_area_is_scanned_to_nothing() {
 }
 
 #[test]
+fn a_dataset_without_clouds_and_a_sensor_inside_a_mesh_are_told() {
+    let folder = Folder::with_meshes();
+    let words = "gen-dataset meshes --adapter cpu --sensor vlp16 --points 64 --views 1";
+    let said = folder.exits(3, &format!("{words} --out a --min-points 100000"));
+    let cause = "-train.npz holds no cloud: expected scans of 100000 points, found";
+    assert_eq!(said.matches(cause).count(), 2, "{said}");
+    let said = folder.succeeds(&format!("{words} --out b --distance 0.5"));
+    let cause = "a sensor stands inside its bounding box: expected a larger --distance\n";
+    assert!(said.contains(cause), "{said}");
+}
+
+#[test]
 fn commands_that_cannot_be_are_usage_errors() {
     let folder = Folder::with_meshes();
     folder.refuses(
@@ -85,6 +97,7 @@ fn commands_that_cannot_be_are_usage_errors() {
             ("gen-dataset meshes --returns dual", "add --format pcap"),
             ("gen-dataset meshes --returns both", "strongest, last, dual"),
             ("gen-dataset meshes --sensor kinect-v2 --quantise", "kinect-v2"),
+            ("gen-dataset meshes --out meshes", "--out: meshes is the folder of the meshes"),
             ("no-such-command", "no-such-command"),
         ],
     );
@@ -113,6 +126,11 @@ fn what_is_not_there_is_named() {
             ("scan bad.toml --out x.npz", "bad.toml"),
             ("scan bad.toml --out x.las", "x.las"),
             ("preview nowhere.npz", "nowhere.npz"),
+            ("gen-scenes --meshes nosuch --out x", "nosuch: no object of this recipe is of kind"),
+            (
+                "gen-drive --meshes nosuch --out x.pcap",
+                "nosuch: no object of this recipe is of kind",
+            ),
             ("preview bad.npz", "bad.npz"),
         ],
     );

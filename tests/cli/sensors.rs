@@ -73,7 +73,9 @@ fn an_ouster_s_own_metadata_are_a_profile() {
     let first = beams.lines().nth(1).unwrap();
     assert!(first.starts_with("0,1,-3") || first.starts_with("0,1,-2.99999"), "{first}");
     assert!(first.contains(",0.0158,"), "{first}");
-    folder.succeeds("gen-dataset meshes --out out --adapter cpu --sensor unit.json --views 1");
+    folder.succeeds(
+        "gen-dataset meshes --out out --adapter cpu --sensor unit.json --views 1 --min-points 16",
+    );
     folder.succeeds("gen-dataset --verify out");
 }
 

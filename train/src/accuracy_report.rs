@@ -7,15 +7,20 @@ use infer_cpu::Evaluation;
 
 use crate::svg::{self, text};
 
-/// The accuracies and their intervals in one line.
+/// The accuracies and their intervals in one line, for data with `n_classes` classes.
 #[must_use]
-pub fn summary(found: &Evaluation, data: &Path) -> String {
+pub fn summary(found: &Evaluation, n_classes: usize, data: &Path) -> String {
     let (n, correct) = (found.total(), found.correct());
     let (low, high) = wilson(correct, n);
     let name = data.file_name().unwrap_or(data.as_os_str()).to_string_lossy();
     let (class_mean, half_width) = found.class_accuracy();
+    let n_found = found.confusion.iter().filter(|answers| answers.iter().any(|n| *n > 0)).count();
+    let classes = match n_found < n_classes {
+        true => format!("{n_found} of {n_classes} classes"),
+        false => "classes".to_owned(),
+    };
     format!(
-        "{correct} of {n} ({:.2} %, 95 % interval {:.2} to {:.2} %), mean over classes {:.2} % \
+        "{correct} of {n} ({:.2} %, 95 % interval {:.2} to {:.2} %), mean over {classes} {:.2} % \
          (± {:.2}), on {name}",
         100.0 * found.instance_accuracy(),
         100.0 * low,
@@ -72,6 +77,17 @@ pub fn drawing(found: &Evaluation, classes: &[String]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_mean_over_some_of_the_classes_says_so() {
+        let found = Evaluation { confusion: vec![vec![3, 1], vec![0, 0]] };
+        for (n_classes, expected) in
+            [(2, "mean over 1 of 2 classes 75.00 %"), (1, "mean over classes 75.00 %")]
+        {
+            let line = summary(&found, n_classes, Path::new("d/test.npz"));
+            assert!(line.contains(expected) && line.ends_with("on test.npz"), "{line}");
+        }
+    }
 
     #[test]
     fn a_matrix_has_a_row_for_each_true_class() {

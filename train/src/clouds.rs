@@ -29,6 +29,19 @@ fn packed(path: &Path, split: Split) -> Option<PathBuf> {
     candidates.into_iter().find(|path| path.is_file())
 }
 
+/// The beginnings of the names of packed files of `split` in the folder `path`, or in that of a
+/// dataset's packed files.
+fn prefixes(path: &Path, split: Split) -> Vec<String> {
+    let ending = format!("-{split}.npz");
+    let folders = [path.to_path_buf(), path.join("packed")];
+    let files = folders.iter().filter_map(|folder| folder.read_dir().ok()).flatten().flatten();
+    let files = files.map(|file| file.path().to_string_lossy().into_owned());
+    let mut names: Vec<String> =
+        files.filter_map(|file| file.strip_suffix(&ending).map(str::to_owned)).collect();
+    names.sort();
+    names
+}
+
 #[cfg(feature = "hdf5")]
 fn read_hdf5(path: &Path, split: Split) -> Result<LabelledSet, Error> {
     Ok(formats::modelnet_h5::read(path, split)?)
@@ -80,12 +93,21 @@ impl Clouds {
         } else if yanx27::is_layout_of(path) {
             yanx27::read(path, split, most_points)?
         } else {
+            let names = prefixes(path, split).join(", ");
+            let found = if names.is_empty() { names } else { format!("; found {names}: name one") };
             let cause = format!(
                 "expected a packed NPZ file, a folder or a start of a name with {split}.npz, or a \
-                 folder with {split}_files.txt or modelnet40_shape_names.txt"
+                 folder with {split}_files.txt or modelnet40_shape_names.txt{found}"
             );
             return Err(Error::Data { path: path.to_path_buf(), cause });
         };
+        if set.is_empty() {
+            let cause = format!(
+                "expected clouds, found none: its {split} part is empty; more meshes or sweeps, or \
+                 fewer --min-points, fill it"
+            );
+            return Err(Error::Data { path: path.to_path_buf(), cause });
+        }
         let mut clouds = Self::checked(set, path)?;
         if !normalization.is_metric() {
             clouds.normalize();

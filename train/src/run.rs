@@ -90,8 +90,11 @@ impl Job<'_> {
         let held = negatives::added(held, recipe, "held", 0);
         if batches::count(clouds.len(), recipe) == 0 {
             let n = clouds.len();
-            let cause =
-                format!("expected a batch of {} clouds to learn from, found {n}", recipe.batch);
+            let batch = recipe.batch;
+            let cause = format!(
+                "expected a batch of {batch} clouds to learn from, found {n}: set a smaller `batch` \
+                 in the recipe"
+            );
             return Err(Error::Data { path: data.into(), cause });
         }
         let folder = out.with_extension("run");
@@ -111,7 +114,10 @@ fn check(clouds: &Clouds, recipe: &Recipe, data: &str) -> Result<(), Error> {
     // A cluster in metres may have any number of points.
     if !recipe.normalization.is_metric() && n_points < recipe.points {
         let wanted = recipe.points;
-        return refuse(format!("expected clouds of {wanted} points or more, found {n_points}"));
+        return refuse(format!(
+            "expected clouds of {wanted} points or more, found {n_points}: give --points, or a \
+             recipe for clusters, such as --recipe street-128"
+        ));
     }
     if clouds.classes.len() < 2 {
         return refuse("expected two classes or more, found one".to_owned());
@@ -119,7 +125,10 @@ fn check(clouds: &Clouds, recipe: &Recipe, data: &str) -> Result<(), Error> {
     let missing = (0..clouds.classes.len()).find(|class| !clouds.set.labels.contains(class));
     if let Some(class) = missing {
         let name = &clouds.classes[class];
-        return refuse(format!("expected clouds of every class, found none of {class} ({name})"));
+        return refuse(format!(
+            "expected clouds of every class, found none of {name}: make the data with a mesh of it \
+             in the train split, or with fewer --min-points"
+        ));
     }
     if recipe.negatives > 0.0 && clouds.classes.iter().any(|name| name == UNKNOWN) {
         return refuse(format!("expected no class `{UNKNOWN}` beside the recipe's negatives"));
@@ -301,11 +310,16 @@ impl<'a> Run<'a> {
         let recipe = &self.trainer.recipe;
         let most_points = points_to_read(recipe);
         let mut clouds = Clouds::read_for(recipe.normalization, test, Split::Test, most_points)?;
+        let n_classes = clouds.classes.len();
         clouds.classes = recipe.classes(&clouds.classes);
         if clouds.classes != self.classes {
             let cause = format!("expected the classes of {data}, found {:?}", clouds.classes);
             return Err(Error::Data { path: test.to_path_buf(), cause });
         }
-        Ok(accuracy_report::summary(&confusion(model, &clouds, &Options::default())?, test))
+        Ok(accuracy_report::summary(
+            &confusion(model, &clouds, &Options::default())?,
+            n_classes,
+            test,
+        ))
     }
 }

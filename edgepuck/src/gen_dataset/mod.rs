@@ -207,8 +207,8 @@ pub(crate) fn end(out: &Path, manifest: &Manifest) -> anyhow::Result<Outcome> {
         Some(picture) => eprintln!("Open this picture to see an example: {}", picture.display()),
         None => eprintln!("No scan holds a point, so no example picture was drawn."),
     }
-    let all_have_clouds = report_empty_sets(manifest) && report_empty_packed(manifest);
-    Ok(match manifest.failures.is_empty() && all_have_clouds {
+    let has_clouds = report_empty_sets(manifest) && report_empty_packed(manifest);
+    Ok(match manifest.failures.is_empty() && has_clouds {
         true => Outcome::Success,
         false => Outcome::SomeRefused,
     })
@@ -245,7 +245,7 @@ fn report_empty_sets(manifest: &Manifest) -> bool {
     all_have_points
 }
 
-/// Prints the packed files from which all clouds are left out. Returns whether there is none.
+/// Prints the packed files from which all clouds are left out. Returns whether any file has clouds.
 fn report_empty_packed(manifest: &Manifest) -> bool {
     let is_empty = |packed: &&PackedRecord| packed.clouds == 0 && !packed.left_out.is_empty();
     let empty: Vec<_> = manifest.packed.iter().filter(is_empty).collect();
@@ -257,7 +257,7 @@ fn report_empty_packed(manifest: &Manifest) -> bool {
             manifest.config.min_points
         );
     }
-    empty.is_empty()
+    empty.is_empty() || manifest.packed.iter().any(|packed| packed.clouds > 0)
 }
 
 /// Verifies the dataset in `folder` and prints its problems, one a line.

@@ -59,7 +59,10 @@ pub(super) fn read_points(
         }
         [n, columns] if columns >= 3 => (n, columns),
         [m, n, 3] => {
-            return Err(invalid(format!("expected shape [n, 3], found {m} clouds of {n} points")));
+            return Err(invalid(format!(
+                "expected shape [n, 3], found {m} clouds of {n} points: `edgepuck eval` classifies \
+                 packed sets"
+            )));
         }
         _ => return Err(invalid(format!("expected shape [n, 3], found {:?}", header.shape))),
     };

@@ -94,18 +94,30 @@ fn what_cannot_be_learnt_from_is_an_error_that_names_it() {
     npz("missing.npz", &of_one, &CLASSES);
     npz("one.npz", &of_one, &CLASSES[..1]);
     npz("few.npz", &clouds(9), &CLASSES);
+    npz("empty.npz", &[], &CLASSES);
+    std::fs::create_dir_all(folder.path().join("set/packed")).unwrap();
+    npz("set/packed/a-train.npz", &clouds(9), &CLASSES);
+    npz("set/packed/b-train.npz", &clouds(9), &CLASSES);
     std::fs::write(folder.path().join("bad.toml"), "epoch = 3").unwrap();
     std::fs::write(folder.path().join("zero.toml"), "epochs = 0").unwrap();
     for (words, expected) in [
         ("--data nan.npz", "point 1 of cloud 7 (disc_0007) is not finite"),
         (
             "--data missing.npz",
-            "missing.npz: expected clouds of every class, found none of 1 (disc)",
+            "missing.npz: expected clouds of every class, found none of disc: make",
         ),
         ("--data one.npz", "one.npz: expected two classes or more, found one"),
-        ("--data few.npz", "few.npz: expected a batch of 10 clouds to learn from, found 9"),
+        (
+            "--data few.npz",
+            "few.npz: expected a batch of 10 clouds to learn from, found 9: set a smaller `batch`",
+        ),
+        ("--data empty.npz", "empty.npz: expected clouds, found none: its train part is empty"),
+        ("--data set", "modelnet40_shape_names.txt; found set/packed/a, set/packed/b: name one"),
         ("--data nowhere", "nowhere: expected a packed NPZ"),
-        ("--data . --points 33", ".: expected clouds of 33 points or more, found 32"),
+        (
+            "--data . --points 33",
+            ".: expected clouds of 33 points or more, found 32: give --points",
+        ),
         ("--data . --recipe bad.toml", "unknown field `epoch`"),
         ("--data . --recipe zero.toml", "`epochs`: expected 1 or more"),
         ("--data . --keep 9", "--front and --keep need --arch cpl"),

@@ -102,6 +102,7 @@ fn report_clouds(
 ) -> anyhow::Result<()> {
     // The data have no clouds of the model's further classes, such as `unknown`.
     let mut clouds = clouds.clone();
+    let n_classes = clouds.classes.len();
     if names.starts_with(&clouds.classes) {
         clouds.classes = names.to_vec();
     }
@@ -113,7 +114,7 @@ fn report_clouds(
             "warning: class {class} is called `{model}` by the model and `{data}` by the data"
         );
     }
-    super::print(&accuracy_report::summary(&found, data))?;
+    super::print(&accuracy_report::summary(&found, n_classes, data))?;
     if let Some(path) = &args.csv {
         atomic::write_bytes(path, accuracy_report::to_csv(&found, names))?;
     }
