@@ -118,3 +118,42 @@ fn a_sensor_below_the_ground_is_no_error() {
     let sweep = Sweep { points: &scan.points, rings: None };
     assert_eq!(segmenter.segment(&sweep).unwrap().labels().len(), scan.points.len());
 }
+
+/// Unseen, the ground climbs by a kerb of 0.12 m and a slope of 8 degrees over at most 4 m: 0.68 m.
+#[test]
+fn what_begins_behind_a_shadow_is_ground_up_to_the_height_that_a_street_can_climb_unseen() {
+    for (shadow_m, height_m, is_street) in [
+        (6.0, 0.2, true),
+        (6.0, 0.6, true),
+        (6.0, 0.8, false),
+        (8.0, 1.2, false),
+        (10.0, 1.4, false),
+    ] {
+        let street = ground(0.0, 0.0, |x, _| x < 8.0);
+        let is_behind = move |x: f64, y: f64| (8.0 + shadow_m..40.0).contains(&x) && y.abs() < 6.0;
+        let scan = scan(&VLP32C, &[street, ground(0.0, height_m, is_behind)]);
+        scan.check(|segmentation| {
+            assert_eq!(scan.share(segmentation, 0, is_ground), 1.0);
+            let share = scan.share(segmentation, 1, is_ground);
+            assert_eq!(share, f64::from(u8::from(is_street)), "{height_m} m after {shadow_m} m");
+        });
+    }
+}
+
+/// Everywhere on a slope across the road, beside a kerb and in the shadow of a car.
+#[test]
+fn the_height_of_the_ground_is_known_between_the_beams() {
+    let slope = 5f64.to_radians().tan();
+    let car = block([14.0, 2.0], [4.2, 1.8], 12.0 * slope, 1.5 + 4.0 * slope);
+    let scan = scan(&VLP32C, &[ground(slope, 0.0, |_, _| true), car]);
+    scan.check(|segmentation| {
+        for i in 0..400 {
+            let (range_m, azimuth) = (4.0 + 0.06 * f64::from(i), f64::from(i) * 0.7);
+            let [x, y] = [range_m * azimuth.cos(), range_m * azimuth.sin()];
+            let z_m = f64::from(segmentation.ground_z_m(x as f32, y as f32).unwrap());
+            // A sector of two degrees is up to 1 m wide, and its mean stands for all of it.
+            let bound = 0.02 + slope * range_m * 1f64.to_radians();
+            assert!((z_m + HEIGHT - slope * x).abs() < bound, "{x} {y}: {z_m}");
+        }
+    });
+}
