@@ -424,7 +424,9 @@ const ASKED: [(&str, Ask); 11] = [
         let min_m = [-2.0, -4.0, -2.0];
         let dust = Volume { min_m, max_m: [6.0, 0.5, 2.0], visibility_m: 100.0 };
         let (rain_mm_h, haze_visibility_m) = (Some(80.0), Some(3000.0));
-        let volumes = vec![dust];
+        // Spray behind the dust, so that a beam has several echoes of the air.
+        let spray = Volume { min_m: [6.5, -4.0, -2.0], max_m: [7.5, 0.5, 2.0], visibility_m: 20.0 };
+        let volumes = vec![dust, spray];
         let weather = Weather { rain_mm_h, haze_visibility_m, volumes, ..Weather::default() };
         e.weather = Some(Box::new(weather));
     }),

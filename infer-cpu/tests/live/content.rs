@@ -3,11 +3,12 @@
 
 use super::street::{PACKET, PACKET_S, PACKETS_PER_S, Thing, packets, street};
 use super::{START_S, on_time, run};
+use edgepuck_ros_messages::{self as ros, Message};
 use edgepuck_segment::{OrientedBox, Settings, Stream};
 use formats::returns::Return;
 use formats::velodyne;
 use glam::{DQuat, DVec3, Vec3};
-use infer_cpu::live::{Arrival, EgoMotion, LiveOptions, Object, Pipeline, Pose};
+use infer_cpu::live::{Arrival, EgoMotion, LiveOptions, Object, Pipeline, Pose, Recorder};
 use infer_cpu::{Classifier, Options, Prediction};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -341,4 +342,102 @@ fn the_last_and_the_strongest_return_of_a_pair_of_blocks_are_not_swapped() {
         .unwrap();
     let expected = [("Last 10 m, 5", 192), ("Strongest 4 m, 90", 192)];
     assert_eq!(seen, expected.map(|(text, n)| (text.to_owned(), n)).into());
+}
+
+/// The messages of one topic of a recording: the time of each, nanoseconds, and its bytes.
+fn messages(recording: &[u8], topic: &str) -> Vec<(u64, Vec<u8>)> {
+    let all = mcap::MessageStream::new(recording).unwrap().map(Result::unwrap);
+    let own = all.filter(|message| message.channel.topic == topic);
+    own.map(|message| (message.log_time, message.data.to_vec())).collect()
+}
+
+fn numbers<const N: usize>(bytes: &[u8]) -> [f64; N] {
+    std::array::from_fn(|i| f64::from_le_bytes(bytes[8 * i..][..8].try_into().unwrap()))
+}
+
+/// Nanoseconds of Unix time, which f64 holds within 240.
+fn assert_time(found_ns: u64, expected_s: f64) {
+    let off_ns = found_ns.abs_diff((expected_s * 1e9) as u64);
+    assert!(off_ns <= 1000, "{found_ns} ns, not {expected_s} s");
+}
+
+#[test]
+fn a_recording_has_the_points_the_pose_and_the_objects_of_each_turn() {
+    let sent = packets(&street(), 5_000, PACKETS_PER_S);
+    let mut options = LiveOptions::default();
+    let poses = [-1.0, 3.0].map(|after_s| (START_S + after_s, driven(after_s)));
+    options.ego_motion = Some(EgoMotion::Poses(poses.to_vec()));
+    let mut pipeline = Pipeline::new(classifier(&street_model()), &options).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("run.mcap");
+    let mut recorder = Recorder::create(&file).unwrap();
+    // By the number of the turn in which a packet or an answer comes.
+    let (mut returns, mut objects) = (BTreeMap::new(), BTreeMap::new());
+    let mut before = 0;
+    for (since_s, packet) in on_time(&sent) {
+        pipeline.take(packet, Arrival { time_s: START_S + since_s, moment: None });
+        // What a packet completes comes before the packet itself.
+        pipeline.answer(|object| {
+            recorder.object(object);
+            objects.entry(before).or_insert_with(Vec::new).push(object.clone());
+        });
+        recorder.packet(&pipeline).unwrap();
+        let decoded = pipeline.decoded().unwrap();
+        let timed = decoded.returns.iter().map(|it| (decoded.time_s + it.after_us * 1e-6, *it));
+        before = decoded.turn;
+        returns.entry(before).or_insert_with(Vec::new).extend(timed);
+    }
+    recorder.finish(&pipeline).unwrap();
+    let recording = std::fs::read(&file).unwrap();
+
+    let (clouds, moved) = (messages(&recording, "/points"), messages(&recording, "/tf"));
+    assert_eq!((clouds.len(), moved.len()), (returns.len(), returns.len()));
+    for ((returns, (at_ns, cloud)), (_, tf)) in returns.values().zip(&clouds).zip(&moved) {
+        let (first_s, last_s) = (returns[0].0, returns.last().unwrap().0);
+        assert_time(*at_ns, last_s);
+        // 22 bytes a point: x, y, z, intensity, ring, time; then that all are finite.
+        let data = &cloud[cloud.len() - 1 - 22 * returns.len()..cloud.len() - 1];
+        for (bytes, (time_s, found)) in data.chunks(22).zip(returns) {
+            let [x, y, z] = found.point_m;
+            let since_s = (time_s - first_s) as f32;
+            let numbers = [x, y, z, found.reflectivity.into()].map(f32::to_le_bytes);
+            let ring = found.ring.to_le_bytes();
+            assert_eq!(bytes, [&numbers.concat()[..], &ring, &since_s.to_le_bytes()].concat());
+        }
+        let [x, y, z, rotation @ ..] = numbers::<7>(&tf[tf.len() - 56..]);
+        let expected = driven(last_s - START_S);
+        assert!(DVec3::new(x, y, z).distance(expected.position_m) < 1e-4);
+        let turned = DQuat::from_array(rotation) * DVec3::X;
+        assert!(turned.distance(expected.world_from_sensor * DVec3::X) < 1e-4);
+    }
+
+    let recorded = messages(&recording, "/objects");
+    assert_eq!(recorded.len(), returns.len());
+    let mut n_objects = 0;
+    for (turn, (at_ns, bytes)) in returns.keys().zip(&recorded) {
+        let own: &[Object] = objects.get(turn).map_or(&[], Vec::as_slice);
+        let mut expected = ros::detections(&own.iter().map(message_of).collect::<Vec<_>>());
+        let last_s = own.iter().map(|object| object.last_s).reduce(f64::max);
+        let last_s = last_s.unwrap_or(returns[turn].last().unwrap().0);
+        expected.header =
+            ros::Header { stamp: ros::Time::from_s(last_s), frame_id: "world".to_owned() };
+        assert_time(*at_ns, last_s);
+        assert_eq!(*bytes, expected.to_cdr(), "turn {turn}");
+        n_objects += own.len();
+    }
+    assert!(n_objects > 20, "{n_objects}");
+}
+
+fn message_of(object: &Object) -> ros::Object {
+    ros::Object {
+        turn: object.turn,
+        track: object.track,
+        class: object.class.as_deref().map(str::to_owned),
+        probability: object.probability,
+        frame: "world".to_owned(),
+        position_m: object.position_m,
+        size_m: object.size_m,
+        yaw_deg: object.yaw_deg,
+        last_s: object.last_s,
+    }
 }
