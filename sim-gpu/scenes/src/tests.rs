@@ -287,6 +287,87 @@ fn points_on_moving_objects_lie_in_their_boxes() {
     assert!(n_moving > 200, "{n_moving} points on moving objects");
 }
 
+/// A flat world without objects, so that the range of a beam is what it is in all scenes.
+fn flat(noise_m: f64) -> String {
+    let object = RECIPE.find("object = [").unwrap();
+    let sensor = RECIPE[..object].replace("tilt_deg = [1, 1]", "tilt_deg = [0, 0]");
+    let sensor = sensor.replace("off_road_m = [0, 3]", "off_road_m = [0, 0]");
+    let sensor = sensor.replace("vlp16", "vlp32c");
+    let pole = "kind = \"pole\", class = \"pole\", count = [0, 0], place = \"anywhere\"";
+    format!(
+        "{}object = [{{ {pole}, distance_m = [3, 15] }}]\n\
+         ground = {{ slope_deg = [0, 0], roughness_m = [0, 0], kerb_m = [0, 0] }}",
+        sensor.replace("noise_m = 0", &format!("noise_m = {noise_m}")),
+    )
+}
+
+/// How far each range is off, by beam.
+fn errors(noisy: &Scan, clean: &Scan) -> BTreeMap<u32, f64> {
+    let ranges = |scan: &Scan| -> BTreeMap<u32, f64> {
+        let ranges = scan.range_m.as_ref().unwrap().iter().map(|&range_m| range_m.into());
+        scan.beam.as_ref().unwrap().iter().copied().zip(ranges).collect()
+    };
+    let clean = ranges(clean);
+    ranges(noisy).into_iter().map(|(beam, range_m)| (beam, range_m - clean[&beam])).collect()
+}
+
+/// That the numbers of no two of these, by key, correlate: by five standard errors, 1 / sqrt(n).
+fn assert_independent(all: &[BTreeMap<u32, f64>]) {
+    for (i, one) in all.iter().enumerate() {
+        for (j, other) in all.iter().enumerate().skip(i + 1) {
+            let both: Vec<[f64; 2]> =
+                one.iter().filter_map(|(key, a)| Some([*a, *other.get(key)?])).collect();
+            let sum = |of: fn(&[f64; 2]) -> f64| both.iter().map(of).sum::<f64>();
+            let correlation =
+                sum(|[a, b]| a * b) / (sum(|[a, _]| a * a) * sum(|[_, b]| b * b)).sqrt();
+            assert!(both.len() > 1000, "{}", both.len());
+            let bound = 5.0 / (both.len() as f64).sqrt();
+            assert!(correlation.abs() < bound, "{i} and {j}: {correlation}, not below {bound}");
+        }
+    }
+}
+
+#[test]
+fn scenes_and_packets_of_other_numbers_and_seeds_have_other_noise() {
+    let stage = |noise_m, seed| {
+        let file = Path::new("test.toml");
+        Stage::new(Recipe::parse(&flat(noise_m), file).unwrap(), file, None, seed).unwrap()
+    };
+    let sweep = |noise_m, seed, number| {
+        let stage = stage(noise_m, seed);
+        stage.sweep(&DrawnScene::draw(&stage, number)).unwrap().scan
+    };
+    let of = |(seed, number)| errors(&sweep(0.02, seed, number), &sweep(0.0, seed, number));
+    assert_independent(&[(5, 0), (5, 1), (5, 2), (6, 0), (6, 1)].map(of));
+
+    // All beams of packets 0 to 59, of packets 60 to 119, and of packets of another seed.
+    let packets = |noise_m, seed| {
+        let stage = stage(noise_m, seed);
+        Drive::new(&stage, 0.0).unwrap().fire(0..120).unwrap()
+    };
+    let of = |seed| {
+        let (noisy, clean) = (packets(0.02, seed), packets(0.0, seed));
+        let errors: Vec<_> =
+            noisy.iter().zip(&clean).map(|(a, b)| errors(&a.scan, &b.scan)).collect();
+        [&errors[..60], &errors[60..]].map(|half| {
+            let numbered = half.iter().zip(0u32..);
+            let keyed = numbered.flat_map(|(errors, packet)| {
+                errors.iter().map(move |(beam, error)| (packet * 1000 + beam, *error))
+            });
+            keyed.collect::<BTreeMap<u32, f64>>()
+        })
+    };
+    let [a, b] = of(5);
+    let [c, d] = of(6);
+    // Neighbouring packets: those of even and of odd numbers.
+    let [even, odd] = [0, 1].map(|odd| {
+        let own = a.iter().filter(|(key, _)| **key / 1000 % 2 == odd);
+        own.map(|(key, error)| (key - odd * 1000, *error)).collect::<BTreeMap<u32, f64>>()
+    });
+    assert_independent(&[a, b, c, d]);
+    assert_independent(&[even, odd]);
+}
+
 #[test]
 fn sightings_count_every_point_once_in_its_revolution() {
     let stage = stage(&drive_recipe());
