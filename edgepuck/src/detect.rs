@@ -13,12 +13,13 @@ use plotters::style::RGBColor;
 use serde_json::{Value, json};
 use sim_gpu::glam;
 
-use crate::flags::{need_extension, probability};
-use crate::overwrite::Overwrite;
+use crate::flags::probability;
 use crate::points::SweepArgs;
 use crate::preview::panel::Outline;
 use crate::segment::tint;
 use crate::{Outcome, Usage, preview};
+use formats::outputs::Overwrite;
+use formats::outputs::need_extension;
 use kitti::{Camera, label};
 
 #[derive(clap::Args)]

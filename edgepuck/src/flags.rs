@@ -24,16 +24,6 @@ pub fn need_folder_of_meshes(meshes: Option<&Path>) -> Result<(), Usage> {
     }
 }
 
-/// Checks that the name of the file to write has one of the extensions `expected`.
-pub fn need_extension(flag: &str, file: &Path, expected: &[&str]) -> Result<(), Usage> {
-    let found = file.extension().unwrap_or_default();
-    if expected.iter().any(|extension| found.eq_ignore_ascii_case(extension)) {
-        return Ok(());
-    }
-    let expected = expected.join(" or .");
-    Err(Usage(format!("{flag}: expected a name with .{expected}, found {}", file.display())))
-}
-
 /// The first of these flags that was given.
 pub fn first_given(flags: &[(bool, &'static str)]) -> Option<&'static str> {
     flags.iter().find(|(is_given, _)| *is_given).map(|(_, flag)| *flag)

@@ -8,9 +8,10 @@ use formats::vlp32c::{Capture, SEQUENCE_US, SEQUENCES_PER_PACKET, START_S};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::Outcome;
-use crate::flags::{need_extension, number};
+use crate::flags::number;
 use crate::gen_scenes::read_recipe;
-use crate::overwrite::Overwrite;
+use formats::outputs::Overwrite;
+use formats::outputs::need_extension;
 
 #[derive(clap::Args)]
 pub struct Args {

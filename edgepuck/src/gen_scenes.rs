@@ -15,8 +15,8 @@ use serde_json::{Value, json};
 use sweep_file::SweepFormat;
 
 use crate::caster::CasterArgs;
-use crate::overwrite::Overwrite;
 use crate::{Outcome, Usage, preview, segment};
+use formats::outputs::Overwrite;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {

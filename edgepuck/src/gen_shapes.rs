@@ -1,9 +1,9 @@
 //! `edgepuck gen-shapes`: writes procedural shapes as mesh files.
 
 use crate::Outcome;
-use crate::overwrite::Overwrite;
 use anyhow::Context;
 use edgepuck_shapes as shapes;
+use formats::outputs::Overwrite;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]

@@ -22,7 +22,6 @@ pub mod gen_shapes;
 #[cfg(feature = "models")]
 mod import_weights;
 mod merge_dataset;
-mod overwrite;
 pub mod points;
 mod preview;
 mod preview_scan;

@@ -1,9 +1,9 @@
 //! `edgepuck preview`: a picture of a scan.
 
-use crate::flags::need_extension;
-use crate::overwrite::Overwrite;
 use crate::points::PointsArgs;
 use crate::{Outcome, preview};
+use formats::outputs::Overwrite;
+use formats::outputs::need_extension;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]

@@ -1,7 +1,7 @@
 use crate::Outcome;
 use crate::gen_dataset::{listed, print_notes, report_failures};
-use crate::overwrite::Overwrite;
 use edgepuck_dataset::{Progress, SurfaceConfig, write_surfaces};
+use formats::outputs::Overwrite;
 use sim_gpu::internals::mesh::frame::{Normalize, Up};
 use sim_gpu::internals::sensor::Views;
 use std::path::PathBuf;

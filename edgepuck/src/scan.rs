@@ -2,11 +2,11 @@
 
 use crate::caster::CasterArgs;
 use crate::effect_flags::EffectFlags;
-use crate::overwrite::Overwrite;
 use crate::{Outcome, Usage, flags};
 use anyhow::{Context, ensure};
 use formats::atomic;
 use formats::hash::Hashing;
+use formats::outputs::Overwrite;
 use formats::scan::Attribute;
 use formats::scan_file::ScanFormat;
 use formats::vlp32c::{self, Returns};

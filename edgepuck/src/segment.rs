@@ -1,9 +1,9 @@
-use crate::overwrite::Overwrite;
 use crate::points::SweepArgs;
 use crate::{Outcome, Usage, preview};
 use edgepuck_segment::{Label, Segmentation, Segmenter, Settings, Sweep};
 use formats::cloud_file::write_cloud;
 use formats::hash::Hashing;
+use formats::outputs::Overwrite;
 use formats::scan::Column;
 use formats::{FormatError, Scan, rows};
 use plotters::style::{Color, HSLColor, RGBColor};

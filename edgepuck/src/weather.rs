@@ -1,9 +1,9 @@
 use crate::brightness::BrightnessArgs;
-use crate::overwrite::Overwrite;
 use crate::points::SweepArgs;
 use crate::{Outcome, Usage};
 use formats::Scan;
 use formats::hash::Hashing;
+use formats::outputs::Overwrite;
 use formats::rng::StreamKey;
 use formats::scan_file::{ScanFormat, write_scan};
 use glam::DVec3;

@@ -68,6 +68,9 @@ pub mod modelnet_h5_list;
 #[cfg(feature = "cli")]
 pub mod outcome;
 #[doc(hidden)]
+#[cfg(feature = "cli")]
+pub mod outputs;
+#[doc(hidden)]
 #[cfg(feature = "ply")]
 pub mod ply;
 #[doc(hidden)]

@@ -6,9 +6,9 @@ mod plan;
 mod sweep;
 
 use crate::brightness::BrightnessArgs;
-use crate::overwrite::Overwrite;
 use crate::points::{PlaceArgs, SweepArgs};
 use crate::{Outcome, Usage};
+use formats::outputs::Overwrite;
 use plan::{Entry, Plan};
 use sim_gpu::Sensor;
 use std::path::PathBuf;

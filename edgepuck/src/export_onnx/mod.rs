@@ -14,8 +14,8 @@ use formats::model_card::ModelCard;
 use infer_cpu::model_file;
 use prost::Message;
 
-use crate::overwrite::Overwrite;
 use crate::{Outcome, Usage};
+use formats::outputs::Overwrite;
 use graph::{Graph, Size};
 use pointnet::{Net, NetInputs};
 use proto::{ModelProto, OperatorSetIdProto, StringStringEntryProto, data_type};

@@ -6,13 +6,13 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use crate::Outcome;
-use crate::overwrite::Overwrite;
 use anyhow::Context;
 use card::CardArgs;
 use checkpoint::Checkpoint;
 use formats::FormatError;
 use formats::labelled::read_labelled;
 use formats::model_card::ModelCard;
+use formats::outputs::Overwrite;
 use formats::weights::{Tensor, tensor_part, write_weights};
 use infer_cpu::{Classifier, Options};
 use table::{Names, Table};

@@ -9,6 +9,7 @@ use crate::{Classifier, Options};
 use anyhow::Context;
 use formats::cloud_file::{CloudFormat, write_cloud};
 use formats::outcome::say;
+use formats::outputs::Overwrite;
 
 use super::input;
 use super::model::ModelArgs;
@@ -52,11 +53,15 @@ pub struct SampleArgs {
 
     /// File to write
     output: PathBuf,
+
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 pub fn run(args: &SampleArgs) -> anyhow::Result<Outcome> {
     // An unknown extension fails before a long computation.
     CloudFormat::of_path(&args.output)?;
+    args.overwrite.check([&*args.output])?;
     let mut points = input::read(&args.input, args.format)?;
     if args.drop_invalid {
         let n = points.len();

@@ -11,7 +11,8 @@ fn points_are_chosen_and_not_changed() {
     let cloud: Vec<_> = strip(100).iter().map(|p| [p[0] + 5.5e9, p[1], p[2]]).collect();
     write_cloud(&folder.path("in.npz"), &cloud).unwrap();
     for sampler in ["first", "random", "fps", "voxel"] {
-        let ran = folder.run(&format!("sample --sampler {sampler} --points 16 in.npz out.npz"));
+        let ran = folder
+            .run(&format!("sample --sampler {sampler} --points 16 in.npz out.npz --overwrite"));
         assert_eq!(ran.code, 0, "{}", ran.err);
         let chosen = read_cloud(&folder.path("out.npz")).unwrap();
         assert!(chosen.iter().all(|point| cloud.contains(point)), "{sampler}");
@@ -30,7 +31,7 @@ fn a_voxel_size_is_in_the_cloud_s_unit_wherever_it_lies() {
     };
     for offset in [0.0, 1e6, -1e6] {
         write_cloud(&folder.path("in.npy"), &along(offset)).unwrap();
-        let ran = folder.run("sample --sampler voxel --voxel-size 2.5 in.npy out.npy");
+        let ran = folder.run("sample --sampler voxel --voxel-size 2.5 in.npy out.npy --overwrite");
         // 12.375 long: five cells of 20 points.
         assert_eq!(ran.out, "out.npy: 5 of 100 points\n", "{offset}: {}", ran.err);
     }
@@ -45,7 +46,7 @@ fn critical_points_need_a_model_and_may_repeat() {
     assert!(ran.out.starts_with("out.xyz: 64 of 30 points ("), "{}{}", ran.out, ran.err);
     assert!(ran.out.ends_with(" distinct)\n"), "{}", ran.out);
     assert_eq!(read_cloud(&folder.path("out.xyz")).unwrap().len(), 64);
-    let ran = folder.run(&format!("{line} --resize truncate"));
+    let ran = folder.run(&format!("{line} --resize truncate --overwrite"));
     assert!(ran.out.ends_with(" of 30 points\n"), "{}", ran.out);
 }
 
@@ -54,7 +55,8 @@ fn the_same_seed_gives_the_same_bytes() {
     let folder = Folder::new();
     folder.cloud("in.xyz", &strip(100));
     let bytes = |seed: u32| {
-        let line = format!("sample --sampler random --points 9 --seed {seed} in.xyz out.xyz");
+        let line =
+            format!("sample --sampler random --points 9 --seed {seed} in.xyz out.xyz --overwrite");
         assert_eq!(folder.run(&line).code, 0);
         std::fs::read(folder.path("out.xyz")).unwrap()
     };

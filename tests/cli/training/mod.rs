@@ -75,6 +75,9 @@ fn a_run_leaves_a_model_and_a_folder() {
     // The same again does nothing but read the test half once more.
     let again = train(folder.path(), "train --data . --recipe small.toml --out m.safetensors");
     assert!(stderr(&again).contains("resuming after epoch 2 of 2"), "{}", stderr(&again));
+    let words = "train --data . --recipe small.toml --out m.safetensors --overwrite";
+    let again = train(folder.path(), words);
+    assert!(again.status.success() && !stderr(&again).contains("resuming"), "{}", stderr(&again));
     let csv = "eval --model m.safetensors --data test.npz --csv c.csv --svg c.svg";
     let measured = train(folder.path(), csv);
     assert!(measured.status.success(), "{}", stderr(&measured));
@@ -138,6 +141,10 @@ fn what_cannot_be_learnt_from_is_an_error_that_names_it() {
 #[test]
 fn a_wrong_command_line_gives_2_and_a_failure_1() {
     let folder = folder();
+    std::fs::create_dir(folder.path().join("folder.safetensors")).unwrap();
+    for file in ["mine.safetensors", "mine.xyz"] {
+        std::fs::write(folder.path().join(file), "0 0 0").unwrap();
+    }
     for (words, code) in [
         ("train --recipe small.toml --data . --keep 9 --out m.safetensors", 2),
         ("train --recipe small.toml --data . --arch dgcnn --out m.safetensors", 2),
@@ -145,6 +152,12 @@ fn a_wrong_command_line_gives_2_and_a_failure_1() {
         ("explain --model m.safetensors --cloud c.xyz --points 0", 2),
         ("explain --model m.safetensors --cloud nowhere.xyz", 1),
         ("compare-points nowhere.xyz nowhere.xyz", 1),
+        ("train --data . --out m.pth", 2),
+        ("train --data . --out folder.safetensors", 2),
+        ("train --data . --out mine.safetensors", 2),
+        ("eval --model edge-64 --data . --csv mine.safetensors", 2),
+        ("explain --model edge-64 --cloud c.xyz --svg mine.safetensors", 2),
+        ("sample --sampler all mine.xyz mine.xyz", 2),
     ] {
         let ran = train(folder.path(), words);
         assert_eq!(ran.status.code(), Some(code), "{words}: {}", stderr(&ran));

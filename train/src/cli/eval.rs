@@ -9,6 +9,7 @@ use crate::object_report::{self, Labels, Object, Table, Truth, classified};
 use crate::run::MOST_POINTS;
 use formats::atomic;
 use formats::labelled::LabelledSet;
+use formats::outputs::Overwrite;
 use formats::split::Split;
 use infer_cpu::{Classifier, ModelCard, Options, Precision};
 
@@ -44,6 +45,8 @@ pub struct EvalArgs {
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
     #[command(flatten)]
+    overwrite: Overwrite,
+    #[command(flatten)]
     objects: ObjectArgs,
 }
 
@@ -67,6 +70,7 @@ struct ObjectArgs {
 }
 
 pub fn run(args: &EvalArgs) -> anyhow::Result<()> {
+    args.overwrite.check(args.csv.iter().chain(&args.svg).map(PathBuf::as_path))?;
     let (card, names) = {
         let classifier = Classifier::load(&args.model, &options(args))?;
         let names: Vec<String> = classifier.classes().iter().map(ToString::to_string).collect();

@@ -4,6 +4,7 @@ use crate::explanation_drawing;
 use crate::lime::{Explanation, Lime, explain};
 use crate::random_baseline::RandomBaseline;
 use formats::atomic;
+use formats::outputs::Overwrite;
 use infer_cpu::sampler::{Resize, SamplerKind, SamplerSpec};
 use infer_cpu::{Classifier, Normalization, Options};
 
@@ -34,6 +35,8 @@ pub struct ExplainArgs {
     /// Draw the cloud, with the points that both methods mark, into this SVG file
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
+    #[command(flatten)]
+    overwrite: Overwrite,
 }
 
 /// Number of random subsets to compare the distance with.
@@ -41,6 +44,7 @@ const DRAWS: u32 = 1000;
 
 pub fn run(args: &ExplainArgs) -> anyhow::Result<()> {
     check(args)?;
+    args.overwrite.check(args.svg.iter().map(PathBuf::as_path))?;
     let cloud = read_finite(&args.cloud)?;
     let spec = SamplerSpec {
         kind: SamplerKind::Cpl,

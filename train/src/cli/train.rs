@@ -1,8 +1,10 @@
+use std::fs;
 use std::path::PathBuf;
 
 use crate::clouds::Clouds;
 use crate::recipe::Recipe;
 use crate::run::{Job, points_to_read};
+use formats::outputs::{Overwrite, need_extension};
 use formats::split::Split;
 
 use super::Usage;
@@ -51,9 +53,13 @@ pub struct TrainArgs {
     /// Name of the training set on the model's card [default: the path]
     #[arg(long, value_name = "TEXT")]
     data_name: Option<String>,
-    /// Model file to write. The folder of the run is beside it, with the extension `.run`
+    /// Model file to write (.safetensors). The folder of the run is beside it, with the extension
+    /// `.run`; a run that is in it goes on
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
+    /// Replace the model file, and the run in that folder
+    #[arg(long)]
+    overwrite: bool,
 }
 
 /// Widths of a point encoder's layers, without the 3 coordinates.
@@ -70,6 +76,7 @@ fn parse_widths(word: &str) -> Result<Widths, String> {
 
 pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
     let recipe = recipe(args)?;
+    check_output(args)?;
     let most_points = points_to_read(&recipe);
     let clouds = Clouds::read_for(recipe.normalization, &args.data, Split::Train, most_points)?;
     // A single file has no test part.
@@ -82,6 +89,23 @@ pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
         super::print(&accuracy)?;
     }
     super::print(&args.out.display().to_string())
+}
+
+/// Checks the name of the model, and that only a model of the run beside it is replaced. Removes that
+/// run if the user wants another.
+fn check_output(args: &TrainArgs) -> anyhow::Result<()> {
+    need_extension("--out", &args.out, &["safetensors"])?;
+    if args.out.is_dir() {
+        let out = args.out.display();
+        return Err(Usage(format!("--out: expected a file, found the folder {out}")).into());
+    }
+    let checkpoint = args.out.with_extension("run").join("checkpoint.safetensors");
+    match (args.overwrite, checkpoint.is_file()) {
+        (true, true) => fs::remove_file(&checkpoint)?,
+        (false, false) => Overwrite::default().check([&*args.out])?,
+        _ => {}
+    }
+    Ok(())
 }
 
 fn recipe(args: &TrainArgs) -> anyhow::Result<Recipe> {

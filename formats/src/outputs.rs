@@ -1,10 +1,10 @@
-//! The one rule for outputs that exist already.
+//! The one rule for outputs that exist already, and for the names of outputs.
 
-use crate::Usage;
+use crate::outcome::Usage;
 use std::path::Path;
 
 /// The flag of commands that write files.
-#[derive(clap::Args)]
+#[derive(clap::Args, Debug, Default)]
 pub struct Overwrite {
     /// Replace outputs that exist already
     #[arg(long)]
@@ -37,4 +37,17 @@ impl Overwrite {
         }
         Ok(())
     }
+}
+
+/// Checks that the name of the file to write has one of the extensions `expected`.
+///
+/// # Errors
+/// Names the flag and the file.
+pub fn need_extension(flag: &str, file: &Path, expected: &[&str]) -> Result<(), Usage> {
+    let found = file.extension().unwrap_or_default();
+    if expected.iter().any(|extension| found.eq_ignore_ascii_case(extension)) {
+        return Ok(());
+    }
+    let expected = expected.join(" or .");
+    Err(Usage(format!("{flag}: expected a name with .{expected}, found {}", file.display())))
 }
