@@ -2,7 +2,8 @@
 
 use crate::{
     Outcome, adapters, card, cluster, corrupt, gen_dataset, gen_drive, gen_scenes, gen_shapes,
-    merge_dataset, outcome, preview_scan, profile, sample_surfaces, scan, segment, weather,
+    merge_dataset, outcome, preview_scan, profile, sample_surfaces, scan, segment, signals,
+    weather,
 };
 #[cfg(feature = "models")]
 use crate::{advise, detect, export_onnx, import_weights};
@@ -78,7 +79,7 @@ enum Command {
 /// help, and returns the exit code.
 pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
     match Cli::try_parse_from(words) {
-        Ok(cli) => outcome::exit_code(run(&cli.command)),
+        Ok(cli) => outcome::exit_code(run_as_program(&cli.command)),
         Err(error) => {
             // A closed standard error does not change the exit code.
             let _ = error.print();
@@ -91,6 +92,17 @@ pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
 /// printing them. `--help` is an error.
 pub fn run_words(words: impl IntoIterator<Item = OsString>) -> anyhow::Result<Outcome> {
     run(&Cli::try_parse_from(words)?.command)
+}
+
+/// Runs `command`, which signals may end.
+fn run_as_program(command: &Command) -> anyhow::Result<Outcome> {
+    match command {
+        // `live` ends with the objects of the last packets.
+        #[cfg(feature = "models")]
+        Command::Infer(infer_cpu::cli::Command::Live(_)) => {}
+        _ => signals::handle()?,
+    }
+    run(command)
 }
 
 fn run(command: &Command) -> anyhow::Result<Outcome> {

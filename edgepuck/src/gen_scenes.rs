@@ -9,7 +9,7 @@ use anyhow::{Context, bail, ensure};
 use edgepuck_assets::SCENE_RECIPES;
 use edgepuck_scenes::{LabelledScene, Recipe, Stage, generate};
 use edgepuck_segment::Settings;
-use formats::atomic;
+use formats::atomic::{self, UnfinishedFolder};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 use sweep_file::SweepFormat;
@@ -78,6 +78,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let bar = ProgressBar::new(args.sweeps.into()).with_style(style);
     let mut n_points = 0;
     let packed = args.out.join("packed");
+    let begun = outputs.each_ref().map(|folder| UnfinishedFolder::begin(folder));
     let counts = generate(&stage, &Settings::default(), args.sweeps, &packed, |done| {
         bar.inc(1);
         n_points += done.sweep.points().len();
@@ -94,6 +95,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
         }
         if done.scene.number < args.save { save(&stage, done, args) } else { Ok(()) }
     })?;
+    begun.into_iter().for_each(UnfinishedFolder::finish);
     bar.finish_and_clear();
     let seconds = started.elapsed().as_secs_f64();
     eprintln!(

@@ -32,7 +32,8 @@ pub mod sampler_config;
 mod scan;
 mod segment;
 mod shell;
-pub mod significant_digits;
+pub mod signals;
+mod significant_digits;
 #[cfg(feature = "models")]
 pub mod trade_record;
 mod weather;

@@ -4,11 +4,13 @@
 //! that a process killed at any moment leaves no part of a file under its final name. Nothing is
 //! synced to the disk, which would guard against power cuts but cost more than writing a small scan.
 
+use std::collections::BTreeSet;
 #[cfg(feature = "dataset")]
 use std::fmt::Display;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::{NamedTempFile, TempPath};
 
@@ -21,6 +23,49 @@ const SUFFIX: &str = ".tmp";
 
 /// Bytes of the buffer, which holds most scans.
 const BUFFER: usize = 64 << 10;
+
+/// The files and folders of this process that are not complete yet.
+static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes the files and folders that are not complete yet, and begins no others: for a process that
+/// ends.
+pub fn abandon() {
+    let unfinished = unfinished();
+    for path in unfinished.iter() {
+        // What cannot be removed stays: the process ends anyway.
+        let _ = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
+    }
+    std::mem::forget(unfinished);
+}
+
+/// A folder that is removed, with all that is in it, unless it is finished.
+pub struct UnfinishedFolder(PathBuf);
+
+impl UnfinishedFolder {
+    /// Begins the folder at `path`, which does not exist yet or is empty.
+    #[must_use]
+    pub fn begin(path: &Path) -> Self {
+        unfinished().insert(path.to_path_buf());
+        Self(path.to_path_buf())
+    }
+
+    /// Keeps the folder.
+    pub fn finish(self) {
+        unfinished().remove(&self.0);
+    }
+}
+
+impl Drop for UnfinishedFolder {
+    fn drop(&mut self) {
+        if unfinished().remove(&self.0) {
+            let _ = fs::remove_dir_all(&self.0);
+        }
+    }
+}
 
 /// Writes or replaces the file at `path` with `fill`, atomically. Creates missing folders.
 pub fn write(
@@ -78,7 +123,37 @@ fn write_through<W: Write, T>(
 pub struct Unfinished<W: Write = File> {
     path: PathBuf,
     writer: BufWriter<W>,
-    temporary: TempPath,
+    temporary: Temporary,
+}
+
+/// A temporary file, which is known as unfinished while it is there.
+struct Temporary(Option<TempPath>);
+
+impl Temporary {
+    /// The temporary file of the file at `path`. Creates missing folders.
+    fn of(path: &Path) -> Result<(File, Self), FormatError> {
+        let mut unfinished = unfinished();
+        let temporary = named_temporary(make_folder_of(path)?);
+        let (file, path) = temporary.map_err(|source| FormatError::io(path, source))?.into_parts();
+        unfinished.insert(path.to_path_buf());
+        Ok((file, Self(Some(path))))
+    }
+
+    fn persist(mut self, path: &Path) -> io::Result<()> {
+        let temporary = self.0.take().expect("invariant: only this takes it");
+        let mut unfinished = unfinished();
+        unfinished.remove(&*temporary);
+        temporary.persist(path).map_err(|error| error.error)
+    }
+}
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        let mut unfinished = unfinished();
+        if let Some(path) = self.0.take() {
+            unfinished.remove(&*path);
+        }
+    }
 }
 
 impl Unfinished {
@@ -104,9 +179,7 @@ impl Unfinished {
 
 impl<W: Write> Unfinished<W> {
     fn open(path: &Path, open: impl FnOnce(File) -> W) -> Result<Self, FormatError> {
-        let temporary = named_temporary(make_folder_of(path)?);
-        let (file, temporary) =
-            temporary.map_err(|source| FormatError::io(path, source))?.into_parts();
+        let (file, temporary) = Temporary::of(path)?;
         let writer = BufWriter::with_capacity(BUFFER, open(file));
         Ok(Self { path: path.to_path_buf(), writer, temporary })
     }
@@ -127,7 +200,7 @@ impl<W: Write> Unfinished<W> {
         let here = |source| FormatError::io(&path, source);
         // Windows cannot rename a file that is open for writing.
         let closed = close(writer.into_inner().map_err(|error| here(error.into_error()))?);
-        temporary.persist(&path).map_err(|error| here(error.error))?;
+        temporary.persist(&path).map_err(here)?;
         Ok(closed)
     }
 }
@@ -272,6 +345,20 @@ mod tests {
             assert_eq!(fs::read(&path).unwrap(), bytes);
             assert_eq!(hash, hashing.of_file(&path).unwrap());
         }
+    }
+
+    #[test]
+    fn a_folder_that_is_not_finished_is_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, is_kept) in [("kept", true), ("lost", false)] {
+            let path = folder.path().join(name);
+            let begun = UnfinishedFolder::begin(&path);
+            write_bytes(&path.join("a"), b"x").unwrap();
+            if is_kept {
+                begun.finish();
+            }
+        }
+        assert_eq!(names(folder.path()), ["kept"]);
     }
 
     #[test]

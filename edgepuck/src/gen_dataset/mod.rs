@@ -8,7 +8,7 @@ mod summary;
 mod tars;
 
 use crate::caster::CasterArgs;
-use crate::{Outcome, Usage, flags, gen_shapes};
+use crate::{Outcome, Usage, flags, gen_shapes, signals};
 use anyhow::Context;
 use clap::Parser;
 use clap::error::ErrorKind;
@@ -20,11 +20,9 @@ use edgepuck_shapes as shapes;
 use formats::hash::Hashing;
 use settings::Settings;
 use shard::Shard;
-use signal_hook::consts::{SIGINT, SIGTERM};
 use sim_gpu::{Caster, Tally};
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::Ordering::SeqCst;
 use std::time::Instant;
 pub use summary::print_notes;
@@ -118,6 +116,8 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     if let Some(folder) = &args.verify {
         return check(folder);
     }
+    let progress = Progress::default();
+    signals::stop(&progress);
     let config = args.settings.config()?;
     flags::need_simplification(config.simplify.is_some())?;
     let (meshes_folder, default_out) = match &args.meshes {
@@ -143,9 +143,9 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
         ..Plan::new(&out, &config, &meshes)
     };
     let made = if config.layouts.contains(&Layout::Webdataset) {
-        tars::run(&args.tars, &plan, &caster)
+        tars::run(&args.tars, &plan, &caster, &progress)
     } else {
-        make_files(&plan, &caster, args.verbose)
+        make_files(&plan, &caster, &progress, args.verbose)
     };
     made.or_else(|error| match error.downcast_ref() {
         Some(DatasetError::Interrupted { .. }) => {
@@ -156,33 +156,21 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     })
 }
 
-fn make_files(plan: &Plan, caster: &Caster, verbose: bool) -> anyhow::Result<Outcome> {
+fn make_files(
+    plan: &Plan,
+    caster: &Caster,
+    progress: &Progress,
+    verbose: bool,
+) -> anyhow::Result<Outcome> {
     let started = Instant::now();
-    let progress = Progress::default();
-    // Once all meshes are scanned, a signal ends the program immediately.
-    for signal in [SIGINT, SIGTERM] {
-        let is_scanned = Arc::clone(&progress.is_scanned);
-        signal_hook::flag::register_conditional_default(signal, is_scanned)?;
-    }
-    stop_on_signals(&progress)?;
-    let manifest = bar::beside(&progress, || make(plan, caster, &progress))?;
+    let manifest = bar::beside(progress, || make(plan, caster, progress))?;
     if progress.is_scanned.load(SeqCst) {
         report_failures(&manifest.failures);
-        summary::print(plan.out, &manifest, &progress, started.elapsed(), verbose);
+        summary::print(plan.out, &manifest, progress, started.elapsed(), verbose);
     } else {
         eprintln!("{}: the dataset is already complete.", plan.out.display());
     }
     end(plan.out, &manifest)
-}
-
-/// Lets SIGINT and SIGTERM stop the run. A second Ctrl-C ends the program immediately; schedulers may
-/// repeat SIGTERM.
-fn stop_on_signals(progress: &Progress) -> anyhow::Result<()> {
-    signal_hook::flag::register_conditional_default(SIGINT, Arc::clone(&progress.stop))?;
-    for signal in [SIGINT, SIGTERM] {
-        signal_hook::flag::register(signal, Arc::clone(&progress.stop))?;
-    }
-    Ok(())
 }
 
 /// The meshes in `folder`; prints what is odd about its layout.

@@ -31,9 +31,12 @@ pub struct TarArgs {
     on_shard: Option<String>,
 }
 
-pub fn run(args: &TarArgs, plan: &Plan, caster: &Caster) -> anyhow::Result<Outcome> {
-    let progress = Progress::default();
-    super::stop_on_signals(&progress)?;
+pub fn run(
+    args: &TarArgs,
+    plan: &Plan,
+    caster: &Caster,
+    progress: &Progress,
+) -> anyhow::Result<Outcome> {
     let command = args.on_shard.as_ref();
     let hand_over = command.map(|command| |tar: &Path| hand_over(command, tar, &progress.stop));
     let tars = Tars {
@@ -43,7 +46,7 @@ pub fn run(args: &TarArgs, plan: &Plan, caster: &Caster) -> anyhow::Result<Outco
         },
         hand_over: hand_over.as_ref().map(|hand_over| hand_over as HandOver),
     };
-    let made = make_tars(plan, &tars, caster, &progress)?;
+    let made = make_tars(plan, &tars, caster, progress)?;
 
     let mut failures: Vec<_> = made.tars.iter().flat_map(|tar| tar.failures.clone()).collect();
     failures.sort_by(|p, q| p.source.cmp(&q.source));

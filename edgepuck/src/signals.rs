@@ -1,0 +1,53 @@
+//! What SIGINT and SIGTERM do to the program.
+
+use edgepuck_dataset::Progress;
+use formats::atomic;
+use signal_hook::consts::{SIGINT, SIGTERM};
+use std::process;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::SeqCst};
+use std::sync::{Arc, OnceLock};
+use std::time::Duration;
+
+/// The flags of a run that can be resumed: to stop it, and whether that comes too late.
+static RUN: OnceLock<(Arc<AtomicBool>, Arc<AtomicBool>)> = OnceLock::new();
+
+/// Lets the signals stop `run` where it can be resumed, instead of ending the program.
+pub fn stop(run: &Progress) {
+    let _ = RUN.set((Arc::clone(&run.stop), Arc::clone(&run.is_scanned)));
+}
+
+/// Ends the program at SIGINT and SIGTERM, without the files that it has not finished. Of a run that
+/// can be resumed, they end the scanning. There, a second Ctrl-C ends the program immediately;
+/// schedulers may repeat SIGTERM.
+pub fn handle() -> std::io::Result<()> {
+    let caught = Arc::new(AtomicUsize::new(0));
+    for signal in [SIGINT, SIGTERM] {
+        signal_hook::flag::register_usize(signal, Arc::clone(&caught), signal as usize)?;
+    }
+    std::thread::spawn(move || {
+        loop {
+            std::thread::sleep(Duration::from_millis(10));
+            match caught.swap(0, SeqCst) {
+                0 => {}
+                signal => end(signal as i32),
+            }
+        }
+    });
+    Ok(())
+}
+
+fn end(signal: i32) {
+    let run = RUN.get();
+    if let Some((stop, is_scanned)) = run
+        && !is_scanned.load(SeqCst)
+        && (!stop.swap(true, SeqCst) || signal == SIGTERM)
+    {
+        return;
+    }
+    atomic::abandon();
+    if run.is_some_and(|(_, is_scanned)| is_scanned.load(SeqCst)) {
+        formats::outcome::say("stopped before the scans were packed; --resume continues");
+        process::exit(i32::from(formats::outcome::exit_code(Ok(crate::Outcome::Interrupted))));
+    }
+    let _ = signal_hook::low_level::emulate_default_handler(signal);
+}
