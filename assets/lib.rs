@@ -38,6 +38,13 @@ pub const SCENE_RECIPES: [(&str, &str); 3] = [
     ("yard", include_str!("scenes/yard.toml")),
 ];
 
+/// The recipes of bundled models, for `edgepuck train`: a recipe's name and its TOML.
+pub const TRAINING_RECIPES: [(&str, &str); 3] = [
+    ("edge-64", include_str!("recipes/edge-64.toml")),
+    ("street-128", include_str!("recipes/street-128.toml")),
+    ("lidar-64", include_str!("recipes/lidar-64.toml")),
+];
+
 /// The tables of layer names that `edgepuck import-weights` knows: a table's
 /// path in the repository and its TOML.
 pub const IMPORTERS: [(&str, &str); 2] = [

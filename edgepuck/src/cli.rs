@@ -7,7 +7,7 @@ use crate::{
 };
 #[cfg(feature = "models")]
 use crate::{advise, detect, export_onnx, import_weights};
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::ffi::OsString;
 
 /// Turns CAD meshes into realistic LiDAR training data.
@@ -78,7 +78,7 @@ enum Command {
 /// Runs the command line `words`, which begins with the name of the program. Prints errors and
 /// help, and returns the exit code.
 pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
-    match Cli::try_parse_from(words) {
+    match parsed(words) {
         Ok(cli) => outcome::exit_code(run_as_program(&cli.command)),
         Err(error) => {
             // A closed standard error does not change the exit code.
@@ -91,7 +91,19 @@ pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
 /// Runs the command line `words` like [`main`], but returns errors to the caller instead of
 /// printing them. `--help` is an error.
 pub fn run_words(words: impl IntoIterator<Item = OsString>) -> anyhow::Result<Outcome> {
-    run(&Cli::try_parse_from(words)?.command)
+    run(&parsed(words)?.command)
+}
+
+/// The command line `words`. The examples of commands that `infer-cpu` has too are of this program.
+fn parsed(words: impl IntoIterator<Item = OsString>) -> Result<Cli, clap::Error> {
+    let command = Cli::command().mut_subcommands(|command| match command.get_after_help() {
+        Some(help) => {
+            let help = help.to_string().replace("infer-cpu ", "edgepuck ");
+            command.after_help(help)
+        }
+        None => command,
+    });
+    Cli::from_arg_matches(&command.try_get_matches_from(words)?)
 }
 
 /// Runs `command`, which signals may end.
@@ -149,6 +161,16 @@ fn run(command: &Command) -> anyhow::Result<Outcome> {
 #[cfg(all(test, feature = "models"))]
 mod tests {
     use super::*;
+
+    #[test]
+    fn examples_in_help_are_of_this_program() {
+        for command in ["classify", "sample", "inspect", "live", "bench"] {
+            let help = parsed(["edgepuck", command, "--help"].map(OsString::from)).err().unwrap();
+            let help = help.to_string();
+            assert!(help.contains(&format!("  edgepuck {command} ")), "{help}");
+            assert!(!help.contains("infer-cpu "), "{help}");
+        }
+    }
 
     #[test]
     fn the_commands_in_the_readmes_are_understood() {

@@ -3,6 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
+use edgepuck_assets::TRAINING_RECIPES;
 use formats::FormatError;
 use formats::model_card::Normalization;
 use infer_cpu::UNKNOWN;
@@ -270,9 +271,18 @@ impl Default for Augment {
 }
 
 impl Recipe {
-    /// Reads the recipe at `path`.
+    /// Reads the recipe at `path`, or the built-in one of that name.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = std::fs::read_to_string(path).map_err(|source| FormatError::io(path, source))?;
+        let built_in = TRAINING_RECIPES.iter().find(|(name, _)| Path::new(name) == path);
+        let text = match built_in {
+            Some((_, text)) => (*text).to_owned(),
+            None if !path.exists() => {
+                let names = TRAINING_RECIPES.map(|(name, _)| name).join(", ");
+                let cause = format!("expected a recipe's file, or one of {names}");
+                return Err(Error::Data { path: path.to_path_buf(), cause });
+            }
+            None => std::fs::read_to_string(path).map_err(|e| FormatError::io(path, e))?,
+        };
         let recipe: Self = toml::from_str(&text)
             .map_err(|error| FormatError::malformed(path, "recipe", error.to_string().trim()))?;
         recipe.check()?;

@@ -122,6 +122,11 @@ fn what_cannot_be_learnt_from_is_an_error_that_names_it() {
             ".: expected clouds of 33 points or more, found 32: give --points",
         ),
         ("--data . --recipe bad.toml", "unknown field `epoch`"),
+        (
+            "--data . --recipe street-12",
+            "street-12: expected a recipe's file, or one of edge-64, s",
+        ),
+        ("--data . --recipe street-128", "`unknown`: expected some of the classes"),
         ("--data . --recipe zero.toml", "`epochs`: expected 1 or more"),
         ("--data . --keep 9", "--front and --keep need --arch cpl"),
         ("--data . --arch cpl --keep 33", "`cpl.keep`: expected 1 to `points`"),

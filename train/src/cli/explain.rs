@@ -20,7 +20,8 @@ pub struct ExplainArgs {
     /// The cloud file: PLY, NPZ, NPY, PCD, text, KITTI or LAS
     #[arg(long, value_name = "FILE")]
     cloud: PathBuf,
-    /// Number of points that each method marks
+    /// Largest number of critical points. LIME-3D marks as many points as were found, since a point
+    /// can be critical several times
     #[arg(long, default_value_t = 64, value_name = "N")]
     points: usize,
     /// Number of parts into which LIME-3D divides the cloud
@@ -108,11 +109,11 @@ fn report(
     let [low, middle, high] =
         [DRAWS / 40, DRAWS / 2, DRAWS - 1 - DRAWS / 40].map(|i| random[i as usize]);
     format!(
-        "LIME-3D: {} parts, R² {:.3}\n\
-         Chamfer distance to the {n} points that LIME finds strongest:\n  \
+        "LIME-3D: {} parts, R² of its linear model {:.3}\n\
+         Chamfer distance to the {n} points that LIME finds strongest (squared, and plain):\n  \
          critical points  squared {:.5}, plain {:.5}\n  \
          random points    squared {:.5} (95 % of {DRAWS} draws: {:.5} to {:.5}), plain {:.5}\n  \
-         of the random draws, {:.1} % are nearer",
+         {:.1} % of the random draws are nearer than the critical points",
         found.attribution.len(),
         found.r_squared,
         ours.squared,

@@ -23,8 +23,9 @@ pub struct TrainArgs {
     /// --data, if there is one]
     #[arg(long, value_name = "PATH")]
     test: Option<PathBuf>,
-    /// Recipe (TOML), which the flags below override [default: the settings of the baseline]
-    #[arg(long, value_name = "TOML")]
+    /// Recipe, which the flags below override: a TOML file, or the name of a built-in one: edge-64,
+    /// street-128 or lidar-64 [default: the settings of the baseline]
+    #[arg(long, value_name = "NAME|TOML")]
     recipe: Option<PathBuf>,
     /// Model file, or bundled model, from whose weights training starts. Its layers must be those of the recipe. The
     /// last layer is taken only if the model's classes are the first classes of the data; the
