@@ -17,6 +17,7 @@ use sim_gpu::internals::sensor::{BeamPattern, DetectionLimit, RangeLimits};
 use sim_gpu::internals::weather::{Air, AirBeam, Medium, Scattered};
 use sim_gpu::{Mesh, Pose, Scene, Sensor};
 use std::cmp::Ordering;
+use std::collections::BTreeSet;
 use std::fmt::Write;
 
 /// A panel across the x axis.
@@ -61,7 +62,7 @@ const WORLD: [Panel; 8] = [
 
 const SENSOR_M: DVec3 = DVec3::new(0.25, -0.5, 0.125);
 const RANGE: RangeLimits = RangeLimits { min_m: 2.0, max_m: 30.0, quantum_m: Some(0.004) };
-const LIMIT: DetectionLimit = DetectionLimit { reflectivity: 0.5, range_m: 30.0 };
+const LIMIT: DetectionLimit = DetectionLimit { reflectivity: 0.15, range_m: 30.0 };
 const DIVERGENCE_DEG: [f64; 2] = [0.5, 0.25];
 const SEPARATION_M: f64 = 1.0;
 const SEED: u64 = 9;
@@ -78,7 +79,7 @@ fn sensor() -> Sensor {
     let text = format!(
         "name = \"fan\"\n\
          range = {{ min_m = 2.0, max_m = 30.0, quantum_m = 0.004 }}\n\
-         detection = {{ reflectivity = 0.5, range_m = 30.0 }}\n\
+         detection = {{ reflectivity = 0.15, range_m = 30.0 }}\n\
          footprint = {{ divergence_deg = [0.5, 0.25], separation_m = 1.0 }}\n\
          table = {{ pulse_hz = 15000.0, period_s = 0.1, directions_deg = [{rows}] }}"
     );
@@ -109,6 +110,8 @@ fn scene() -> Scene {
 /// One point of a scan.
 #[derive(Debug, PartialEq)]
 struct Point {
+    /// Which echo of the air it is, from 1; 0 for surfaces. Scans do not tell it.
+    draw: u32,
     beam: u32,
     number: u8,
     object: u32,
@@ -131,6 +134,8 @@ struct Echo {
     /// What its random numbers belong to.
     key: StreamKey,
     ray: u32,
+    /// As [`Point::draw`].
+    draw: u32,
     cosine: f64,
 }
 
@@ -274,8 +279,17 @@ impl Plain<'_> {
                 self.air.as_ref().map_or(1.0, |air| air.transmission(from_m, along, range_m));
             let brightness = bright * through / f64::from(per_beam);
             let (source, power) = (Ok(object), brightness / range_m.powi(2));
-            let echo =
-                Echo { range_m, power, brightness, retroreflection, source, key, ray, cosine };
+            let echo = Echo {
+                range_m,
+                power,
+                brightness,
+                retroreflection,
+                source,
+                key,
+                ray,
+                draw: 0,
+                cosine,
+            };
             echoes.push(echo);
         }
         let end_m = if n_hits < per_beam { RANGE.max_m } else { farthest_m.min(RANGE.max_m) };
@@ -325,6 +339,7 @@ impl Plain<'_> {
         };
         let lit = echo.source.map_or(0.0, |object| WORLD[object].reflectivity * echo.cosine);
         Point {
+            draw: echo.draw,
             beam,
             number,
             object: echo.source.map_or(u32::MAX, |object| object as u32),
@@ -351,7 +366,8 @@ fn add_air_echoes(air: &Air, along: &AirBeam, ray: u32, echoes: &mut Vec<Echo>) 
         draw += 1;
         let key = StreamKey([low, high ^ 0x9E37_79B9u32.wrapping_mul(draw)]);
         let (source, retroreflection, cosine) = (Err(medium), 0.0, 0.0);
-        let echo = Echo { range_m, power, brightness, retroreflection, source, key, ray, cosine };
+        let echo =
+            Echo { range_m, power, brightness, retroreflection, source, key, ray, draw, cosine };
         echoes.extend((range_m >= RANGE.min_m).then_some(echo));
     });
 }
@@ -373,6 +389,7 @@ fn scanned(scene: &Scene, sensor: &Sensor, effects: &Effects) -> Vec<Point> {
         (f64s(&scan.range_m), f64s(&scan.power), f64s(&scan.intensity));
     let origin = DVec3::from_array(scan.origin);
     let point = |i: usize| Point {
+        draw: 0,
         beam: scan.beam.as_ref().unwrap()[i],
         number: scan.return_number.as_ref().unwrap()[i],
         object: scan.object.as_ref().unwrap()[i],
@@ -425,7 +442,7 @@ const ASKED: [(&str, Ask); 11] = [
         let dust = Volume { min_m, max_m: [6.0, 0.5, 2.0], visibility_m: 100.0 };
         let (rain_mm_h, haze_visibility_m) = (Some(80.0), Some(3000.0));
         // Spray behind the dust, so that a beam has several echoes of the air.
-        let spray = Volume { min_m: [6.5, -4.0, -2.0], max_m: [7.5, 0.5, 2.0], visibility_m: 20.0 };
+        let spray = Volume { min_m: [6.5, -4.0, -2.0], max_m: [7.5, 0.5, 2.0], visibility_m: 5.0 };
         let volumes = vec![dust, spray];
         let weather = Weather { rain_mm_h, haze_visibility_m, volumes, ..Weather::default() };
         e.weather = Some(Box::new(weather));
@@ -470,7 +487,7 @@ fn each_pair_of_effects_is_that_of_the_plain_reference() {
 #[test]
 fn all_effects_together_are_those_of_the_plain_reference_in_each_return_mode() {
     let (scene, sensor) = (scene(), sensor());
-    let mut seen = std::collections::BTreeSet::new();
+    let (mut seen, mut draws) = (BTreeSet::new(), BTreeSet::new());
     for model in NoiseModel::ALL {
         for mode in ReturnMode::ALL {
             let mut effects = Effects::default();
@@ -479,8 +496,11 @@ fn all_effects_together_are_those_of_the_plain_reference_in_each_return_mode() {
             let expected = reference(&sensor, &effects);
             assert_same(&scanned(&scene, &sensor, &effects), &expected, &format!("{model} {mode}"));
             seen.extend(expected.iter().map(|point| (point.object, point.medium)));
+            draws.extend(expected.iter().map(|point| point.draw));
         }
     }
     // All that the sensor can see took part: five panels, rain and dust.
     assert_eq!(seen.len(), 7, "{seen:?}");
+    // And the second echo of the air in a beam, with random numbers of its own.
+    assert!(draws.contains(&2), "{draws:?}");
 }

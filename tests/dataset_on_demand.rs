@@ -86,6 +86,16 @@ fn a_cloud_depends_on_its_number_and_the_seed_alone() {
 }
 
 #[test]
+fn each_epoch_has_a_seed_of_its_own_and_the_first_that_of_the_training() {
+    let mut seeds: Vec<u64> = (0..1000).map(|epoch| seed_of_epoch(7, epoch)).collect();
+    assert_eq!(seeds[0], 7);
+    seeds.extend((1..1000).map(|epoch| seed_of_epoch(8, epoch)));
+    seeds.sort_unstable();
+    seeds.dedup();
+    assert_eq!(seeds.len(), 1999);
+}
+
+#[test]
 fn a_mesh_whose_views_all_have_too_few_points_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let meshes = meshes(folder.path());

@@ -133,7 +133,20 @@ mod tests {
     fn an_epoch_has_each_cloud_once() {
         let mut drawn = order(&[0; 30], 1, 0, &Recipe::default());
         assert!(!drawn.is_sorted());
+        assert_ne!(drawn, order(&[0; 30], 1, 1, &Recipe::default()));
         drawn.sort_unstable();
         assert_eq!(drawn, (0..30).map(|i| (i, 0)).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn short_epochs_take_other_clouds_each() {
+        let recipe = Recipe { clouds_per_epoch: Some(11), ..Recipe::default() };
+        let [first, second] = [0, 1].map(|epoch| {
+            let mut drawn = order(&[0; 40], 1, epoch, &recipe);
+            drawn.sort_unstable();
+            drawn
+        });
+        assert_eq!((first.len(), second.len()), (11, 11));
+        assert_ne!(first, second);
     }
 }

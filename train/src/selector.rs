@@ -132,4 +132,25 @@ mod tests {
         assert_eq!(chosen.rows, [0, 2]);
         assert_eq!(chosen.batch.coordinates[1], batch.coordinates[2]);
     }
+
+    #[test]
+    fn a_relaxed_selection_differs_from_step_to_step_and_from_cloud_to_cloud() {
+        let mut pooled = PooledLayer::new("a", "b", (3, 64), true, 1);
+        let cloud: Vec<[f32; 3]> =
+            (0..40u8).map(|i| [1.7, 2.9, 4.3].map(|f| (f * f32::from(i)).sin())).collect();
+        let coordinates = [cloud.clone(), cloud].concat();
+        let starts = vec![0, 40, 80];
+        let batch = Batch { coordinates, weights: vec![1.0; 80], starts, ..Batch::default() };
+        pooled.forward(batch.points(), batch.rows(), 0.1);
+        let cpl = Cpl { gumbel: true, keep: 8, ..Cpl::default() };
+        let chosen = |step| {
+            let rows =
+                CriticalPointSelector::new(&cpl, 0).unwrap().select(&pooled, &batch, step).rows;
+            rows.into_iter().partition::<Vec<u32>, _>(|row| *row < 40)
+        };
+        let (first, second) = chosen(0);
+        assert_ne!(first, second.iter().map(|row| row - 40).collect::<Vec<_>>());
+        assert_eq!((first.clone(), second.clone()), chosen(0));
+        assert_ne!(first, chosen(1).0);
+    }
 }

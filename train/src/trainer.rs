@@ -106,22 +106,43 @@ impl Trainer {
     /// The dropout mask of the last hidden features for the next step.
     fn dropout(&self, clouds: usize) -> Option<Matrix> {
         let width = self.model.network.dropout_width()?;
-        let dropped = self.recipe.dropout;
-        if dropped == 0.0 {
-            return None;
-        }
-        let stream = StreamKey::new(self.recipe.seed, "dropout", 0);
-        let first = self.step * (clouds * width) as u64;
-        let scale = (1.0 / (1.0 - dropped)) as f32;
-        let mut n = first;
-        Some(Matrix::from_shape_simple_fn((clouds, width), || {
-            n += 1;
-            if stream.unit(n) < dropped { 0.0 } else { scale }
-        }))
+        let is_asked = self.recipe.dropout > 0.0;
+        is_asked.then(|| dropout(&self.recipe, self.step, (clouds, width)))
     }
 
     fn not_finite(&mut self, loss: f64, step: u64) -> Error {
         let layer = self.model.not_finite().unwrap_or("the last").to_owned();
         Error::NotFinite { loss, step, epoch: self.epoch + 1, layer }
+    }
+}
+
+/// The mask of `step`: 0 for what is dropped, and what is kept scaled to the same mean.
+fn dropout(recipe: &Recipe, step: u64, (clouds, width): (usize, usize)) -> Matrix {
+    let stream = StreamKey::new(recipe.seed, "dropout", 0);
+    let mut n = step * (clouds * width) as u64;
+    let scale = (1.0 / (1.0 - recipe.dropout)) as f32;
+    Matrix::from_shape_simple_fn((clouds, width), || {
+        n += 1;
+        if stream.unit(n) < recipe.dropout { 0.0 } else { scale }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_step_drops_its_share_of_other_features() {
+        let recipe = Recipe { dropout: 0.25, ..Recipe::default() };
+        let mask = |step| dropout(&recipe, step, (100, 100));
+        let (first, second) = (mask(0), mask(1));
+        let dropped = |mask: &Matrix| mask.iter().filter(|x| **x == 0.0).count();
+        let both = first.iter().zip(&second).filter(|(a, b)| **a + **b == 0.0).count();
+        // Counts of 10,000 draws, within five standard deviations of a binomial.
+        for (found, share) in [(dropped(&first), 0.25), (dropped(&second), 0.25), (both, 0.0625)] {
+            let off = (found as f64 - 1e4 * share).abs();
+            assert!(off < 5.0 * (1e4 * share * (1.0 - share)).sqrt(), "{found} of {share}");
+        }
+        assert!(first.iter().all(|x| *x == 0.0 || (*x - 4.0 / 3.0).abs() < 1e-6));
     }
 }

@@ -100,3 +100,19 @@ impl Linear {
         LayerMut { linear: self, norm: None, output: None }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn layers_and_their_parts_begin_with_numbers_of_their_own() {
+        let layer = |name, seed| Linear::new(name, 64, 64, seed);
+        let (a, b) = (layer("a", 0), layer("b", 0));
+        assert_ne!(a.weight.value, b.weight.value);
+        assert_ne!(a.bias.value, b.bias.value);
+        assert_ne!(a.weight.value[..64], a.bias.value[..]);
+        assert_ne!(a.weight.value, layer("a", 1).weight.value);
+        assert_eq!(a.weight.value, layer("a", 0).weight.value);
+    }
+}
