@@ -44,6 +44,8 @@ class Dataset:
         effects: The path of a TOML file with a table `[effects]`, instead of noise and dropout.
         seed: The seed of all random numbers.
         normalize: The normalisation of meshes, as in `Mesh`.
+        units: The unit of the meshes' coordinates with `normalize="none"`, as in `Mesh`; the metre by
+            default.
         up: The upward axis of meshes, as in `Mesh`.
         min_points: A view with fewer points is replaced by another view.
         cache_mb: The size of the cache of meshes in each process, MiB.
@@ -75,6 +77,7 @@ class Dataset:
         effects: str | os.PathLike[str] | None = None,
         seed: int = 0,
         normalize: str = "unit-sphere",
+        units: str | None = None,
         up: str | None = None,
         min_points: int = 64,
         cache_mb: int = 1024,
@@ -91,6 +94,7 @@ class Dataset:
             "azimuth-jitter": azimuth_jitter,
             "seed": _arguments.seed(seed),
             "normalize": normalize,
+            "units": units,
             "up": up,
             "min-points": min_points,
             "effects": None if effects is None else place(effects),

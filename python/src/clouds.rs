@@ -84,7 +84,9 @@ impl Clouds {
         let draw = || self.clouds.draw(&caster, seed, &indices, &self.attributes);
         let rows = process::run(py, draw)?;
         let warnings = self.clouds.warnings();
-        let warnings = warnings.iter().map(|told| told.trim_start_matches("warning: "));
+        // Flags are arguments here.
+        let argument = |told: &String| told.trim_start_matches("warning: ").replace(" --", " ");
+        let warnings = warnings.iter().map(argument);
         warn(py, &warnings.collect::<Vec<_>>())?;
         let rows = rows.map_err(raised)?;
         let labels = indices.iter().map(|&index| self.clouds.label(index) as i64);

@@ -4,6 +4,7 @@ parent did before, and gives the same clouds to any number of them."""
 import faulthandler
 import multiprocessing
 import queue
+import shutil
 import subprocess
 import sys
 import textwrap
@@ -124,6 +125,18 @@ def test_what_is_doubtful_about_a_mesh_is_told_once(tmp_path: Path) -> None:
             dataset.batch(range(len(dataset)))
     for part in ["one.obj: expected a size of 1 cm to 100 m", "two.obj: expected a size", "cross", "inside"]:
         assert sum(part in str(one.message) for one in told) == (1 if ".obj" in part else 2), part
+    # In millimetres it has a size of 15 cm.
+    settings = {"normalize": "none", "units": "mm", "up": "z", "points": 64, "min_points": 1}
+    small = ep.Dataset(tmp_path, distance=3, attributes=["range"], **settings)
+    np.testing.assert_allclose(small[0][0][:, 3], 3, atol=0.3)
+
+
+def test_what_is_doubtful_about_a_folder_is_told(tmp_path: Path, shapes: Path) -> None:
+    shutil.copytree(shapes, tmp_path / "meshes")
+    (tmp_path / "meshes/bus").mkdir()
+    (tmp_path / "meshes/bus/a.glb").write_bytes(b"glTF")
+    with pytest.warns(UserWarning, match=r"1 file is ignored \(.glb\); the class bus has no mesh"):
+        ep.Dataset(tmp_path / "meshes")
 
 
 def test_a_pickled_dataset_draws_the_same(dataset: ep.Dataset) -> None:
