@@ -67,7 +67,7 @@ fn what_is_no_cloud_is_refused_with_its_key() {
     let set = bytes_of("(2, 1, 3)", &[1; 6]);
     assert_eq!(
         error("a.npz", npz(&[("points", set)])),
-        "points: expected shape [n, 3], found 2 clouds of 1 points"
+        "points: expected shape [n, 3], found 2 clouds of 1 points: `edgepuck eval` classifies packed sets"
     );
     assert_eq!(
         error("a.npz", npz(&[("positions", cloud()), ("origin", flat())])),
