@@ -441,3 +441,23 @@ fn message_of(object: &Object) -> ros::Object {
         last_s: object.last_s,
     }
 }
+
+/// A gap of more than a quarter of a turn: what came before it is answered at once, and nothing
+/// across it is joined.
+#[test]
+fn after_a_long_gap_all_that_came_before_is_answered_first() {
+    let sent = packets(&street(), 5_000, PACKETS_PER_S);
+    let all: Vec<(f64, &[u8])> = on_time(&sent).collect();
+    // Turn 3 is at 0.38 s when 0.26 of a turn is lost.
+    let (gap, lost) = (290, 20);
+    let mut whole = super::pipeline(&LiveOptions::default());
+    let before = run(&mut whole, all[..gap].iter().copied());
+    let mut pipeline = super::pipeline(&LiveOptions::default());
+    let mut objects = Vec::new();
+    for &(since_s, packet) in all[..gap].iter().chain(&all[gap + lost..=gap + lost]) {
+        pipeline.take(packet, Arrival { time_s: START_S + since_s, moment: None });
+        pipeline.answer(|object| objects.push(object.clone()));
+    }
+    assert_eq!(objects, before);
+    assert_eq!((pipeline.counts().lost, pipeline.counts().restarts), (lost as u64, 0));
+}
