@@ -96,7 +96,10 @@ fn what_is_no_cloud_is_refused() {
     let shape = |found: &str| format!("array: expected shape [n, 3], found {found}");
     assert_eq!(wrong("<f4", "(3,)", &[0; 12]), shape("[3]"));
     assert_eq!(wrong("<f4", "(4, 2)", &[0; 32]), shape("[4, 2]"));
-    assert_eq!(wrong("<f4", "(2, 1, 3)", &[0; 24]), shape("2 clouds of 1 points"));
+    assert_eq!(
+        wrong("<f4", "(2, 1, 3)", &[0; 24]),
+        shape("2 clouds of 1 points: `edgepuck eval` classifies packed sets")
+    );
     let transposed = wrong("<f4", "(3, 100)", &[0; 1200]);
     assert_eq!(transposed, shape("[3, 100]: transpose it"));
     assert_eq!(
