@@ -33,9 +33,9 @@ pub enum ConfigError {
         /// The file as named by the user.
         file: PathBuf,
     },
-    /// The text cannot be used.
+    /// The content cannot be used: its syntax or its values.
     #[error("{}: {message}", file.display())]
-    Syntax {
+    Content {
         /// The file as named by the user.
         file: PathBuf,
         /// All that is wrong, each with its line, key and cause.
@@ -90,11 +90,12 @@ impl From<InvalidValue> for Vec<InvalidValue> {
 }
 
 /// All values, or all that is wrong.
-pub fn all<T>(
-    results: impl IntoIterator<Item = Result<T, InvalidValue>>,
+pub fn all<T, E: Into<Vec<InvalidValue>>>(
+    results: impl IntoIterator<Item = Result<T, E>>,
 ) -> Result<Vec<T>, Vec<InvalidValue>> {
     let mut wrong = Vec::new();
-    let sound = results.into_iter().filter_map(|one| one.map_err(|error| wrong.push(error)).ok());
+    let sound =
+        results.into_iter().filter_map(|one| one.map_err(|error| wrong.extend(error.into())).ok());
     let sound = sound.collect();
     if wrong.is_empty() { Ok(sound) } else { Err(wrong) }
 }
@@ -120,7 +121,7 @@ pub fn read<T: DeserializeOwned, U, E: Into<Vec<InvalidValue>>>(
 /// Parses `text`, which is in `file`, and makes of it what is wanted by `check`.
 ///
 /// # Errors
-/// All mistakes of the file at once: unknown and missing keys, values of other types, and those that
+/// All unknown and missing keys and values of other types at once or, if there is none, all that
 /// `check` refuses.
 pub fn parse<T: DeserializeOwned, U, E: Into<Vec<InvalidValue>>>(
     text: &str,
@@ -130,7 +131,7 @@ pub fn parse<T: DeserializeOwned, U, E: Into<Vec<InvalidValue>>>(
     // Windows' editors begin files with a byte order mark.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     Mistakes::find(text, |value| check(value).map_err(Into::into)).map_err(|mistakes| {
-        ConfigError::Syntax { file: file.to_owned(), message: mistakes.to_string() }
+        ConfigError::Content { file: file.to_owned(), message: mistakes.to_string() }
     })
 }
 

@@ -1,26 +1,28 @@
 //! All mistakes of a TOML file at once.
 //!
-//! Serde stops at the first mistake. The file is therefore read again, without each value that is
-//! wrong and with a stand-in for each that is missing, until nothing new is found. The only schema is
-//! the types that are read.
+//! Serde stops at the first mistake. Where it finds one, each table and item is therefore read apart,
+//! without the rest of the file. Only if all are of the right types are their values checked. The only
+//! schema is the types that are read.
 
 use std::fmt;
 use std::ops::Range;
 
 use serde::de::DeserializeOwned;
 use toml::Spanned;
-use toml::de::{DeTable, DeValue, Deserializer, Error};
+use toml::de::{DeString, DeTable, DeValue, Deserializer, Error};
 
 use super::{InvalidValue, one_of};
 
-/// The most mistakes that are looked for.
-const MOST: usize = 32;
+/// The most mistakes that are told.
+const MOST: usize = 20;
 
-/// The stand-ins for a missing value, in the order in which they are tried. The first is a number
-/// that files do not hold: a message about it is a consequence of the missing value.
-const STAND_INS: [&str; 9] =
-    [ODD, "1", "\"x\"", "true", "[1, 1, 1]", "[1, 1]", "[1, 1, 1, 1]", "[{}]", "{}"];
-const ODD: &str = "0.71828182";
+/// The most characters of a value that are told.
+const MOST_CHARS: usize = 60;
+
+/// The values that stand in for a missing one, in the order in which they are tried, so that serde
+/// finds the next missing one.
+const STAND_INS: [&str; 8] =
+    ["1", "\"x\"", "true", "[1, 1, 1]", "[1, 1]", "[1, 1, 1, 1]", "[]", "{}"];
 
 /// Everything that is wrong with a file, sorted by line.
 pub(super) struct Mistakes(Vec<Mistake>);
@@ -28,10 +30,7 @@ pub(super) struct Mistakes(Vec<Mistake>);
 struct Mistake {
     /// The line, from 1; `None` where the key's table is the file itself.
     line: Option<usize>,
-    key: String,
-    cause: String,
-    /// Whether it is a consequence of another mistake, which the user is not told.
-    follows: bool,
+    invalid: InvalidValue,
 }
 
 impl Mistakes {
@@ -40,30 +39,44 @@ impl Mistakes {
         text: &str,
         check: impl Fn(T) -> Result<U, Vec<InvalidValue>>,
     ) -> Result<U, Self> {
+        let line_starts: Vec<usize> = text.match_indices('\n').map(|(at, _)| at + 1).collect();
+        let line = |at: usize| 1 + line_starts.partition_point(|&start| start <= at);
         let (root, errors) = DeTable::parse_recoverable(text);
-        let mut reader = Reader { text, root, stand_ins: Vec::new(), found: Vec::new() };
-        for error in &errors {
-            let line = error.span().map(|span| reader.line(&span));
-            let (key, cause) = (String::new(), error.message().to_owned());
-            reader.found.push(Mistake { line, key, cause, follows: false });
-        }
-        while errors.is_empty() && reader.found.len() < MOST {
-            let is_new = match T::deserialize(Deserializer::from(reader.root.clone())) {
-                Err(error) => reader.mend(&error),
-                Ok(value) => match check(value) {
-                    Ok(made) if reader.found.is_empty() => return Ok(made),
-                    Ok(_) => false,
-                    Err(all) => reader.refuse(all),
-                },
+        if !errors.is_empty() {
+            let mistake = |error: &Error| Mistake {
+                line: error.span().map(|span| line(span.start)),
+                invalid: InvalidValue::new("", error.message()),
             };
-            if !is_new {
-                break;
-            }
+            return Err(Self::sorted(errors.iter().map(mistake)));
         }
-        let mut found = reader.found;
-        found.retain(|mistake| !mistake.follows);
-        found.sort_by_key(|mistake| mistake.line);
-        Err(Self(found))
+        let read = |root| T::deserialize(Deserializer::from(root));
+        let found = match read(root.clone()) {
+            Ok(value) => match check(value) {
+                Ok(made) => return Ok(made),
+                Err(all) => all,
+            },
+            Err(_) => {
+                let mut nodes = Vec::new();
+                let root = Spanned::new(root.span(), DeValue::Table(root.get_ref().clone()));
+                let root = numbered(root, String::new(), &mut nodes);
+                let read = |root| read(root).err();
+                let mut reader =
+                    Reader { text, nodes, read: &read, above: Vec::new(), found: Vec::new() };
+                reader.probe(&root);
+                reader.found
+            }
+        };
+        let mistake = |invalid: InvalidValue| Mistake {
+            line: nearest(root.get_ref(), &invalid.key).map(|span| line(span.start)),
+            invalid,
+        };
+        Err(Self::sorted(found.into_iter().map(mistake)))
+    }
+
+    fn sorted(all: impl Iterator<Item = Mistake>) -> Self {
+        let mut all: Vec<Mistake> = all.collect();
+        all.sort_by_key(|mistake| mistake.line);
+        Self(all)
     }
 }
 
@@ -73,7 +86,13 @@ impl fmt::Display for Mistakes {
             return only.fmt(f);
         }
         write!(f, "{} mistakes:", self.0.len())?;
-        self.0.iter().try_for_each(|mistake| write!(f, "\n  {mistake}"))
+        for mistake in self.0.iter().take(MOST) {
+            write!(f, "\n  {}", mistake.to_string().replace('\n', "\n  "))?;
+        }
+        match self.0.len().saturating_sub(MOST) {
+            0 => Ok(()),
+            more => write!(f, "\n  and {more} more"),
+        }
     }
 }
 
@@ -82,111 +101,164 @@ impl fmt::Display for Mistake {
         if let Some(line) = self.line {
             write!(f, "line {line}: ")?;
         }
-        if !self.key.is_empty() {
-            write!(f, "{}: ", self.key)?;
+        match self.invalid.key.is_empty() {
+            true => f.write_str(&self.invalid.cause),
+            false => self.invalid.fmt(f),
         }
-        f.write_str(&self.cause)
     }
 }
 
 struct Reader<'a> {
     text: &'a str,
-    root: Spanned<DeTable<'a>>,
-    /// The keys that were missing, and the stand-in of each, as an index.
-    stand_ins: Vec<(String, usize)>,
-    found: Vec<Mistake>,
+    /// The path and the place in the text of each value. The span of value i begins at i, as tables
+    /// may share a heading.
+    nodes: Vec<(String, Range<usize>)>,
+    read: &'a dyn Fn(Spanned<DeTable<'a>>) -> Option<Error>,
+    /// The tables, each with the key, and the lists above the value that is read.
+    above: Vec<(Range<usize>, Option<Spanned<DeString<'a>>>)>,
+    found: Vec<InvalidValue>,
 }
 
-impl Reader<'_> {
-    /// Notes what serde found, and mends it. Returns whether to read again.
-    fn mend(&mut self, error: &Error) -> bool {
-        let span = error.span().unwrap_or_default();
-        let at = path_in_table(self.root.get_ref(), &span).unwrap_or_default();
-        let message = error.message();
-        if let Some(field) = message.strip_prefix("missing field `") {
-            let field = field.trim_end_matches('`');
-            let key = if at.is_empty() { field.to_owned() } else { format!("{at}.{field}") };
-            self.note(&key, "expected a value, found none".to_owned());
-            self.stand_ins.push((key.clone(), 0));
-            return self.insert(&key, stand_in(0));
-        }
-        if let Some((key, nth)) = self.stand_ins.iter_mut().rfind(|(key, _)| is_within(&at, key)) {
-            *nth += 1;
-            let (key, nth) = (key.clone(), *nth);
-            let is_variant = message.starts_with("unknown variant") && nth < STAND_INS.len();
-            let variant = message.split('`').nth(3).filter(|_| is_variant);
-            let named = variant.map(|name| DeValue::String(name.to_owned().into()));
-            return self.insert(&key, named.or_else(|| stand_in(nth)));
-        }
-        let last = at.rsplit('.').next().unwrap_or_default();
-        let invalid = match message.split_once(": ") {
-            // From a check within serde, such as `effects.noise.sigma_m: expected ...`.
-            Some((key, cause)) if !last.is_empty() && is_within(key, last) => {
-                InvalidValue::new(format!("{at}{}", &key[last.len()..]), cause)
-            }
-            _ => InvalidValue::new(at, self.cause(message, span)),
+impl<'a> Reader<'a> {
+    /// Notes what is wrong within `value`, and returns whether nothing is.
+    fn probe(&mut self, value: &Spanned<DeValue<'a>>) -> bool {
+        let id = value.span().start;
+        let Some(invalid) =
+            self.read_apart(value.clone()).and_then(|error| self.within(id, &error))
+        else {
+            return true;
         };
-        self.refuse(vec![invalid])
+        let known = self.found.len();
+        match value.get_ref() {
+            DeValue::Array(items) => {
+                for item in items {
+                    self.probe_below(value.span(), None, item);
+                }
+            }
+            DeValue::Table(table) => {
+                let mut sound = table.clone();
+                for (key, below) in table {
+                    if !self.probe_below(value.span(), Some(key.clone()), below) {
+                        sound.remove(key.get_ref().as_ref());
+                    }
+                }
+                self.note_missing(value.span(), table, sound, known);
+            }
+            _ => {}
+        }
+        if self.found.len() == known {
+            self.found.push(invalid);
+        }
+        false
     }
 
-    /// Notes unfit values, and removes those that are new. Returns whether to read again.
-    fn refuse(&mut self, mut all: Vec<InvalidValue>) -> bool {
-        all.retain(|invalid| self.note(&invalid.key, invalid.cause.clone()));
-        for InvalidValue { key, .. } in &all {
-            let (above, last) = key.rsplit_once('.').unwrap_or(("", key));
-            // A list is removed whole, so that the numbers of its items stay; one of tables is kept.
-            let name = last.split('[').next().unwrap_or_default();
-            let is_tables = |value: &Spanned<DeValue>| {
-                value.get_ref().get(0).is_some_and(|item| item.get_ref().is_table())
+    fn probe_below(
+        &mut self,
+        span: Range<usize>,
+        key: Option<Spanned<DeString<'a>>>,
+        below: &Spanned<DeValue<'a>>,
+    ) -> bool {
+        self.above.push((span, key));
+        let is_sound = self.probe(below);
+        self.above.pop();
+        is_sound
+    }
+
+    /// Reads a file that holds only this `value`.
+    fn read_apart(&self, mut value: Spanned<DeValue<'a>>) -> Option<Error> {
+        for (span, key) in self.above.iter().rev() {
+            let outer = match key {
+                Some(key) => {
+                    let mut table = DeTable::new();
+                    table.insert(key.clone(), value);
+                    DeValue::Table(table)
+                }
+                None => DeValue::Array(std::iter::once(value).collect()),
             };
-            if let Some(table) = table_mut(self.root.get_mut(), above)
-                && !table.get(name).is_some_and(is_tables)
-            {
-                table.remove(name);
+            value = Spanned::new(span.clone(), outer);
+        }
+        let span = value.span();
+        let DeValue::Table(root) = value.into_inner() else { return None };
+        (self.read)(Spanned::new(span, root))
+    }
+
+    /// What is wrong, if it is within value `id`, which was read apart.
+    fn within(&self, id: usize, error: &Error) -> Option<InvalidValue> {
+        let of = &self.nodes[id].0;
+        let (path, place) = self.nodes.get(error.span().map_or(0, |span| span.start))?;
+        let is_inside = of.is_empty() || is_within(path, of);
+        // From a check within serde, such as `effects.noise.sigma_m: expected ...`.
+        let last = path.rsplit('.').next().unwrap_or_default();
+        if !last.is_empty()
+            && let Some((key, cause)) = error.message().split_once(": ")
+            && is_within(key, last)
+        {
+            if is_inside {
+                return Some(InvalidValue::new(format!("{path}{}", &key[last.len()..]), cause));
             }
+            // A list that holds only one item numbers it 0.
+            let first = |path: &str| {
+                let zero = |(i, step): (usize, &str)| match step.split_once(']') {
+                    Some((_, rest)) if i > 0 => format!("[0]{rest}"),
+                    _ => step.to_owned(),
+                };
+                path.split('[').enumerate().map(zero).collect::<String>()
+            };
+            let (key, of_first) = (format!("{}{}", first(path), &key[last.len()..]), first(of));
+            return is_within(&key, &of_first)
+                .then(|| InvalidValue::new(format!("{of}{}", &key[of_first.len()..]), cause));
         }
-        !all.is_empty()
+        is_inside.then(|| match missing(error) {
+            Some(field) => missing_in(path, field),
+            None => InvalidValue::new(path, self.cause(error.message(), place)),
+        })
     }
 
-    /// Notes a mistake, and returns whether it is new: its key was not known to be wrong.
-    fn note(&mut self, key: &str, cause: String) -> bool {
-        if self.found.iter().any(|known| is_within(key, &known.key)) {
-            return false;
+    /// Notes the keys that a `table` lacks, of which the `sound` part can be read.
+    fn note_missing(
+        &mut self,
+        span: Range<usize>,
+        table: &DeTable<'a>,
+        mut sound: DeTable<'a>,
+        known: usize,
+    ) {
+        let behind = self.nodes.len();
+        let path = self.nodes[span.start].0.clone();
+        let mut last = (String::new(), 0);
+        while let Some(error) =
+            self.read_apart(Spanned::new(span.clone(), DeValue::Table(sound.clone())))
+        {
+            let at = error.span().map_or(0, |span| span.start);
+            let mut named = None;
+            match missing(&error) {
+                Some(field) if at == span.start && !sound.contains_key(field) => {
+                    let meant = format!("did you mean \"{field}\"?");
+                    let is_meant = self.found[known..].iter().any(|it| it.cause.contains(&meant));
+                    if !is_meant && !table.contains_key(field) {
+                        self.found.push(missing_in(&path, field));
+                    }
+                    last = (field.to_owned(), 0);
+                }
+                _ if at == behind => {
+                    last.1 += 1;
+                    let is_variant = error.message().starts_with("unknown variant");
+                    named = error.message().split('`').nth(3).filter(|_| is_variant);
+                }
+                _ => break,
+            }
+            let Some(text) = STAND_INS.get(last.1) else { break };
+            let value = match named {
+                Some(name) => DeValue::String(name.to_owned().into()),
+                None => DeValue::parse(text).expect("invariant: stand-ins are TOML").into_inner(),
+            };
+            let span = behind..behind + 1;
+            sound.remove(last.0.as_str());
+            sound.insert(Spanned::new(span.clone(), last.0.clone().into()), placed(value, &span));
         }
-        let is_about = |key: &str| {
-            let part = |c: char| c.is_alphanumeric() || "_.[]".contains(c);
-            cause.split(|c| !part(c)).any(|word| word == key)
-        };
-        let table = |key: &str| key.rsplit_once('.').map_or(String::new(), |(it, _)| it.to_owned());
-        let follows = |known: &Mistake| {
-            let beside = table(&known.key);
-            let meant = known.cause.split("did you mean \"").nth(1);
-            let meant = meant.and_then(|rest| rest.split('"').next()).filter(|_| {
-                // About the table that lacks the key that was meant, or about that key.
-                beside == key || beside == table(key)
-            });
-            let is_meant = |word| is_about(word) || key.rsplit('.').next() == Some(word);
-            !known.key.is_empty() && is_about(&known.key) || meant.is_some_and(is_meant)
-        };
-        let follows = cause.contains(ODD) || self.found.iter().any(follows);
-        let line = nearest(self.root.get_ref(), key).map(|span| self.line(&span));
-        self.found.push(Mistake { line, key: key.to_owned(), cause, follows });
-        true
-    }
-
-    fn insert(&mut self, key: &str, value: Option<DeValue<'static>>) -> bool {
-        // Behind the text, where nothing else is.
-        let place = self.text.len() + self.found.len() + self.stand_ins.len();
-        let (above, name) = key.rsplit_once('.').unwrap_or(("", key));
-        let table = table_mut(self.root.get_mut(), above);
-        let (Some(value), Some(table)) = (value, table) else { return false };
-        let span = place..place + 1;
-        table.insert(Spanned::new(span.clone(), name.to_owned().into()), placed(value, &span));
-        true
     }
 
     /// Serde's `message` in words that those who write TOML know.
-    fn cause(&self, message: &str, span: Range<usize>) -> String {
+    fn cause(&self, message: &str, place: &Range<usize>) -> String {
         let mut words = message.split('`').skip(1).step_by(2);
         if message.starts_with("unknown field") || message.starts_with("unknown variant") {
             let word = words.next().unwrap_or_default();
@@ -201,18 +273,17 @@ impl Reader<'_> {
         if message.contains(", found ") {
             return message.to_owned();
         }
-        let found = self.text.get(span).unwrap_or_default();
-        let found = found.lines().next().unwrap_or("nothing");
+        let found = self.text.get(place.clone()).unwrap_or_default();
+        let found: Vec<&str> = found.split_whitespace().collect();
+        let mut found = found.join(" ");
+        if let Some((at, _)) = found.char_indices().nth(MOST_CHARS) {
+            found.replace_range(at.., "...");
+        }
         let expected = match message.split_once(", expected ") {
             Some((_, expected)) => format!("expected {}", in_toml(expected)),
             None => message.to_owned(),
         };
         format!("{expected}, found {found}")
-    }
-
-    /// The line of a place in the text, from 1.
-    fn line(&self, span: &Range<usize>) -> usize {
-        1 + self.text[..span.start.min(self.text.len())].matches('\n').count()
     }
 }
 
@@ -233,9 +304,44 @@ fn in_toml(expected: &str) -> String {
     format!("a whole number within {least}..={most}")
 }
 
-fn stand_in(nth: usize) -> Option<DeValue<'static>> {
-    let value = STAND_INS.get(nth).map(|text| DeValue::parse(text));
-    value.map(|value| value.expect("invariant: stand-ins are TOML").into_inner())
+/// The field that `error` says is missing.
+fn missing(error: &Error) -> Option<&str> {
+    Some(error.message().strip_prefix("missing field `")?.trim_end_matches('`'))
+}
+
+fn missing_in(table: &str, field: &str) -> InvalidValue {
+    let key = if table.is_empty() { field.to_owned() } else { format!("{table}.{field}") };
+    InvalidValue::new(key, "expected a value, found none")
+}
+
+/// The `value`, with its number among `nodes` as its span and its key's.
+fn numbered<'a>(
+    value: Spanned<DeValue<'a>>,
+    path: String,
+    nodes: &mut Vec<(String, Range<usize>)>,
+) -> Spanned<DeValue<'a>> {
+    let span = nodes.len()..nodes.len() + 1;
+    nodes.push((path.clone(), value.span()));
+    let value = match value.into_inner() {
+        DeValue::Array(items) => {
+            let items = items.into_iter().enumerate();
+            DeValue::Array(
+                items.map(|(i, item)| numbered(item, format!("{path}[{i}]"), nodes)).collect(),
+            )
+        }
+        DeValue::Table(table) => {
+            let mut all = DeTable::new();
+            for (key, below) in table {
+                let key = key.into_inner();
+                let dot = if path.is_empty() { "" } else { "." };
+                let below = numbered(below, format!("{path}{dot}{key}"), nodes);
+                all.insert(Spanned::new(below.span(), key), below);
+            }
+            DeValue::Table(all)
+        }
+        other => other,
+    };
+    Spanned::new(span, value)
 }
 
 /// The `value` and its items, as if they were at `span`.
@@ -254,35 +360,9 @@ fn is_within(key: &str, of: &str) -> bool {
     key.strip_prefix(of).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
 }
 
-/// The path of what is at `span`, such as `rotating.beam[3]`: the innermost of several.
-fn path_in_table(table: &DeTable, span: &Range<usize>) -> Option<String> {
-    table.iter().find_map(|(key, value)| {
-        let below = path_below(value, span);
-        let below = below.or_else(|| (key.span() == *span).then(String::new));
-        below.map(|below| format!("{}{below}", key.get_ref()))
-    })
-}
-
-fn path_below(value: &Spanned<DeValue>, span: &Range<usize>) -> Option<String> {
-    let below = match value.get_ref() {
-        DeValue::Table(table) => path_in_table(table, span).map(|path| format!(".{path}")),
-        DeValue::Array(items) => items
-            .iter()
-            .enumerate()
-            .find_map(|(i, item)| path_below(item, span).map(|path| format!("[{i}]{path}"))),
-        _ => None,
-    };
-    below.or_else(|| (value.span() == *span).then(String::new))
-}
-
-/// The steps of a path: `rotating`, `beam`, `3`.
-fn steps(path: &str) -> impl Iterator<Item = &str> {
-    path.split(['.', '[']).map(|step| step.trim_end_matches(']'))
-}
-
 /// The place of the value at `path`, or of the nearest one above it.
 fn nearest(root: &DeTable, path: &str) -> Option<Range<usize>> {
-    let mut steps = steps(path);
+    let mut steps = path.split(['.', '[']).map(|step| step.trim_end_matches(']'));
     let mut value = root.get(steps.next()?)?;
     for step in steps {
         let below = match step.parse::<usize>() {
@@ -293,23 +373,4 @@ fn nearest(root: &DeTable, path: &str) -> Option<Range<usize>> {
         value = below;
     }
     Some(value.span())
-}
-
-fn table_mut<'t, 'a>(root: &'t mut DeTable<'a>, path: &str) -> Option<&'t mut DeTable<'a>> {
-    if path.is_empty() {
-        return Some(root);
-    }
-    let mut steps = steps(path);
-    let mut value = root.get_mut(steps.next()?)?.get_mut();
-    for step in steps {
-        value = match value {
-            DeValue::Array(items) => items.get_mut(step.parse::<usize>().ok()?)?.get_mut(),
-            DeValue::Table(table) => table.get_mut(step)?.get_mut(),
-            _ => return None,
-        };
-    }
-    match value {
-        DeValue::Table(table) => Some(table),
-        _ => None,
-    }
 }

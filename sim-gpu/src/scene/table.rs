@@ -1,13 +1,16 @@
 //! A scene as TOML holds it, and its checks.
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use formats::scan::{Attribute, AttributeSet};
 use glam::{DQuat, DVec3};
-use serde::Deserialize;
+use serde::de::value::SeqAccessDeserializer;
+use serde::de::{SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer};
 
 use super::{SceneObject, SceneSensor};
 use crate::config::{self, InvalidValue, one_of, positive, within};
@@ -58,7 +61,7 @@ pub(super) struct ObjectTable {
     roll_deg: Option<f64>,
     quaternion_xyzw: Option<[f64; 4]>,
     /// The poses over time of the frame of the pose above.
-    trajectory: Option<toml::Value>,
+    trajectory: Option<Motion>,
     scale: Option<Scale>,
     reflectivity: Option<f64>,
     /// The quality as a retro-reflector, such as a road sign: up to 1, which is ideal.
@@ -86,7 +89,7 @@ pub(super) struct SensorTable {
     roll_deg: Option<f64>,
     quaternion_xyzw: Option<[f64; 4]>,
     /// The poses over time, instead of the keys above.
-    trajectory: Option<toml::Value>,
+    trajectory: Option<Motion>,
     /// The revolutions of the scan; by default those of the profile.
     revolutions: Option<NonZeroU32>,
     #[serde(default)]
@@ -112,35 +115,56 @@ struct TimedPose {
     quaternion_xyzw: Option<[f64; 4]>,
 }
 
+/// A trajectory: its file, or its poses.
+enum Motion {
+    File(String),
+    Poses(Vec<TimedPose>),
+}
+
+impl<'de> Deserialize<'de> for Motion {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        struct Either;
+        impl<'de> Visitor<'de> for Either {
+            type Value = Motion;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a file's name or a list of poses")
+            }
+
+            fn visit_str<E>(self, file: &str) -> Result<Motion, E> {
+                Ok(Motion::File(file.to_owned()))
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, poses: A) -> Result<Motion, A::Error> {
+                Vec::deserialize(SeqAccessDeserializer::new(poses)).map(Motion::Poses)
+            }
+        }
+        from.deserialize_any(Either)
+    }
+}
+
 fn trajectory(
     key: String,
     folder: &Path,
-    table: Option<toml::Value>,
-) -> Result<Option<Arc<Trajectory>>, InvalidValue> {
+    motion: Option<Motion>,
+) -> Result<Option<Arc<Trajectory>>, Vec<InvalidValue>> {
     let wrong = |cause: String| InvalidValue::new(key.clone(), cause);
-    let found = match table {
+    let found = match motion {
         None => return Ok(None),
-        Some(toml::Value::String(file)) => Trajectory::load(&folder.join(file), PERIOD_S)
+        Some(Motion::File(file)) => Trajectory::load(&folder.join(file), PERIOD_S)
             .map_err(|error| wrong(error.to_string()))?,
-        Some(toml::Value::Array(poses)) => {
-            let timed = |(i, pose): (usize, toml::Value)| {
+        Some(Motion::Poses(poses)) => {
+            let timed = |(i, pose): (usize, TimedPose)| {
                 let key = format!("{key}[{i}]");
-                let pose: TimedPose = pose.try_into().map_err(|error: toml::de::Error| {
-                    InvalidValue::new(&key, error.message().to_owned())
-                })?;
                 let keys = pose.keys();
                 let at = match (keys.look_at_m, keys.rotation(&key)?) {
                     (None, None) => Pose::at(keys.position_m(&key)?),
                     _ => keys.pose(&key)?,
                 };
-                Ok((pose.time_s, at))
+                Ok::<_, InvalidValue>((pose.time_s, at))
             };
-            let poses: Result<_, InvalidValue> = poses.into_iter().enumerate().map(timed).collect();
-            Trajectory::new(poses?).map_err(|invalid| wrong(invalid.to_string()))?
-        }
-        Some(other) => {
-            let found = other.type_str();
-            return Err(wrong(format!("expected a file's name or a list of poses, found {found}")));
+            let poses = config::all(poses.into_iter().enumerate().map(timed))?;
+            Trajectory::new(poses).map_err(|invalid| wrong(invalid.to_string()))?
         }
     };
     Ok(Some(Arc::new(found)))
@@ -238,18 +262,18 @@ enum OwnSimplify {
 }
 
 impl ObjectTable {
-    pub fn validate(self, index: usize, folder: &Path) -> Result<SceneObject, InvalidValue> {
+    pub fn validate(self, index: usize, folder: &Path) -> Result<SceneObject, Vec<InvalidValue>> {
         let table = format!("object[{index}]");
         let key = |field: &str| format!("{table}.{field}");
         let Some(stem) = self.mesh.file_stem() else {
-            return Err(InvalidValue::new(key("mesh"), "expected the path of a file"));
+            return Err(InvalidValue::new(key("mesh"), "expected the path of a file").into());
         };
         let scale = match self.scale.unwrap_or(Scale::Uniform(1.0)) {
             Scale::Uniform(factor) => [factor; 3],
             Scale::PerAxis(factors) => factors,
         };
         let reflectivity = self.reflectivity.unwrap_or(1.0);
-        check_object(key, scale, reflectivity, self.retroreflection)?;
+        let numbers = check_object(key, scale, reflectivity, self.retroreflection);
         let keys = PoseKeys {
             position_m: self.position_m,
             look_at_m: None,
@@ -258,6 +282,9 @@ impl ObjectTable {
             roll_deg: self.roll_deg,
             quaternion_xyzw: self.quaternion_xyzw,
         };
+        let [position, rotation] =
+            [keys.position_m(&table).map(drop), keys.rotation(&table).map(drop)];
+        config::all([numbers, position, rotation])?;
         let simplify = match self.simplify {
             None => None,
             Some(OwnSimplify::Within(simplify)) => Some(Some(simplify)),
@@ -266,7 +293,8 @@ impl ObjectTable {
                 return Err(InvalidValue::new(
                     key("simplify"),
                     "expected \"auto\", metres or false, found true",
-                ));
+                )
+                .into());
             }
         };
         let own = self.materials.into_iter().map(|(name, material)| {
@@ -300,15 +328,20 @@ impl SensorTable {
         index: usize,
         folder: &Path,
         effects: &Effects,
-    ) -> Result<SceneSensor, InvalidValue> {
+    ) -> Result<SceneSensor, Vec<InvalidValue>> {
         let table = format!("sensor[{index}]");
         let key = |field: &str| format!("{table}.{field}");
-        let sensor = SensorProfile::resolve_in(folder, &self.profile)
-            .map_err(|error| InvalidValue::new(key("profile"), error.to_string()))?;
-        let name = named(&table, self.name.unwrap_or_else(|| sensor.name.clone()))?;
-        effects.for_sensor(&sensor).map_err(|InvalidValue { key, cause }| {
-            InvalidValue::new(key, format!("{cause}: {table}, \"{name}\""))
+        let sensor = SensorProfile::resolve_in(folder, &self.profile).map_err(|error| {
+            InvalidValue::new(key("profile"), error.to_string().replace('\n', "\n  "))
         })?;
+        let name = named(&table, self.name.unwrap_or_else(|| sensor.name.clone()))?;
+        let rounded = Effects { quantum: effects.quantum, ..Effects::default() };
+        let others = Effects { quantum: None, ..effects.clone() };
+        config::all([others, rounded].map(|effects| {
+            effects.for_sensor(&sensor).map_err(|InvalidValue { key, cause }| {
+                InvalidValue::new(key, format!("{cause}: {table}, \"{name}\""))
+            })
+        }))?;
         let sensor = match self.revolutions {
             None => sensor,
             Some(revolutions) => sensor
@@ -321,7 +354,7 @@ impl SensorTable {
         if let Some(motion) = motion {
             if self.position_m.is_some() {
                 let cause = "cannot stand beside position_m: the trajectory has the poses";
-                return Err(InvalidValue::new(key("trajectory"), cause));
+                return Err(InvalidValue::new(key("trajectory"), cause).into());
             }
             let last_s = sensor.pattern().last_s();
             check_motion(&key("trajectory"), &sensor, &motion, [start_s, start_s + last_s])?;
@@ -330,7 +363,7 @@ impl SensorTable {
         }
         let Some(position_m) = self.position_m else {
             let cause = "expected position_m or trajectory, found neither";
-            return Err(InvalidValue::new(table, cause));
+            return Err(InvalidValue::new(table, cause).into());
         };
         let keys = PoseKeys {
             position_m,

@@ -13,7 +13,7 @@ const FARTHEST_M: f64 = 524.0;
 
 /// Reads the metadata in `file`. The sensor's frame is Ouster's lidar frame.
 pub(super) fn load(file: &Path) -> Result<SensorProfile, ConfigError> {
-    let metadata = Metadata::read_beams(file).map_err(|error| ConfigError::Syntax {
+    let metadata = Metadata::read_beams(file).map_err(|error| ConfigError::Content {
         file: file.to_owned(),
         message: error.to_string(),
     })?;

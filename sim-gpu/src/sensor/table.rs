@@ -126,7 +126,7 @@ impl Table {
 fn read(file: &Path) -> Result<Vec<[f64; 2]>, ConfigError> {
     let failed = |line: u64, cause: String| {
         let message = if line > 0 { format!("line {line}: {cause}") } else { cause };
-        ConfigError::Syntax { file: file.to_owned(), message }
+        ConfigError::Content { file: file.to_owned(), message }
     };
     let opened = std::fs::File::open(file)
         .map_err(|source| ConfigError::Read { file: file.to_owned(), source })?;

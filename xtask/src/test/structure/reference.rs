@@ -291,7 +291,13 @@ impl Code {
             let default = self.absent(file, field);
             *page += &format!("| `{key}` | {value} | {default} | {meaning} |\n");
             let key = if path.is_empty() { key } else { format!("{path}.{key}") };
-            let key = if kind == "list: table" { format!("[[{key}]]") } else { format!("[{key}]") };
+            let key = match kind.split_once(": ") {
+                // A section of its own has the poses, which two tables share.
+                _ if kind.ends_with("`trajectory`") => continue,
+                Some(("list", "table")) => format!("[[{key}]]"),
+                Some(("table", _)) => format!("[{key}.NAME]"),
+                _ => format!("[{key}]"),
+            };
             below.push((key, file.to_owned(), inner(&field.ty)));
         }
         below
@@ -336,7 +342,7 @@ impl Code {
             "String" | "PathBuf" => "text",
             "u16" | "u32" | "u64" => "whole number",
             "NonZeroU32" => "whole number, at least 1",
-            "toml::Value" => "text or list: `trajectory`",
+            "Motion" => "text or list: `trajectory`",
             _ => "",
         };
         match self.find(file, &name) {
@@ -357,6 +363,8 @@ impl Code {
         let name = words(&field.ty);
         match serde(&field.attrs, "default") {
             _ if name.starts_with("Option<") => "optional".to_owned(),
+            // Its check wants one: an empty list has a better message than serde's.
+            _ if docs(&field.attrs).contains("at least one") => "required".to_owned(),
             None => "required".to_owned(),
             Some(Some(function)) => {
                 let body = self.functions.get(&function).map_or("", String::as_str);
