@@ -31,7 +31,7 @@ pub struct PlaceArgs {
     #[command(flatten)]
     points: PointsArgs,
 
-    /// Position of the sensor in the sweep, in metres [default: 0 0 0]
+    /// Position of the sensor in the sweep, in metres [default: that of the scan's file, or 0 0 0]
     #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true)]
     sensor: Option<Vec<f64>>,
 }
@@ -93,7 +93,7 @@ impl SweepArgs {
     pub fn read(&self) -> Result<Scan, FormatError> {
         let scan = self.read_whole()?;
         let positions = self.relative(&scan).map(|point| point.map(|x| x as f32)).collect();
-        Ok(Scan { origin: [0.0; 3], positions, ..scan })
+        Ok(Scan { origin: [0.0; 3], pose: None, positions, ..scan })
     }
 
     /// The sweep as in its file.
@@ -104,15 +104,15 @@ impl SweepArgs {
         Ok(scan)
     }
 
-    /// The position of the sensor, metres.
-    pub fn sensor_m(&self) -> [f64; 3] {
+    /// The position of the sensor of `scan`, metres.
+    pub fn sensor_m(&self, scan: &Scan) -> [f64; 3] {
         let given = self.place.sensor.as_deref().and_then(|xyz| <[f64; 3]>::try_from(xyz).ok());
-        given.unwrap_or_default()
+        given.unwrap_or_else(|| scan.sensor_position_m())
     }
 
     /// The points from the sensor, metres.
     fn relative<'a>(&self, scan: &'a Scan) -> impl Iterator<Item = [f64; 3]> + use<'a> {
-        let (sensor, origin) = (self.sensor_m(), scan.origin);
+        let (sensor, origin) = (self.sensor_m(scan), scan.origin);
         scan.positions.iter().map(move |point| {
             [0, 1, 2].map(|axis| f64::from(point[axis]) + origin[axis] - sensor[axis])
         })

@@ -100,6 +100,6 @@ fn write_ply(file: &Path, points: &[[f32; 3]], tints: &[RGBColor]) -> Result<(),
         (vec!["green"], Column::U8(&green)),
         (vec!["blue"], Column::U8(&blue)),
     ];
-    let header = rows::ply_header([0.0; 3], &columns);
+    let header = rows::ply_header([0.0; 3], None, &columns);
     rows::write(file, Hashing::None, &header, &columns).map(|_| ())
 }

@@ -86,7 +86,7 @@ pub fn run(args: &WeatherArgs) -> anyhow::Result<Outcome> {
     let brightness = args.brightness.brightness_of(&scan, &args.input.sweep)?;
     let air = Air::new(&weather, sensor.beam_divergence_deg(), &limit, &sensor.range);
     let stream = StreamKey::new(args.seed, "weather", 0);
-    let sensor_m = DVec3::from_array(args.input.sensor_m());
+    let sensor_m = DVec3::from_array(args.input.sensor_m(&scan));
     let (mut changed, fates) = in_weather(&scan, &brightness, sensor_m, &air, &limit, stream);
     args.brightness.restore(&mut changed);
     write_scan(&args.out, format, Hashing::None, &changed)?;

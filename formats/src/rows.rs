@@ -48,13 +48,16 @@ pub fn write(
     })
 }
 
-/// The header of PLY, with an origin other than 0 as a comment.
+/// The header of PLY, with an origin other than 0 and a sensor's pose as comments.
 #[must_use]
-pub fn ply_header(origin: [f64; 3], columns: &Columns<'_>) -> String {
+pub fn ply_header(origin: [f64; 3], pose: Option<[f64; 16]>, columns: &Columns<'_>) -> String {
     let mut header = "ply\nformat binary_little_endian 1.0\n".to_owned();
     if origin != [0.0; 3] {
         let [x, y, z] = origin;
         header += &format!("comment origin {x} {y} {z}\n");
+    }
+    if let Some(pose) = pose {
+        header += &format!("comment pose {}\n", pose.map(|x| x.to_string()).join(" "));
     }
     header += &format!("element vertex {}\n", n_points(columns));
     for (names, column) in columns {

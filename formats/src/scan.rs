@@ -15,6 +15,9 @@ pub struct Scan {
     pub origin: [f64; 3],
     /// The end points of the beams in the world's frame, metres from `origin`.
     pub positions: Vec<[f32; 3]>,
+    /// The transform from the sensor's frame to the world's when the scan began, a matrix of 4 by 4
+    /// row by row, metres; `None` if it is the identity or not known.
+    pub pose: Option<[f64; 16]>,
     /// Distance from the start of the beam, which is at the sensor or near it, metres.
     pub range_m: Option<Vec<f32>>,
     /// Number of the beam in the sensor's firing order.
@@ -130,6 +133,15 @@ pub enum ColumnSlot<'a> {
     Vector(&'a mut Option<Vec<[f32; 3]>>),
 }
 
+/// What [`pose_of`] takes.
+pub(crate) const POSE: &str = "expected the 16 numbers of a matrix whose last row is 0, 0, 0, 1";
+
+/// The pose of these numbers, row by row.
+pub(crate) fn pose_of(numbers: &[f64]) -> Option<[f64; 16]> {
+    let is_pose = numbers.iter().all(|x| x.is_finite()) && numbers.ends_with(&[0.0, 0.0, 0.0, 1.0]);
+    numbers.try_into().ok().filter(|_| is_pose)
+}
+
 /// Beyond this, f32 resolves less than half a millimetre.
 const FARTHEST_SINGLE_M: f64 = 8192.0;
 
@@ -145,6 +157,12 @@ impl Scan {
         };
         let place = |point: &[f64; 3]| [0, 1, 2].map(|axis| (point[axis] - origin[axis]) as f32);
         Self { origin, positions: points.iter().map(place).collect(), ..Self::default() }
+    }
+
+    /// The position of the sensor when the scan began, metres, in the world.
+    #[must_use]
+    pub fn sensor_position_m(&self) -> [f64; 3] {
+        self.pose.map_or([0.0; 3], |pose| [pose[3], pose[7], pose[11]])
     }
 
     /// The number of points.
@@ -169,7 +187,8 @@ impl Scan {
             numbers.iter().map(|&i| values[i]).collect()
         }
         let positions = picked(&self.positions, numbers);
-        let mut selected = Self { origin: self.origin, positions, ..Self::default() };
+        let mut selected =
+            Self { origin: self.origin, pose: self.pose, positions, ..Self::default() };
         for (attribute, column) in self.columns() {
             match (selected.slot(attribute), column) {
                 (ColumnSlot::F32(slot), Column::F32(all)) => *slot = Some(picked(all, numbers)),

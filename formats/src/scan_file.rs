@@ -10,10 +10,11 @@
 //! | `reflectivity`, `return`, `medium` | u8 | `[n, 1]` |
 //! | `sensor`, `attitude`, `normal` | f32 | `[n, 3]` |
 //! | `origin`, only if it is not 0 | f64 | `[3]` |
+//! | `pose` of the sensor, only if it is not the identity | f64 | `[4, 4]` |
 //!
 //! Attributes are columns, not vectors: Open3D 0.20 loads either, but voxel
-//! down-sampling and PLY writing fail on a vector. It keeps `origin` as an
-//! attribute too; delete it there before joining or thinning clouds.
+//! down-sampling and PLY writing fail on a vector. It keeps `origin` and `pose`
+//! as attributes too; delete them there before joining or thinning clouds.
 
 use std::io::{self, Seek, Write};
 use std::path::Path;
@@ -24,7 +25,7 @@ use crate::archive::{NpzReader, NpzWriter, Values, write_archive};
 use crate::error::FormatError;
 use crate::hash::{FileHash, Hashing};
 use crate::number::Number;
-use crate::scan::{Attribute, Column, ColumnSlot, Scan};
+use crate::scan::{Attribute, Column, ColumnSlot, POSE, Scan, pose_of};
 use crate::{csv, ply};
 
 crate::named! {
@@ -112,6 +113,9 @@ pub(crate) fn write_npz<W: Write + Seek>(npz: &mut NpzWriter<W>, scan: &Scan) ->
     if scan.origin != [0.0; 3] {
         npz.array("origin", &[3], scan.origin.into_iter())?;
     }
+    if let Some(pose) = scan.pose {
+        npz.array("pose", &[4, 4], pose.into_iter())?;
+    }
     Ok(())
 }
 
@@ -134,6 +138,11 @@ fn read_npz(path: &Path) -> Result<Scan, FormatError> {
         let origin = npz.array::<f64>("origin")?.elements;
         scan.origin =
             origin.try_into().map_err(|_| npz.error("origin", "expected three numbers"))?;
+    }
+    if npz.has("pose") {
+        let pose = npz.array::<f64>("pose")?;
+        let pose = pose_of(&pose.elements).filter(|_| pose.shape == [4, 4]);
+        scan.pose = Some(pose.ok_or_else(|| npz.error("pose", POSE))?);
     }
     for attribute in Attribute::ALL {
         let key = attribute.name();

@@ -12,6 +12,7 @@ pub fn scan(n: usize, origin: [f64; 3]) -> Scan {
     let whole = |first: u32| Some((0..n as u32).map(|i| first + i).collect());
     Scan {
         origin,
+        pose: None,
         positions: (0..n).map(|i| [i as f32 * 0.1, -1e-30, f32::MAX]).collect(),
         range_m: real(1.1),
         beam: whole(7),

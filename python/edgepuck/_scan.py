@@ -123,7 +123,11 @@ class Scan:
         """
         names = {name: column for column, name in _NAMES.items()}
         columns = {names.get(field.name, field.name): getattr(self, field.name) for field in fields(self)}
-        left_out = {"pose", "sensor"} if self._is_at_rest else {"pose"}
+        left_out = {"sensor"} if self._is_at_rest else set()
+        if np.array_equal(columns["pose"], np.eye(4)):
+            left_out.add("pose")
+        else:
+            columns["pose"] = np.ravel(columns["pose"]).astype(float)
         known = {
             name: np.ascontiguousarray(of)
             for name, of in columns.items()

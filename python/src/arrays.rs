@@ -6,12 +6,10 @@ use formats::Scan;
 use formats::hash::Hashing;
 use formats::scan::{Attribute, ColumnSlot};
 use formats::scan_file::{ScanFormat, write_scan};
-use glam::DMat4;
 use numpy::ndarray::Array2;
 use numpy::{Element, IntoPyArray, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use sim_gpu::Pose;
 use std::path::PathBuf;
 
 /// `[n, 3]`.
@@ -28,16 +26,11 @@ pub fn points(array: &PyReadonlyArray2<'_, f32>) -> PyResult<Vec<[f32; 3]>> {
     Ok(array.as_array().rows().into_iter().map(|row| [row[0], row[1], row[2]]).collect())
 }
 
-/// From the sensor's frame to the world's, row by row.
-pub fn matrix(pose: &Pose) -> Vec<f64> {
-    let world_from_sensor = DMat4::from_rotation_translation(pose.rotation, pose.position_m);
-    world_from_sensor.transpose().to_cols_array().to_vec()
-}
-
 /// The columns of `scan` by their names in files.
 pub fn scan(py: Python<'_>, mut scan: Scan) -> PyResult<Bound<'_, PyDict>> {
     let columns = PyDict::new(py);
     columns.set_item("origin", scan.origin)?;
+    columns.set_item("pose", scan.pose.as_ref())?;
     columns.set_item("positions", vectors(py, std::mem::take(&mut scan.positions))?)?;
     for attribute in Attribute::ALL {
         let column = match scan.slot(attribute) {
@@ -78,6 +71,7 @@ pub fn scan_of(columns: &Bound<'_, PyDict>) -> PyResult<Scan> {
         let name: String = name.extract()?;
         match name.as_str() {
             "origin" => scan.origin = column.extract()?,
+            "pose" => scan.pose = Some(column.extract()?),
             "positions" => scan.positions = points(&column.extract()?)?,
             name => match scan.slot(name.parse().map_err(raised)?) {
                 ColumnSlot::F32(slot) => *slot = Some(list(&column)?),

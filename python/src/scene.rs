@@ -106,20 +106,17 @@ impl Scene {
         scene.seed = seed.unwrap_or(scene.seed);
         sensor.sensor.rays(&scene.effects).map_err(raised)?;
         let scan = process::run(py, || scene.scan(&sensor.sensor, pose).with(&caster).run())?;
-        let columns = arrays::scan(py, scan.map_err(raised)?.points)?;
-        columns.set_item("pose", arrays::matrix(&pose))?;
-        Ok(columns)
+        arrays::scan(py, scan.map_err(raised)?.points)
     }
 
     /// Scan it by each of the sensors of its file.
     fn scan_all<'py>(&self, py: Python<'py>, adapter: &str) -> PyResult<Vec<NamedScan<'py>>> {
         let (caster, scene) = (LazyCaster::new(adapter).open()?, lock(&self.scene).clone());
         let scans = process::run(py, || scene.scan_all(&caster))?.map_err(raised)?;
-        let columns = scans.into_iter().zip(&scene.sensors).map(|(scan, mounted)| {
-            let columns = arrays::scan(py, scan.points)?;
-            columns.set_item("pose", arrays::matrix(&mounted.pose))?;
-            Ok((mounted.name.clone(), columns))
-        });
+        let columns = scans
+            .into_iter()
+            .zip(&scene.sensors)
+            .map(|(scan, mounted)| Ok((mounted.name.clone(), arrays::scan(py, scan.points)?)));
         columns.collect()
     }
 }

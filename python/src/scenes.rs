@@ -6,7 +6,6 @@ use edgepuck_segment::Settings;
 use numpy::IntoPyArray;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
-use sim_gpu::Pose;
 use std::path::PathBuf;
 
 /// The scenes of a recipe.
@@ -66,9 +65,7 @@ impl Scenes {
             objects.append(of_object)?;
         }
         told.set_item("objects", objects)?;
-        let columns = arrays::scan(py, sweep.scan)?;
-        columns.set_item("pose", arrays::matrix(&Pose::IDENTITY))?;
-        told.set_item("scan", columns)?;
+        told.set_item("scan", arrays::scan(py, sweep.scan)?)?;
         Ok(told)
     }
 }

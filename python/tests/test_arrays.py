@@ -108,7 +108,7 @@ def test_a_mesh_keeps_what_it_was_given(cube: tuple) -> None:
     np.testing.assert_array_equal(lidar.scan(again).positions, lidar.scan(mesh).positions)
 
 
-def test_a_scan_around_a_mesh_is_segmented_from_its_sensor(cube: tuple) -> None:
+def test_a_scan_around_a_mesh_is_segmented_from_its_sensor(cube: tuple, tmp_path: Path) -> None:
     mesh = ep.Mesh(cube[0] + [0, 0, 0], cube[1], normalize="none")
     scan = ep.Sensor("vlp32c").scan(mesh, distance=6, elevation=0, azimuth=70)
     from_sensor = scan.in_sensor_frame()
@@ -116,6 +116,10 @@ def test_a_scan_around_a_mesh_is_segmented_from_its_sensor(cube: tuple) -> None:
     assert (from_sensor[:, 0] > 5).all()
     np.testing.assert_array_equal(ep.segment(scan), ep.segment(from_sensor, rings=scan.ring))
     assert (ep.segment(scan) >= 0).any()
+    for name in ["scan.npz", "scan.ply"]:
+        scan.save(tmp_path / name)
+        again = ep.Scan.read(tmp_path / name)
+        np.testing.assert_array_equal(again.in_sensor_frame(), from_sensor)
 
 
 def test_clusters_are_numbered_and_ground_is_told() -> None:

@@ -6,7 +6,7 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use glam::{DMat3, DQuat, DVec3};
+use glam::{DMat3, DMat4, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
 use crate::config::{self, ConfigError, InvalidValue};
@@ -30,6 +30,13 @@ pub struct Pose {
 impl Pose {
     /// At the origin, not turned: a sensor looks along x.
     pub const IDENTITY: Self = Self { position_m: DVec3::ZERO, rotation: DQuat::IDENTITY };
+
+    /// From its frame to the world's: a matrix of 4 by 4, row by row.
+    #[must_use]
+    pub fn matrix(&self) -> [f64; 16] {
+        let matrix = DMat4::from_rotation_translation(self.rotation, self.position_m);
+        matrix.transpose().to_cols_array()
+    }
 
     /// At this position, metres, not turned.
     #[must_use]

@@ -35,9 +35,9 @@ fn counts(folder: &Folder, file: &str) -> BTreeMap<String, usize> {
 fn a_sweep_is_corrupted_in_every_way_and_twice_alike() {
     let folder = with_sweep();
     let sweep = folder.scan("sweep.npz");
-    for out in ["one", "other"] {
-        folder.succeeds(&format!("corrupt sweep.npz --sensor 0 0 1.8 --out {out}"));
-    }
+    // The file of the scan has the sensor's position.
+    folder.succeeds("corrupt sweep.npz --out one");
+    folder.succeeds("corrupt sweep.npz --sensor 0 0 1.8 --out other");
     folder.assert_same_tree("one", "other");
     let found = counts(&folder, "one/corruptions.csv");
     assert_eq!(found.len(), 24);
@@ -81,8 +81,8 @@ fn sweeps_of_the_default_commands_have_the_intensities_that_corruptions_need() {
     let wall = formats::scan_file::read_scan(&folder.at("wall.ply")).unwrap();
     let brightest = wall.intensity.iter().flatten().copied().fold(0.0, f32::max);
     assert!((0.99..=1.0).contains(&brightest), "{brightest}");
-    for (sweep, sensor) in [("scenes/sweeps/000000.npz", ""), ("wall.ply", "--sensor 29.4 0 6.4")] {
-        let words = format!("--only fog,wet-ground,crosstalk --severity 1 {sensor} --overwrite");
+    for sweep in ["scenes/sweeps/000000.npz", "wall.ply"] {
+        let words = "--only fog,wet-ground,crosstalk --severity 1 --overwrite";
         folder.succeeds(&format!("corrupt {sweep} {words} --out out"));
         for (file, count) in counts(&folder, "out/corruptions.csv") {
             let scan = folder.scan(&format!("out/{file}"));

@@ -32,7 +32,7 @@ pub(super) fn run(
     };
     let limit = any(takes_light).then(|| limit_of(sensor)).transpose()?;
     let limit = limit.unwrap_or(DetectionLimit { reflectivity: 1.0, range_m: 1.0 });
-    let sensor_m = DVec3::from_array(input.sensor_m());
+    let sensor_m = DVec3::from_array(input.sensor_m(&scan));
     let is_ground = match any(|corruption| matches!(corruption, Corruption::WetGround { .. })) {
         true => ground(&scan, sensor_m)?,
         false => Vec::new(),

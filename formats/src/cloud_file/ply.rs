@@ -12,14 +12,14 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 /// Reads the position of every vertex, with the file's `origin` added.
 pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
     let mut points = Vec::new();
-    let origin = read_elements(
+    let frame = read_elements(
         reader,
         name,
         &["vertex"],
         |_, vertex| AXES.iter().map(|axis| vertex.scalar(axis)).collect(),
         |_, row| points.push([row[0], row[1], row[2]]),
     )?;
-    if let Some([x, y, z]) = origin {
+    if let Some([x, y, z]) = frame.origin {
         points.iter_mut().for_each(|p| *p = [p[0] + x, p[1] + y, p[2] + z]);
     }
     Ok(points)

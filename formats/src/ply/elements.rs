@@ -3,7 +3,7 @@
 use std::io::{self, BufRead, Read};
 use std::path::Path;
 
-use super::header::{Element, Encoding, Property, read_header};
+use super::header::{Element, Encoding, Frame, Property, read_header};
 use crate::decoding::{error_in, invalid};
 use crate::error::FormatError;
 use crate::lines::Lines;
@@ -18,14 +18,14 @@ use crate::records;
 /// whose numbers end the row. Other properties and elements are skipped. Memory does not grow with
 /// the counts of the header.
 ///
-/// Returns the `origin` of the header, an offset to add to every position.
+/// Returns what comments of the header say of the positions.
 pub fn read_elements(
     reader: &mut impl BufRead,
     name: &Path,
     wanted: &[&str],
     mut choose: impl FnMut(usize, &Element) -> Result<Vec<usize>, String>,
     mut each: impl FnMut(usize, &[f64]),
-) -> Result<Option<[f64; 3]>, FormatError> {
+) -> Result<Frame, FormatError> {
     let mut lines = Lines::new(reader, name);
     let header = read_header(&mut lines, name)?;
     let wrong = |kind: &str, cause| FormatError::malformed(name, format!("element {kind}"), cause);
@@ -56,7 +56,7 @@ pub fn read_elements(
                 .map_err(|error| error_in(name, &format!("element {}", element.name), error))?,
         }
     }
-    Ok(header.origin)
+    Ok(header.frame)
 }
 
 fn read_ascii<R: BufRead>(

@@ -7,13 +7,22 @@ use crate::decoding::excerpt;
 use crate::error::FormatError;
 use crate::lines::{Line, Lines};
 use crate::number::{ByteOrder, NumberType};
+use crate::scan::pose_of;
 
 pub(super) struct Header {
     pub encoding: Encoding,
-    /// An offset to add to every point, from the comment `origin X Y Z` of scans.
-    pub origin: Option<[f64; 3]>,
+    pub frame: Frame,
     /// The kinds of elements, in the order of the file.
     pub elements: Vec<Element>,
+}
+
+/// What comments of scans say of the positions.
+#[derive(Clone, Copy, Default)]
+pub struct Frame {
+    /// An offset to add to every position: `origin X Y Z`.
+    pub origin: Option<[f64; 3]>,
+    /// From the sensor's frame to the world's: `pose`, and 16 numbers row by row.
+    pub pose: Option<[f64; 16]>,
 }
 
 #[derive(Clone, Copy)]
@@ -93,14 +102,21 @@ pub(super) fn read_header<R: BufRead>(
         Some(line) if line.text == "ply" => {}
         _ => return Err(wrong("expected `ply` as the first line")),
     }
-    let (mut encoding, mut origin, mut elements) = (None, None, Vec::new());
+    let (mut encoding, mut frame, mut elements) = (None, Frame::default(), Vec::new());
     while let Some(line) = lines.next()? {
         let mut words = line.text.split_ascii_whitespace();
         let keyword = words.next().unwrap_or_default();
         let words: Vec<_> = words.collect();
         match (keyword, &words[..]) {
             ("" | "obj_info", _) => {}
-            ("comment", ["origin", numbers @ ..]) => origin = origin.or(three(numbers)),
+            ("comment", ["origin", words @ ..]) => {
+                let origin = numbers(words).and_then(|numbers| numbers.try_into().ok());
+                frame.origin = frame.origin.or(origin);
+            }
+            ("comment", ["pose", words @ ..]) => {
+                let pose = numbers(words).and_then(|numbers| pose_of(&numbers));
+                frame.pose = frame.pose.or(pose);
+            }
             ("comment", _) => {}
             ("format", [word, ..]) => encoding = Some(encoding_named(&line, word)?),
             ("element", [name, n]) => elements.push(Element {
@@ -116,7 +132,7 @@ pub(super) fn read_header<R: BufRead>(
             }
             ("end_header", []) => {
                 let encoding = encoding.ok_or_else(|| wrong("the line `format` is missing"))?;
-                return Ok(Header { encoding, origin, elements });
+                return Ok(Header { encoding, frame, elements });
             }
             _ => {
                 return Err(line
@@ -127,9 +143,8 @@ pub(super) fn read_header<R: BufRead>(
     Err(wrong("the file ends before `end_header`"))
 }
 
-fn three(words: &[&str]) -> Option<[f64; 3]> {
-    let numbers: Option<Vec<f64>> = words.iter().map(|word| word.parse().ok()).collect();
-    numbers?.try_into().ok()
+fn numbers(words: &[&str]) -> Option<Vec<f64>> {
+    words.iter().map(|word| word.parse().ok()).collect()
 }
 
 fn encoding_named(line: &Line<'_>, word: &str) -> Result<Encoding, FormatError> {

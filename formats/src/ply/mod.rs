@@ -7,6 +7,6 @@ mod header;
 mod scan;
 
 pub use elements::read_elements;
-pub use header::Element;
+pub use header::{Element, Frame};
 #[cfg(feature = "dataset")]
 pub use scan::{read_scan, write_scan};

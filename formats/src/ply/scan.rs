@@ -3,7 +3,7 @@
 //! Properties: `x y z`, then `range` (float), `beam` (uint), `ring` (ushort),
 //! `time` (float), `triangle` (uint), `object` (uint), `intensity` (float),
 //! `nx ny nz` (float), if the scan has them. An origin other than 0 is the comment
-//! `origin X Y Z`. Open3D 0.20 reads the properties of type float and
+//! `origin X Y Z`, and a pose other than the identity the comment `pose` with 16 numbers. Open3D 0.20 reads the properties of type float and
 //! skips the others; from NPZ it reads all of them.
 
 use std::fs::File;
@@ -25,14 +25,14 @@ pub fn write_scan(
     let attributes = scan.columns().map(|(attribute, column)| (attribute.column_names(), column));
     let positions = (rows::AXES.to_vec(), Column::Vector(&scan.positions));
     let columns: Vec<_> = std::iter::once(positions).chain(attributes).collect();
-    rows::write(path, hashing, &rows::ply_header(scan.origin, &columns), &columns)
+    rows::write(path, hashing, &rows::ply_header(scan.origin, scan.pose, &columns), &columns)
 }
 
 /// Reads a scan, ASCII or binary, with properties in any order. Other properties are skipped.
 pub fn read_scan(path: &Path) -> Result<Scan, FormatError> {
     let file = File::open(path).map_err(|source| FormatError::io(path, source))?;
     let (mut known, mut values) = (Vec::new(), Vec::new());
-    let origin = read_elements(
+    let frame = read_elements(
         &mut BufReader::new(file),
         path,
         &["vertex"],
@@ -48,8 +48,8 @@ pub fn read_scan(path: &Path) -> Result<Scan, FormatError> {
     )?;
     let width = 3 + known.iter().map(|attribute| attribute.column_names().len()).sum::<usize>();
     let rows = Rows { values: &values, width };
-    let mut scan =
-        Scan { origin: origin.unwrap_or_default(), positions: rows.vectors(0), ..Scan::default() };
+    let mut scan = Scan { pose: frame.pose, positions: rows.vectors(0), ..Scan::default() };
+    scan.origin = frame.origin.unwrap_or_default();
     let mut first = 3;
     for attribute in known {
         let wrong =

@@ -17,6 +17,7 @@ use std::path::Path;
 /// | --- | --- | --- |
 /// | `positions` | `Vec<[f32; 3]>` | metres in the world, less `origin` |
 /// | `origin` | `[f64; 3]` | what to add to each position, metres; 0 near the world's origin |
+/// | `pose` | `Option<[f64; 16]>` | from the sensor's frame to the world's, 4 by 4 row by row; `None` is the identity |
 /// | `range_m`, `time_s`, `intensity` | `Option<Vec<f32>>` | distance, seconds since the scan began, 0 to 1 |
 /// | `beam`, `object`, `triangle` | `Option<Vec<u32>>` | number of the beam, instance and triangle |
 /// | `ring` | `Option<Vec<u16>>` | row of the beam, from below |

@@ -162,7 +162,10 @@ impl<'a> ScanBuilder<'a> {
             (None, 0) => None,
             (None, _) => Some(self.stream(&format!("instance/{number}"))),
         });
-        let Scanned { scan, tally, cast_on_cpu, .. } = scan_objects(&caster, &placed, &request)?;
+        let Scanned { mut scan, tally, cast_on_cpu, .. } =
+            scan_objects(&caster, &placed, &request)?;
+        let pose = self.motion.as_ref().map_or(self.pose, |motion| motion.at(self.start_s));
+        scan.pose = (pose != Pose::IDENTITY).then(|| pose.matrix());
         Ok(Scan::new(scan, tally, cast_on_cpu, self.sensor.clone(), effects))
     }
 
