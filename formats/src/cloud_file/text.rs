@@ -1,13 +1,14 @@
 //! Clouds as text, with a line for each point.
 //!
 //! Semicolons, commas, tabs or blanks separate columns: the first of these that the
-//! first line has. A first line of names states the columns of x, y and z; otherwise
-//! they are the first three. Text after a `#`, and a line that begins with `//`, is a comment. A
+//! first line has. A first line of names, which may be a comment, states the columns of x, y and z,
+//! and their unit if that is not the metre; without names they are the first three. Text after a `#`, and a line that begins with `//`, is a comment. A
 //! line with nothing but a count is that of the points after it, as in Leica's `.pts`.
 
 use std::io::{self, BufRead, Write};
 use std::path::Path;
 
+use crate::decoding::excerpt;
 use crate::error::FormatError;
 use crate::lines::{Line, Lines};
 
@@ -22,6 +23,7 @@ enum Separator {
 struct Layout {
     separator: Separator,
     columns: [usize; 3],
+    unit_m: [f64; 3],
 }
 
 pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
@@ -30,9 +32,13 @@ pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3
     let mut points = Vec::new();
     // The number of points that the counts so far promise.
     let mut promised = None;
+    let mut comment = String::new();
     while let Some(line) = lines.next()? {
         let content = without_comment(&line.text);
         if content.is_empty() {
+            if layout.is_none() && !line.text.is_empty() {
+                comment = line.text.trim_start_matches(['#', '/', ' ']).to_owned();
+            }
             continue;
         }
         let found = points.len() as u64;
@@ -49,7 +55,7 @@ pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3
         match &layout {
             Some(layout) => points.push(layout.point(&line, content)?),
             None => {
-                let (first, is_header) = Layout::from_first_line(&line, content)?;
+                let (first, is_header) = Layout::from_first_line(&line, content, &comment)?;
                 if !is_header {
                     points.push(first.point(&line, content)?);
                 }
@@ -73,28 +79,47 @@ fn without_comment(line: &str) -> &str {
 
 impl Layout {
     /// The layout by the first line, and whether that has names.
-    fn from_first_line(line: &Line<'_>, content: &str) -> Result<(Self, bool), FormatError> {
+    /// If it has not, the `comment` before it may have them.
+    fn from_first_line(
+        line: &Line<'_>,
+        content: &str,
+        comment: &str,
+    ) -> Result<(Self, bool), FormatError> {
         let separator = Separator::in_line(content);
         let fields: Vec<_> = separator.fields(content).collect();
         if fields.len() < AXES.len() {
             let cause = format!("expected x, y and z, found {} column(s)", fields.len());
             return Err(line.error(cause));
         }
-        let place = |axis: &str| fields.iter().position(|name| name.eq_ignore_ascii_case(axis));
-        let places = AXES.map(place);
-        if let [Some(x), Some(y), Some(z)] = places {
-            return Ok((Self { separator, columns: [x, y, z] }, true));
-        }
         let is_header = fields.iter().all(|field| is_name(field));
-        let mut missing = AXES.into_iter().zip(places).filter(|(_, place)| place.is_none());
-        let is_named = places.iter().any(Option::is_some);
-        if is_header
-            && is_named
-            && let Some((axis, _)) = missing.next()
+        let names: Vec<_> = match is_header {
+            true => fields,
+            false => separator.fields(comment).filter(|_| fields.len() > 1).collect(),
+        };
+        let n = separator.fields(content).count();
+        let places = AXES.map(|axis| {
+            let exact = names.iter().position(|name| name.eq_ignore_ascii_case(axis));
+            let usual =
+                || names.iter().position(|name| axis_named(name).is_some_and(|(a, _)| a == axis));
+            exact.or_else(usual)
+        });
+        if let [Some(x), Some(y), Some(z)] = places
+            && names.len() == n
         {
-            return Err(line.error(format!("expected a column named {axis} beside those named")));
+            let unit_m =
+                [x, y, z].map(|at| axis_named(names[at]).map_or(1.0, |(_, unit_m)| unit_m));
+            return Ok((Self { separator, columns: [x, y, z], unit_m }, is_header));
         }
-        Ok((Self { separator, columns: [0, 1, 2] }, is_header))
+        if is_header {
+            let missing = AXES.into_iter().zip(places).find(|(_, place)| place.is_none());
+            let (axis, _) = missing.expect("invariant: three places return above");
+            let found = excerpt(content);
+            return Err(line.error(format!(
+                "expected a column named {axis} (or pos_{axis}, {axis}_m and the like), found \
+                 `{found}`"
+            )));
+        }
+        Ok((Self { separator, columns: [0, 1, 2], unit_m: [1.0; 3] }, false))
     }
 
     fn point(&self, line: &Line<'_>, content: &str) -> Result<[f64; 3], FormatError> {
@@ -102,7 +127,7 @@ impl Layout {
         let mut missing = AXES.len();
         for (i, field) in self.separator.fields(content).enumerate() {
             if let Some(axis) = self.columns.iter().position(|&column| column == i) {
-                point[axis] = line.number(field)?;
+                point[axis] = line.number(field)? * self.unit_m[axis];
                 missing -= 1;
                 if missing == 0 {
                     return Ok(point);
@@ -113,6 +138,39 @@ impl Layout {
         let found = self.separator.fields(content).count();
         Err(line.error(format!("expected {expected} columns, found {found}")))
     }
+}
+
+/// The axis of a column with a usual name, such as `pos_x`, `X (mm)` or ParaView's `Points:0`, and its
+/// unit, metres.
+fn axis_named(name: &str) -> Option<(&'static str, f64)> {
+    /// What names say beside the axis, longer ones first.
+    const PLACES: [&str; 9] =
+        ["coordinate", "coord", "position", "pos", "points", "point", "location", "xyz", "p"];
+    let name = name.to_ascii_lowercase();
+    let (mut found, mut unit_m, mut is_place) = (None, 1.0, false);
+    for word in name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|word| !word.is_empty()) {
+        let bare = |place: &&str| word.strip_prefix(place).or(word.strip_suffix(place));
+        let at = match PLACES.iter().find_map(bare).unwrap_or(word) {
+            "" | "s" => {
+                is_place = true;
+                continue;
+            }
+            "m" | "meter" | "metre" | "meters" | "metres" => continue,
+            "mm" | "cm" => {
+                unit_m = if word == "mm" { 1e-3 } else { 1e-2 };
+                continue;
+            }
+            "x" | "easting" | "east" => 0,
+            "y" | "northing" | "north" => 1,
+            "z" | "height" | "altitude" | "up" => 2,
+            number @ ("0" | "1" | "2") if is_place => usize::from(number.as_bytes()[0] - b'0'),
+            _ => return None,
+        };
+        if found.replace(AXES[at]).is_some() {
+            return None;
+        }
+    }
+    Some((found?, unit_m))
 }
 
 /// Whether `field` can be a column's name: neither a number nor an attempt at

@@ -27,9 +27,24 @@ fn a_line_of_names_says_which_columns_are_meant() {
         "time,Z,intensity,Y,X\n9,3e-7,9,-2.5,1\n9,6,9,5,4\n",
         "\"x\";\"y\";\"z\"\n1;-2.5;3e-7\n4;5;6\n",
         "easting northing height\n1 -2.5 3e-7\n4 5 6\n",
+        "time,x_m,y_m,z_m\n9,1,-2.5,3e-7\n9,4,5,6\n",
+        "ring,pos_x,pos_y,pos_z\n9,1,-2.5,3e-7\n9,4,5,6\n",
+        "intensity,X_coord,Y_coord,Z_coord\n9,1,-2.5,3e-7\n9,4,5,6\n",
+        "t,positionX,positionY,positionZ\n9,1,-2.5,3e-7\n9,4,5,6\n",
+        "t,px,py,pz,nx,ny,nz\n9,1,-2.5,3e-7,0,0,1\n9,4,5,6,0,0,1\n",
+        // CloudCompare, ParaView, VeloView, and ouster-sdk's `np.savetxt`.
+        "//X Y Z Intensity\n1 -2.5 3e-7 9\n4 5 6 9\n",
+        "\"intensity\",\"Points:0\",\"Points:1\",\"Points:2\"\n9,1,-2.5,3e-7\n9,4,5,6\n",
+        "laser_id,Points_m_XYZ:0,Points_m_XYZ:1,Points_m_XYZ:2\n9,1,-2.5,3e-7\n9,4,5,6\n",
+        "# TIMESTAMP (ns), RANGE (mm), X (m), Y (m), Z (m)\n9, 9, 1, -2.5, 3e-7\n9, 9, 4, 5, 6\n",
     ] {
         assert_eq!(read("a.csv", text), POINTS, "{text}");
     }
+}
+
+#[test]
+fn millimetres_are_told_by_names() {
+    assert_eq!(read("a.csv", "t,X (mm),Y (mm),Z (mm)\n9,1000,-500,250\n"), [[1.0, -0.5, 0.25]]);
 }
 
 #[test]
@@ -87,7 +102,15 @@ fn what_is_no_cloud_is_refused_with_its_line() {
         ("1 2 three\n", "line 1: expected a number, found `three`"),
         ("1,5;2,5;3,5\n", "line 1: expected a number, found `1,5`"),
         ("1\t2\t\t3\n", "line 1: expected a number, found ``"),
-        ("x,y,intensity\n1,2,3\n", "line 1: expected a column named z beside those named"),
+        (
+            "x,y,intensity\n1,2,3\n",
+            "line 1: expected a column named z (or pos_z, z_m and the like), found `x,y,intensity`",
+        ),
+        (
+            "range,azimuth,elevation\n1,2,3\n",
+            "line 1: expected a column named x (or pos_x, x_m and the like), found \
+             `range,azimuth,elevation`",
+        ),
         ("a,x,y,z\n1,2,3\n", "line 2: expected 4 columns, found 3"),
         ("OFF\n8 6 12\n", "line 1: expected x, y and z, found 1 column(s)"),
         ("v 1 2 3\n", "line 1: expected a number, found `v`"),
