@@ -58,6 +58,8 @@ pub mod weights;
 #[cfg(feature = "files")]
 pub mod atomic;
 #[doc(hidden)]
+pub mod foreign;
+#[doc(hidden)]
 pub mod interval;
 #[doc(hidden)]
 #[cfg(feature = "npz")]

@@ -23,6 +23,7 @@ use pcap_parser::traits::PcapNGPacketBlock;
 use pcap_parser::{Block, Linktype, PIB_MAGIC, PcapBlockOwned, PcapError, create_reader};
 
 use crate::error::FormatError;
+use crate::foreign::or_foreign_file;
 
 /// The magic number of a file in this byte order with times in microseconds.
 const MAGIC: u32 = 0xa1b2_c3d4;
@@ -127,7 +128,7 @@ pub fn read(
     each: impl FnMut(&UdpPacket<'_>) -> ControlFlow<()>,
 ) -> Result<Counts, FormatError> {
     let file = File::open(path).map_err(|source| FormatError::io(path, source))?;
-    read_from(file, path, each)
+    read_from(file, path, each).map_err(|error| or_foreign_file(path, "a capture", error))
 }
 
 /// As [`read`], from `capture`, which errors call `name`.

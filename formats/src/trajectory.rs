@@ -10,6 +10,7 @@
 use std::path::Path;
 
 use crate::error::FormatError;
+use crate::foreign::or_foreign_file;
 
 /// A pose at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,6 +26,10 @@ pub struct KeyedPose {
 /// Reads a trajectory in TUM's or KITTI's format, which the count of numbers in a line tells apart.
 /// The poses of KITTI's format are `period_s` apart and begin at 0.
 pub fn read_trajectory(path: &Path, period_s: f64) -> Result<Vec<KeyedPose>, FormatError> {
+    read(path, period_s).map_err(|error| or_foreign_file(path, "a trajectory", error))
+}
+
+fn read(path: &Path, period_s: f64) -> Result<Vec<KeyedPose>, FormatError> {
     let io = |source| FormatError::io(path, source);
     let text = std::fs::read_to_string(path).map_err(io)?;
     let text = text.trim_start_matches('\u{feff}');

@@ -11,6 +11,7 @@ use safetensors::tensor::{Dtype, Metadata, TensorInfo};
 
 use crate::atomic;
 use crate::error::FormatError;
+use crate::foreign::or_foreign;
 
 /// The header's length comes first, as u64.
 const LENGTH_SIZE: u64 = 8;
@@ -69,6 +70,21 @@ impl WeightsFile {
     }
 
     fn new(path: &Path, mut file: Box<dyn Source>, file_size: u64) -> Result<Self, FormatError> {
+        let (data_offset, header) =
+            Self::read_header(path, &mut file, file_size).map_err(|error| {
+                // A file that cannot be read again keeps its error.
+                let _ = file.rewind();
+                or_foreign(path, &mut file, "safetensors", error)
+            })?;
+        Ok(Self { path: path.to_path_buf(), file, data_offset, header })
+    }
+
+    /// Where the data begin, and the header.
+    fn read_header(
+        path: &Path,
+        mut file: &mut dyn Source,
+        file_size: u64,
+    ) -> Result<(u64, Metadata), FormatError> {
         let here = |source| FormatError::io(path, source);
         let bad = |cause: String| FormatError::malformed(path, "header", cause);
         let mut length = [0; LENGTH_SIZE as usize];
@@ -95,7 +111,7 @@ impl WeightsFile {
         if promised != file_size {
             return Err(bad(format!("expected {promised} bytes by the header, found {file_size}")));
         }
-        Ok(Self { path: path.to_path_buf(), file, data_offset, header })
+        Ok((data_offset, header))
     }
 
     /// The file's name.

@@ -3,6 +3,8 @@
 
 #[cfg(feature = "cloud-files")]
 mod clouds;
+#[cfg(all(feature = "cloud-files", feature = "pcap", feature = "weights"))]
+mod foreign;
 #[cfg(all(feature = "npz", feature = "dataset"))]
 mod labelled_sets;
 #[cfg(feature = "hdf5")]

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::error::FormatError;
+use crate::foreign::foreign;
 use crate::lines::BYTE_ORDER_MARK;
 use crate::npy;
 
@@ -79,8 +80,11 @@ impl CloudFormat {
             () if begins(b"# .PCD") || begins(b"VERSION") => Ok(Self::Pcd),
             () if begins(b"LASF") => Ok(Self::Las),
             () if begins(b"OFF") || begins(b"solid ") => refuse(MESH),
-            () if start.contains(&0) => refuse(UNKNOWN),
-            () => Ok(Self::Text),
+            () => match foreign(start) {
+                Some(found) => refuse(&format!("expected a cloud, found {found}")),
+                None if start.contains(&0) => refuse(UNKNOWN),
+                None => Ok(Self::Text),
+            },
         }
     }
 }

@@ -10,6 +10,7 @@ use std::path::Path;
 use super::CloudFormat;
 use crate::atomic;
 use crate::error::FormatError;
+use crate::foreign::foreign;
 use crate::number::{ByteOrder, NumberType};
 use crate::records;
 
@@ -110,8 +111,11 @@ fn read_points(
     mut take: impl FnMut(&dyn Fn(usize) -> f64),
 ) -> Result<(), FormatError> {
     let start = reader.fill_buf().map_err(|source| FormatError::io(name, source))?;
-    if is_velodyne_packets(start) {
-        let cause = "expected points, found raw Velodyne packets: decode them first";
+    let packets = is_velodyne_packets(start).then_some("raw Velodyne packets: decode them first");
+    // Of other kinds, the first bytes can be those of a number.
+    let is_text = start.iter().take(16).all(|byte| (b' '..127).contains(byte));
+    if let Some(found) = packets.or(foreign(start).filter(|_| is_text)) {
+        let cause = format!("expected points, found {found}");
         return Err(FormatError::malformed(name, "format", cause));
     }
     let mut count = 0;

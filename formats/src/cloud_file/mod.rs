@@ -42,6 +42,7 @@ use std::path::Path;
 
 use crate::atomic;
 use crate::error::FormatError;
+use crate::foreign::or_foreign_file;
 use crate::records;
 pub use format::CloudFormat;
 #[cfg(feature = "las")]
@@ -98,6 +99,13 @@ pub fn read_cloud_as(
     path: &Path,
     format: Option<CloudFormat>,
 ) -> Result<Vec<[f64; 3]>, FormatError> {
+    read_file(path, format).map_err(|error| {
+        let expected = format.or(CloudFormat::of_path(path).ok());
+        or_foreign_file(path, expected.map_or("a cloud", CloudFormat::name), error)
+    })
+}
+
+fn read_file(path: &Path, format: Option<CloudFormat>) -> Result<Vec<[f64; 3]>, FormatError> {
     let (mut file, found) = open(path, format)?;
     match found {
         #[cfg(feature = "npz")]

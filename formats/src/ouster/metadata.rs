@@ -8,6 +8,7 @@ use std::path::Path;
 use serde_json::Value;
 
 use crate::error::FormatError;
+use crate::foreign::or_foreign_file;
 
 /// The longest metadata, bytes.
 const LONGEST: u64 = 4 << 20;
@@ -51,7 +52,7 @@ impl Metadata {
     /// # Errors
     /// A file that cannot be read; as [`Metadata::parse`].
     pub fn read(path: &Path) -> Result<Self, FormatError> {
-        Self::parse_as(&text_of(path)?, path, profile)
+        Self::read_as(path, profile)
     }
 
     /// As [`Metadata::read`], for the beams alone: packets may have any profile.
@@ -63,7 +64,7 @@ impl Metadata {
             let is_coarse = value.as_str().is_some_and(|name| name.contains("RNG15"));
             Ok(if is_coarse { Profile::LowRate } else { Profile::Single })
         };
-        Self::parse_as(&text_of(path)?, path, nearest)
+        Self::read_as(path, nearest)
     }
 
     /// Parses `text`, which errors attribute to `path`. It knows both layouts: the nested one, and
@@ -74,6 +75,14 @@ impl Metadata {
     /// Text that is not JSON; a required field that is missing or invalid.
     pub fn parse(text: &str, path: &Path) -> Result<Self, FormatError> {
         Self::parse_as(text, path, profile)
+    }
+
+    fn read_as(
+        path: &Path,
+        profile: impl Fn(&Value) -> Result<Profile, String>,
+    ) -> Result<Self, FormatError> {
+        let read = text_of(path).and_then(|text| Self::parse_as(&text, path, profile));
+        read.map_err(|error| or_foreign_file(path, "metadata in JSON", error))
     }
 
     fn parse_as(

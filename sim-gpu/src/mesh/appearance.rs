@@ -5,8 +5,9 @@
 
 use std::path::{Path, PathBuf};
 
+use formats::foreign::foreign;
+
 use super::error::{Malformed, MeshError, ParseError};
-use super::foreign::foreign;
 use super::format::MeshFormat;
 use super::load::read;
 use super::obj::{self, for_each_line, index, words};
@@ -126,8 +127,8 @@ pub(crate) fn colours(path: &Path) -> Result<Vec<Colour>, MeshError> {
 }
 
 fn parse_colours(bytes: &[u8], library: &Path) -> Result<Vec<Colour>, ParseError> {
-    if let Some(error) = foreign(bytes, "materials") {
-        return Err(error);
+    if let Some(found) = foreign(bytes) {
+        return Err(Malformed::Syntax(format!("expected materials, found {found}")).into());
     }
     let mut colours: Vec<Colour> = Vec::new();
     for_each_line(without_mark(bytes), |key, value| {

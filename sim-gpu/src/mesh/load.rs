@@ -3,10 +3,10 @@
 use std::fs;
 use std::path::Path;
 
+use formats::foreign::foreign;
 use formats::hash::{FileHash, Hashing};
 
 use super::error::{Malformed, MeshError, ParseError};
-use super::foreign::foreign;
 use super::format::MeshFormat;
 use super::tokens::without_mark;
 use super::triangle_mesh::{Parsed, TriangleMesh};
@@ -57,7 +57,10 @@ pub fn parse(bytes: &[u8], format: MeshFormat) -> Result<Parsed, ParseError> {
         MeshFormat::Stl => stl::parse(bytes),
     };
     let checked = parsed.and_then(|parsed| check(&parsed.mesh).map(|()| parsed));
-    let mut parsed = checked.map_err(|error| foreign(bytes, "a mesh").unwrap_or(error))?;
+    let mut parsed = checked.map_err(|error| match foreign(bytes) {
+        Some(found) => Malformed::Syntax(format!("expected a mesh, found {found}")).into(),
+        None => error,
+    })?;
     parsed.cut_polygons(|_, _| ());
     Ok(parsed)
 }

@@ -2,7 +2,6 @@
 
 mod appearance;
 mod error;
-mod foreign;
 mod format;
 pub mod frame;
 mod load;

@@ -1,0 +1,62 @@
+use std::fs;
+use std::path::Path;
+
+use formats::FormatError;
+use formats::cloud_file::read_cloud;
+use formats::ouster::Metadata;
+use formats::trajectory::read_trajectory;
+use formats::weights::WeightsFile;
+
+type Reader = fn(&Path) -> Result<(), FormatError>;
+
+#[test]
+fn what_stands_in_place_of_a_file_is_named() {
+    let cloud: Reader = |path| read_cloud(path).map(drop);
+    let capture: Reader =
+        |path| formats::pcap::read(path, |_| std::ops::ControlFlow::Continue(())).map(drop);
+    let mut readers: Vec<(&str, &str, Reader)> = vec![
+        ("a.pcap", "a capture", capture),
+        ("a.tum", "a trajectory", |path| read_trajectory(path, 0.1).map(drop)),
+        ("a.json", "metadata in JSON", |path| Metadata::read(path).map(drop)),
+        ("a.safetensors", "safetensors", |path| WeightsFile::open(path).map(drop)),
+    ];
+    for (name, expected) in [
+        ("a.ply", "ply"),
+        ("a.npz", "npz"),
+        ("a.npy", "npy"),
+        ("a.pcd", "pcd"),
+        ("a.xyz", "xyz"),
+        ("a.txt", "xyz"),
+        ("a.csv", "csv"),
+        ("a.las", "las"),
+        ("a.bin", "kitti"),
+        ("a.pcd.bin", "nuscenes"),
+        ("a.csv.gz", "a cloud"),
+    ] {
+        readers.push((name, expected, cloud));
+    }
+    // As `git lfs pointer` writes it, and by RFC 1952, PKWARE's APPNOTE 4.3.7 and Unicode's marks.
+    let pointer = format!(
+        "version https://git-lfs.github.com/spec/v1\noid sha256:{}\nsize 123456\n",
+        "4d7a".repeat(16)
+    );
+    let wide = |text: &str| text.encode_utf16().flat_map(u16::to_le_bytes).collect::<Vec<_>>();
+    let table = "x,y,z\n1.5,2.5,3.5\n".repeat(20);
+    let folder = tempfile::tempdir().unwrap();
+    for (bytes, found) in [
+        (pointer.into_bytes(), "a Git LFS pointer: fetch the file by `git lfs pull`"),
+        ([&[0xFF, 0xFE][..], &wide(&table)].concat(), "text in UTF-16: save it as UTF-8"),
+        ([b"\x1F\x8B\x08\0", &[0x7f; 300][..]].concat(), "a compressed file: unpack it"),
+        ([b"PK\x03\x04\x14\0", &[0x7f; 300][..]].concat(), "a compressed file: unpack it"),
+        (b"<!DOCTYPE html>\n<html><head></head></html>\n".to_vec(), "a web page"),
+    ] {
+        for (name, expected, read) in &readers {
+            let path = folder.path().join(name);
+            fs::write(&path, &bytes).unwrap();
+            let error = read(&path).unwrap_err().to_string();
+            let is_known = bytes.starts_with(b"PK") && ["npz", "safetensors"].contains(expected);
+            let names_it = error.contains(found) && error.contains(name);
+            assert!(names_it || is_known, "{name}: {error}");
+        }
+    }
+}
