@@ -78,7 +78,8 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let bar = ProgressBar::new(args.sweeps.into()).with_style(style);
     let mut n_points = 0;
     let packed = args.out.join("packed");
-    let begun = outputs.each_ref().map(|folder| UnfinishedFolder::begin(folder));
+    // Saved sweeps are complete, one by one; of packed clusters, only all are.
+    let begun = UnfinishedFolder::begin(&packed);
     let counts = generate(&stage, &Settings::default(), args.sweeps, &packed, |done| {
         bar.inc(1);
         n_points += done.sweep.points().len();
@@ -95,7 +96,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
         }
         if done.scene.number < args.save { save(&stage, done, args) } else { Ok(()) }
     })?;
-    begun.into_iter().for_each(UnfinishedFolder::finish);
+    begun.finish();
     bar.finish_and_clear();
     let seconds = started.elapsed().as_secs_f64();
     eprintln!(

@@ -5,15 +5,26 @@ use formats::atomic;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use std::process;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::SeqCst};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 /// The flags of a run that can be resumed: to stop it, and whether that comes too late.
-static RUN: OnceLock<(Arc<AtomicBool>, Arc<AtomicBool>)> = OnceLock::new();
+type Flags = (Arc<AtomicBool>, Arc<AtomicBool>);
 
-/// Lets the signals stop `run` where it can be resumed, instead of ending the program.
-pub fn stop(run: &Progress) {
-    let _ = RUN.set((Arc::clone(&run.stop), Arc::clone(&run.is_scanned)));
+/// The flags of the run at work.
+static RUN: Mutex<Option<Flags>> = Mutex::new(None);
+
+fn of_run() -> MutexGuard<'static, Option<Flags>> {
+    RUN.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Does the `work` of `run`. Meanwhile the signals stop it where it can be resumed, instead of ending
+/// the program.
+pub fn stop<T>(run: &Progress, work: impl FnOnce() -> T) -> T {
+    *of_run() = Some((Arc::clone(&run.stop), Arc::clone(&run.is_scanned)));
+    let made = work();
+    *of_run() = None;
+    made
 }
 
 /// Ends the program at SIGINT and SIGTERM, without the files that it has not finished. Of a run that
@@ -37,8 +48,8 @@ pub fn handle() -> std::io::Result<()> {
 }
 
 fn end(signal: i32) {
-    let run = RUN.get();
-    if let Some((stop, is_scanned)) = run
+    let run = of_run().clone();
+    if let Some((stop, is_scanned)) = &run
         && !is_scanned.load(SeqCst)
         && (!stop.swap(true, SeqCst) || signal == SIGTERM)
     {

@@ -12,7 +12,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use tempfile::{NamedTempFile, TempPath};
+use tempfile::TempPath;
 
 use crate::error::FormatError;
 #[cfg(feature = "dataset")]
@@ -127,32 +127,47 @@ pub struct Unfinished<W: Write = File> {
 }
 
 /// A temporary file, which is known as unfinished while it is there.
-struct Temporary(Option<TempPath>);
+struct Temporary {
+    path: TempPath,
+    known: Known,
+}
+
+/// The path of a file that is known as unfinished.
+struct Known(PathBuf);
+
+impl Known {
+    fn begin(path: &Path) -> Self {
+        unfinished().insert(path.to_path_buf());
+        Self(path.to_path_buf())
+    }
+}
+
+impl Drop for Known {
+    fn drop(&mut self) {
+        unfinished().remove(&self.0);
+    }
+}
 
 impl Temporary {
     /// The temporary file of the file at `path`. Creates missing folders.
     fn of(path: &Path) -> Result<(File, Self), FormatError> {
-        let mut unfinished = unfinished();
-        let temporary = named_temporary(make_folder_of(path)?);
-        let (file, path) = temporary.map_err(|source| FormatError::io(path, source))?.into_parts();
-        unfinished.insert(path.to_path_buf());
-        Ok((file, Self(Some(path))))
+        let mut builder = tempfile::Builder::new();
+        let mut known = None;
+        let made = builder.prefix(PREFIX).suffix(SUFFIX).make_in(make_folder_of(path)?, |path| {
+            // Before the file is there: after `abandon`, this waits for the end of the process.
+            known = Some(Known::begin(path));
+            File::options().write(true).create_new(true).open(path)
+        });
+        let (file, made) = made.map_err(|source| FormatError::io(path, source))?.into_parts();
+        let known = known.expect("invariant: a file is known before it is made");
+        Ok((file, Self { path: made, known }))
     }
 
-    fn persist(mut self, path: &Path) -> io::Result<()> {
-        let temporary = self.0.take().expect("invariant: only this takes it");
-        let mut unfinished = unfinished();
-        unfinished.remove(&*temporary);
-        temporary.persist(path).map_err(|error| error.error)
-    }
-}
-
-impl Drop for Temporary {
-    fn drop(&mut self) {
-        let mut unfinished = unfinished();
-        if let Some(path) = self.0.take() {
-            unfinished.remove(&*path);
-        }
+    fn persist(self, path: &Path) -> io::Result<()> {
+        let Self { path: temporary, known } = self;
+        let persisted = temporary.persist(path).map_err(|error| error.error);
+        drop(known);
+        persisted
     }
 }
 
@@ -235,18 +250,6 @@ pub(crate) fn make_folder_of(path: &Path) -> Result<&Path, FormatError> {
         fs::create_dir_all(folder).map_err(|source| FormatError::io(folder, source))?;
     }
     Ok(folder)
-}
-
-fn named_temporary(folder: &Path) -> io::Result<NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(PREFIX).suffix(SUFFIX);
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        // The permissions of `File::create`, from which the umask is subtracted.
-        builder.permissions(fs::Permissions::from_mode(0o666));
-    }
-    builder.tempfile_in(folder)
 }
 
 /// Removes the temporary files that killed runs left in `folder` and below, and returns their
@@ -366,7 +369,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let below = folder.path().join("chair/train");
         fs::create_dir_all(&below).unwrap();
-        named_temporary(&below).unwrap().keep().unwrap();
+        std::mem::forget(Temporary::of(&below.join("scan.bin")).unwrap());
         fs::write(below.join(".hidden.tmp"), "").unwrap();
         assert_eq!(sweep_leftovers(folder.path()).unwrap(), 1);
         assert_eq!(names(&below), [".hidden.tmp"]);

@@ -55,18 +55,29 @@ fn a_run_that_is_told_to_end_says_so_and_goes_on_later() {
 #[test]
 #[cfg(unix)]
 fn a_program_that_is_ended_leaves_nothing_unfinished() {
-    for words in ["gen-drive --seconds 3600 --out d/d.pcap", "gen-scenes --sweeps 100000 --out d"] {
+    for (words, kept) in [
+        ("gen-drive --seconds 3600 --out d/d.pcap", &[][..]),
+        ("gen-scenes --sweeps 100000 --save 1 --out d", &["preview.png", "sweeps"]),
+    ] {
         let folder = Folder::new();
         let mut child = folder.edgepuck(words).stderr(Stdio::null()).spawn().unwrap();
-        while !std::fs::read_dir(folder.at("d")).is_ok_and(|mut files| files.next().is_some()) {
+        let is_begun = || {
+            let mut files = std::fs::read_dir(folder.at("d")).into_iter().flatten();
+            files.next().is_some() && kept.iter().all(|name| folder.at("d").join(name).exists())
+        };
+        while !is_begun() {
             std::thread::sleep(Duration::from_millis(5));
         }
         std::thread::sleep(Duration::from_millis(300));
         assert!(terminate(&child), "{words}");
         assert_eq!(child.wait().unwrap().code(), None, "{words}");
         let left = std::fs::read_dir(folder.at("d")).unwrap().map(|file| file.unwrap().file_name());
-        let left: Vec<_> = left.filter(|name| name != "preview.png").collect();
-        assert!(left.is_empty(), "{words}: {left:?}");
+        let mut left: Vec<_> = left.collect();
+        left.sort();
+        assert_eq!(left, kept, "{words}");
+        if kept.contains(&"sweeps") {
+            folder.refuses(2, &[(words, "sweeps: it exists already: --overwrite replaces it")]);
+        }
     }
 }
 

@@ -104,7 +104,7 @@ impl Clouds {
         if set.is_empty() {
             let cause = format!(
                 "expected clouds, found none: its {split} part is empty; more meshes or sweeps, or \
-                 fewer --min-points, fill it"
+                 a smaller --min-points, fill it"
             );
             return Err(Error::Data { path: path.to_path_buf(), cause });
         }

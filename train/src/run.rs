@@ -41,6 +41,8 @@ pub struct Job<'a> {
     pub data_name: &'a str,
     /// The model file. The run's folder is beside it.
     pub out: &'a Path,
+    /// Whether to begin anew instead of resuming the run in that folder.
+    pub overwrite: bool,
 }
 
 /// What a run reports while it trains.
@@ -115,8 +117,8 @@ fn check(clouds: &Clouds, recipe: &Recipe, data: &str) -> Result<(), Error> {
     if !recipe.normalization.is_metric() && n_points < recipe.points {
         let wanted = recipe.points;
         return refuse(format!(
-            "expected clouds of {wanted} points or more, found {n_points}: give --points, or a \
-             recipe for clusters, such as --recipe street-128"
+            "expected clouds of {wanted} points or more, found {n_points}: give at most {n_points} \
+             by --points, or a recipe for clusters, such as --recipe street-128"
         ));
     }
     if clouds.classes.len() < 2 {
@@ -127,7 +129,7 @@ fn check(clouds: &Clouds, recipe: &Recipe, data: &str) -> Result<(), Error> {
         let name = &clouds.classes[class];
         return refuse(format!(
             "expected clouds of every class, found none of {name}: make the data with a mesh of it \
-             in the train split, or with fewer --min-points"
+             in the train split, or with a smaller --min-points"
         ));
     }
     if recipe.negatives > 0.0 && clouds.classes.iter().any(|name| name == UNKNOWN) {
@@ -168,7 +170,8 @@ impl<'a> Run<'a> {
         let digest = clouds.digest();
         let mut run = Self { folder, trainer, metrics, classes, training_set, digest, report };
         let path = run.folder.join("checkpoint.safetensors");
-        if path.is_file() {
+        let resumes = path.is_file() && !job.overwrite;
+        if resumes {
             let notes = checkpoint::read(&path, &mut run.trainer, &run.digest)?;
             let (epoch, epochs) = (run.trainer.epoch, job.recipe.epochs);
             (run.report)(Progress::Resumed { epoch, epochs });
@@ -178,6 +181,10 @@ impl<'a> Run<'a> {
             let card = run.card(None);
             let clouds = negatives::added(clouds.clone(), &job.recipe, "learnt", 0);
             init::start(&mut run.trainer, model, &card, &clouds)?;
+        }
+        // Not before everything is checked: a run that cannot begin leaves the finished one.
+        if path.is_file() && !resumes {
+            fs::remove_file(&path).map_err(|source| FormatError::io(&path, source))?;
         }
         let text = run.trainer.recipe.to_toml()?;
         atomic::write_bytes(&run.folder.join("recipe.toml"), &text)?;

@@ -117,7 +117,6 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
         return check(folder);
     }
     let progress = Progress::default();
-    signals::stop(&progress);
     let config = args.settings.config()?;
     flags::need_simplification(config.simplify.is_some())?;
     let (meshes_folder, default_out) = match &args.meshes {
@@ -163,7 +162,8 @@ fn make_files(
     verbose: bool,
 ) -> anyhow::Result<Outcome> {
     let started = Instant::now();
-    let manifest = bar::beside(progress, || make(plan, caster, progress))?;
+    let manifest =
+        bar::beside(progress, || signals::stop(progress, || make(plan, caster, progress)))?;
     if progress.is_scanned.load(SeqCst) {
         report_failures(&manifest.failures);
         summary::print(plan.out, &manifest, progress, started.elapsed(), verbose);
@@ -233,7 +233,8 @@ fn report_empty_sets(manifest: &Manifest) -> bool {
     all_have_points
 }
 
-/// Prints the packed files from which all clouds are left out. Returns whether any file has clouds.
+/// Prints the packed files from which all clouds are left out. Returns whether there is none, or
+/// another file has clouds.
 fn report_empty_packed(manifest: &Manifest) -> bool {
     let is_empty = |packed: &&PackedRecord| packed.clouds == 0 && !packed.left_out.is_empty();
     let empty: Vec<_> = manifest.packed.iter().filter(is_empty).collect();

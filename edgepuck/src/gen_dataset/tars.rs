@@ -1,7 +1,7 @@
 //! `gen-dataset --layout webdataset`: makes tars and hands each over when it is complete.
 
 use super::{report_failures, summary};
-use crate::{Outcome, shell};
+use crate::{Outcome, shell, signals};
 use edgepuck_dataset::{Cut, HandOver, Plan, Progress, Sample, TarRecord, Tars, make_tars};
 use sim_gpu::Caster;
 use std::path::Path;
@@ -46,7 +46,7 @@ pub fn run(
         },
         hand_over: hand_over.as_ref().map(|hand_over| hand_over as HandOver),
     };
-    let made = make_tars(plan, &tars, caster, progress)?;
+    let made = signals::stop(progress, || make_tars(plan, &tars, caster, progress))?;
 
     let mut failures: Vec<_> = made.tars.iter().flat_map(|tar| tar.failures.clone()).collect();
     failures.sort_by(|p, q| p.source.cmp(&q.source));

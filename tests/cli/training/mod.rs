@@ -75,6 +75,13 @@ fn a_run_leaves_a_model_and_a_folder() {
     // The same again does nothing but read the test half once more.
     let again = train(folder.path(), "train --data . --recipe small.toml --out m.safetensors");
     assert!(stderr(&again).contains("resuming after epoch 2 of 2"), "{}", stderr(&again));
+    let checkpoint = || std::fs::read(run.join("checkpoint.safetensors")).unwrap();
+    let finished = checkpoint();
+    for wrong in ["--data nowhere", "--data . --points 33", "--data . --init nowhere"] {
+        let words = format!("train {wrong} --recipe small.toml --out m.safetensors --overwrite");
+        assert!(!train(folder.path(), &words).status.success(), "{wrong}");
+        assert!(checkpoint() == finished, "{wrong}");
+    }
     let words = "train --data . --recipe small.toml --out m.safetensors --overwrite";
     let again = train(folder.path(), words);
     assert!(again.status.success() && !stderr(&again).contains("resuming"), "{}", stderr(&again));
@@ -119,7 +126,7 @@ fn what_cannot_be_learnt_from_is_an_error_that_names_it() {
         ("--data nowhere", "nowhere: expected a packed NPZ"),
         (
             "--data . --points 33",
-            ".: expected clouds of 33 points or more, found 32: give --points",
+            ".: expected clouds of 33 points or more, found 32: give at most 32",
         ),
         ("--data . --recipe bad.toml", "unknown field `epoch`"),
         (

@@ -1,4 +1,3 @@
-use std::fs;
 use std::path::PathBuf;
 
 use crate::clouds::Clouds;
@@ -85,15 +84,21 @@ pub fn run(args: &TrainArgs) -> anyhow::Result<()> {
     let name = args.data.display().to_string();
     let data_name = args.data_name.as_ref().unwrap_or(&name);
     let test = args.test.clone().or(test_part);
-    let job = Job { recipe, clouds: &clouds, data: &name, data_name, out: &args.out };
+    let job = Job {
+        recipe,
+        clouds: &clouds,
+        data: &name,
+        data_name,
+        out: &args.out,
+        overwrite: args.overwrite,
+    };
     if let Some(accuracy) = job.run(test.as_deref(), &mut shown())? {
         super::print(&accuracy)?;
     }
     super::print(&args.out.display().to_string())
 }
 
-/// Checks the name of the model, and that only a model of the run beside it is replaced. Removes that
-/// run if the user wants another.
+/// Checks the name of the model, and that only a model of the run beside it is replaced.
 fn check_output(args: &TrainArgs) -> anyhow::Result<()> {
     need_extension("--out", &args.out, &["safetensors"])?;
     if args.out.is_dir() {
@@ -101,10 +106,8 @@ fn check_output(args: &TrainArgs) -> anyhow::Result<()> {
         return Err(Usage(format!("--out: expected a file, found the folder {out}")).into());
     }
     let checkpoint = args.out.with_extension("run").join("checkpoint.safetensors");
-    match (args.overwrite, checkpoint.is_file()) {
-        (true, true) => fs::remove_file(&checkpoint)?,
-        (false, false) => Overwrite::default().check([&*args.out])?,
-        _ => {}
+    if !args.overwrite && !checkpoint.is_file() {
+        Overwrite::default().check([&*args.out])?;
     }
     Ok(())
 }

@@ -141,7 +141,7 @@ fn a_run_that_was_interrupted_is_not_started_again() {
     let run = |name: &str, epochs| {
         let recipe = Recipe { epochs, init: Some(model.clone()), ..recipe() };
         let out = &out(name);
-        Job { recipe, clouds: &clouds, data: "data", data_name: "data", out }
+        Job { recipe, clouds: &clouds, data: "data", data_name: "data", out, overwrite: false }
             .run(None, &mut |_| {})
             .unwrap();
     };

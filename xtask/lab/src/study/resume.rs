@@ -24,7 +24,7 @@ pub fn network(out: &Path, name: &str, recipe: Recipe, clouds: &Clouds) -> anyho
         return Ok(());
     }
     eprintln!("training {name}: {} clouds, {} points", clouds.len(), recipe.points);
-    let job = Job { recipe, clouds, data: name, data_name: name, out };
+    let job = Job { recipe, clouds, data: name, data_name: name, out, overwrite: false };
     let mut report = |progress: Progress<'_>| {
         if let Progress::Epoch(epoch) = progress {
             eprintln!("{epoch}");
