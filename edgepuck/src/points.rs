@@ -4,7 +4,9 @@ use std::borrow::Cow;
 use std::net::IpAddr;
 use std::path::{Path, PathBuf};
 
-use formats::cloud_file::{CloudFormat, check_sweep, read_cloud_as, read_intensities};
+use formats::cloud_file::{
+    CloudFormat, check_sweep, doubtful_sweep, read_cloud_as, read_intensities,
+};
 use formats::scan_file::read_scan;
 use formats::{FormatError, Scan, Senders, ouster, pcap, velodyne};
 
@@ -101,6 +103,9 @@ impl SweepArgs {
         let scan = self.place.points.read(&self.sweep)?;
         let remedy = "give the sensor's position by --sensor, or the format by --format";
         check_sweep(self.relative(&scan), &self.sweep, remedy)?;
+        if let Some(doubt) = doubtful_sweep(self.relative(&scan)) {
+            eprintln!("warning: {}: {doubt}", self.sweep.display());
+        }
         Ok(scan)
     }
 

@@ -65,7 +65,7 @@ struct MeshArgs {
 
     /// Distance of the sensor from the centre of the meshes, at which it looks, metres [default:
     /// 3]
-    #[arg(long, value_name = "M", value_parser = flags::positive)]
+    #[arg(long, value_name = "M", value_parser = flags::positive, allow_negative_numbers = true)]
     distance: Option<f64>,
 
     /// Elevation of the sensor above the horizon, degrees [default: 20]

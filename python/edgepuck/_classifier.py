@@ -104,7 +104,14 @@ def _is_batch(cloud: Any) -> bool:
 
 def points_of(cloud: ArrayLike) -> NDArray[np.float32]:
     """The first three columns of `cloud`, which are points of shape [n, 3]."""
-    points = np.asarray(cloud, dtype=np.float32)
-    if points.ndim != 2 or points.shape[1] < 3:
-        raise _edgepuck.Error(f"expected points of shape [n, 3], found {list(points.shape)}")
+    points = np.asarray(cloud)
+    if points.dtype.names is not None:
+        missing = [axis for axis in "xyz" if axis not in points.dtype.names]
+        if missing:
+            raise _edgepuck.Error(f"expected fields x, y and z, found {list(points.dtype.names)}")
+        points = np.stack([points[axis] for axis in "xyz"], axis=-1)
+    points = np.asarray(points, dtype=np.float32)
+    if points.ndim != 2 or points.shape[1] < 3 or (points.shape[0] == 3 and points.shape[1] > 32):
+        way_out = ": transpose it" if points.ndim == 2 and points.shape[0] == 3 else ""
+        raise _edgepuck.Error(f"expected points of shape [n, 3], found {list(points.shape)}{way_out}")
     return np.ascontiguousarray(points[:, :3])

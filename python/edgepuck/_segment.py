@@ -43,6 +43,7 @@ def rings_of(rings: ArrayLike | None) -> NDArray[np.uint16] | None:
     if rings is None:
         return None
     found = np.asarray(rings)
-    if found.ndim != 1 or (found.size and not (0 <= found.min() and found.max() < 2**16)):
+    is_whole = found.dtype.kind in "iuf" and np.array_equal(found, np.floor(found))
+    if found.ndim != 1 or not is_whole or (found.size and not (0 <= found.min() and found.max() < 2**16)):
         raise _edgepuck.Error("rings: expected whole numbers from 0 to 65535 of shape [n]")
     return np.ascontiguousarray(found, dtype=np.uint16)

@@ -1,8 +1,9 @@
 //! Rust's lists as NumPy arrays, without a copy, and arrays as lists.
 
-use crate::error::raised;
+use crate::error::{raised, warn};
 use edgepuck_program::points::PointsArgs;
 use formats::Scan;
+use formats::cloud_file::{doubtful_sweep, judge_sweep};
 use formats::hash::Hashing;
 use formats::scan::{Attribute, ColumnSlot};
 use formats::scan_file::{ScanFormat, write_scan};
@@ -24,6 +25,17 @@ pub fn points(array: &PyReadonlyArray2<'_, f32>) -> PyResult<Vec<[f32; 3]>> {
         return Err(raised(format!("expected points of shape [n, 3], found {:?}", array.shape())));
     }
     Ok(array.as_array().rows().into_iter().map(|row| [row[0], row[1], row[2]]).collect())
+}
+
+/// The points of a sweep, metres from the sensor.
+pub fn sweep(py: Python<'_>, array: &PyReadonlyArray2<'_, f32>) -> PyResult<Vec<[f32; 3]>> {
+    let points = points(array)?;
+    let metres = || points.iter().map(|point| point.map(f64::from));
+    judge_sweep(metres()).map_err(|(i, cause)| {
+        raised(format!("point {i}: {cause}: subtract the sensor's position, or give metres"))
+    })?;
+    warn(py, doubtful_sweep(metres()).as_slice())?;
+    Ok(points)
 }
 
 /// The columns of `scan` by their names in files.

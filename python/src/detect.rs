@@ -1,4 +1,4 @@
-use crate::arrays::points;
+use crate::arrays::sweep;
 use crate::error::{raised, raised_with_causes};
 use edgepuck_program::detect::{Detector, Object};
 use edgepuck_segment::OrientedBox;
@@ -22,7 +22,7 @@ pub fn detect<'py>(
 ) -> PyResult<Vec<Bound<'py, PyDict>>> {
     let options = Options { precision: precision.parse().map_err(raised)?, ..Options::default() };
     let ring = rings.map(|rings| rings.as_array().to_vec());
-    let scan = Scan { positions: points(&cloud)?, ring, ..Scan::default() };
+    let scan = Scan { positions: sweep(py, &cloud)?, ring, ..Scan::default() };
     let found = py.detach(|| {
         let mut detector = Detector::open(Path::new(model), &options, min_points)?;
         detector.min_confidence = min_confidence;

@@ -1,4 +1,4 @@
-use crate::arrays::points;
+use crate::arrays::{points, sweep};
 use crate::error::raised;
 use edgepuck_segment::{Label, Segmenter, Settings, Sweep};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
@@ -26,7 +26,8 @@ pub fn segment<'py>(
     radius: Option<f32>,
     min_points: Option<usize>,
 ) -> PyResult<Bound<'py, PyArray1<i32>>> {
-    let cloud = points(&cloud)?;
+    // Connected components need no sweep.
+    let cloud = if radius.is_some() { points(&cloud)? } else { sweep(py, &cloud)? };
     let rings = rings.map(|rings| rings.as_array().to_vec());
     let mut settings = radius.map_or_else(Settings::default, Settings::of_components);
     if let Some(min_points) = min_points {

@@ -37,6 +37,13 @@ SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0]]
         (lambda: ep.detect(np.zeros((5, 3)), "no-model"), "no-model"),
         (lambda: ep.Mesh(SQUARE, [[0, 1, 2]], units="km"), "expected one of m, mm, cm, in, ft"),
         (lambda: ep.segment(np.zeros((5, 3)), rings=[1, 2]), "ring"),
+        (lambda: ep.segment(np.zeros((2, 3)), rings=[1, 2.5]), "rings: expected whole numbers"),
+        (lambda: ep.detect(np.zeros((2, 3)), rings=[1, np.nan]), "rings: expected whole numbers"),
+        (lambda: ep.detect(np.full((5, 3), 49520.0)), "point 0: expected metres from the sensor"),
+        (lambda: ep.segment([[1.0, 2.0, np.nan]]), "point 0: expected metres from the sensor"),
+        (lambda: ep.detect(np.zeros((3, 200))), "found [3, 200]: transpose it"),
+        (lambda: ep.Classifier("edge-64")(np.zeros((2, 3, 200))), "found [3, 200]: transpose it"),
+        (lambda: ep.segment(np.zeros(5, [("x", "f4"), ("y", "f4")])), "expected fields x, y and z"),
         (lambda: ep.Scenes("moon"), "moon"),
         (lambda: ep.scan_scene("missing.toml"), "missing.toml"),
         (lambda: ep.Dataset("missing"), "missing: cannot be read"),
@@ -51,6 +58,22 @@ def test_what_cannot_be_used_is_named(make, message: str) -> None:
     with pytest.raises(ep.Error, match="(?s)") as caught:
         make()
     assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("farthest", "message"),
+    [(8000.0, "8000.000 m from the sensor"), (0.08, "are the points in metres"), (0.0, "no point")],
+)
+def test_a_sweep_that_is_probably_not_in_metres_is_told(farthest: float, message: str) -> None:
+    with pytest.warns(UserWarning, match=message):
+        ep.segment(np.full((5, 3), [farthest, 0.0, 0.0]))
+
+
+def test_the_fields_x_y_and_z_are_points() -> None:
+    post = np.array([[5.0, 0.0, 0.05 * i - 1.0] for i in range(30)], np.float32)
+    fields = [("ring", "u2"), ("x", "f4"), ("y", "f4"), ("z", "f4")]
+    named = np.array([(7, *point) for point in post], fields)
+    assert np.array_equal(ep.segment(named), ep.segment(post))
 
 
 @pytest.mark.parametrize(
