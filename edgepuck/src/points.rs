@@ -101,7 +101,8 @@ impl SweepArgs {
     /// The sweep as in its file.
     pub fn read_whole(&self) -> Result<Scan, FormatError> {
         let scan = self.place.points.read(&self.sweep)?;
-        let remedy = "give the sensor's position by --sensor, or the format by --format";
+        let remedy = "are they in millimetres, or from another origin? Scale them, give the sensor's \
+                      position by --sensor, or the format by --format";
         check_sweep(self.relative(&scan), &self.sweep, remedy)?;
         if let Some(doubt) = doubtful_sweep(self.relative(&scan)) {
             eprintln!("warning: {}: {doubt}", self.sweep.display());

@@ -181,6 +181,15 @@ fn scene(args: &Args) -> anyhow::Result<(Scene, String)> {
         }
     };
     let what = file.display().to_string();
+    if file.is_dir() {
+        let cause = "expected a file, found a folder: `edgepuck gen-dataset` scans its meshes";
+        return Err(Usage(format!("{what}: {cause}")).into());
+    }
+    if let Some(extension) = file.extension().filter(|of| !of.eq_ignore_ascii_case("toml")) {
+        let found = extension.display();
+        let cause = "expected a mesh (.obj, .off, .ply, .stl) or a scene (.toml)";
+        return Err(Usage(format!("{what}: {cause}, found the extension .{found}")).into());
+    }
     if let Some(flag) = args.meshes.given().or(args.effects.given()) {
         let cause =
             format!("{flag} applies to scans of meshes: {what} is a scene, which states it");
@@ -256,14 +265,16 @@ fn told(scene: &Scene, scan: &Scan) -> String {
     let of_the_air = effects.weather.as_ref().map(|_| format!("{} of the air, ", tally.scattered));
     let can_be_missed = effects.detection.is_some() || effects.weather.is_some();
     let undetected = can_be_missed.then(|| format!("{} undetected, ", tally.undetected));
+    // Noise can move a return behind a sensor that is close to it.
+    let behind = (tally.negative > 0).then(|| format!(", {} behind the sensor", tally.negative));
     format!(
-        "{} points ({}{} out of range, {}{} dropped, {} with a negative range)",
+        "{} points ({}{} out of range, {}{} dropped{})",
         tally.points,
         of_the_air.unwrap_or_default(),
         tally.out_of_range,
         undetected.unwrap_or_default(),
         tally.dropped,
-        tally.negative,
+        behind.unwrap_or_default(),
     )
 }
 

@@ -40,6 +40,10 @@ pub fn sweep(py: Python<'_>, array: &PyReadonlyArray2<'_, f32>) -> PyResult<Vec<
 
 /// The columns of `scan` by their names in files.
 pub fn scan(py: Python<'_>, mut scan: Scan) -> PyResult<Bound<'_, PyDict>> {
+    if scan.is_empty() {
+        let cause = "no beam returned a point: expected an object in the sensor's range and view";
+        warn(py, &[cause])?;
+    }
     let columns = PyDict::new(py);
     columns.set_item("origin", scan.origin)?;
     columns.set_item("pose", scan.pose.as_ref())?;

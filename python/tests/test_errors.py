@@ -69,6 +69,12 @@ def test_a_sweep_that_is_probably_not_in_metres_is_told(farthest: float, message
         ep.segment(np.full((5, 3), [farthest, 0.0, 0.0]))
 
 
+def test_a_scan_of_nothing_is_told() -> None:
+    with pytest.warns(UserWarning, match="no beam returned a point"):
+        scan = ep.Scene().scan(ep.Sensor("vlp16"))
+    assert len(scan.positions) == 0
+
+
 def test_the_fields_x_y_and_z_are_points() -> None:
     post = np.array([[5.0, 0.0, 0.05 * i - 1.0] for i in range(30)], np.float32)
     fields = [("ring", "u2"), ("x", "f4"), ("y", "f4"), ("z", "f4")]

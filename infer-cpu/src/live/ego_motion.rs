@@ -88,6 +88,41 @@ impl EgoMotion {
         self.known_s().map_or(Ok(()), |known_s| check_cover(known_s, sent_s))
     }
 
+    /// Why the poses are probably not those of a sensor on the ground, in metres and seconds; empty
+    /// if nothing speaks against it.
+    #[must_use]
+    pub fn doubts(&self) -> Vec<String> {
+        let Self::Poses(poses) = self else { return Vec::new() };
+        let steps = || poses.windows(2).map(|pair| (pair[0].0, pair[1].0 - pair[0].0, pair));
+        let mut doubts = Vec::new();
+        let speeds = steps().map(|(at_s, dt_s, pair)| {
+            (pair[0].1.position_m.distance(pair[1].1.position_m) / dt_s, at_s)
+        });
+        if let Some((speed_m_s, at_s)) = speeds.max_by(|a, b| a.0.total_cmp(&b.0))
+            && speed_m_s > FASTEST_M_S
+        {
+            doubts.push(format!(
+                "the sensor moves at {speed_m_s:.0} m/s at {at_s} s: expected at most {FASTEST_M_S} \
+                 m/s; are the positions in metres and the times in seconds?"
+            ));
+        }
+        let is_inverted = |(_, pose): &&(f64, Pose)| (pose.world_from_sensor * DVec3::Z).z < 0.0;
+        if 2 * poses.iter().filter(is_inverted).count() > poses.len() {
+            doubts.push(
+                "the sensor stands on its head: expected quaternions in the order x y z w".into(),
+            );
+        }
+        if let Some((at_s, gap_s, _)) = steps().max_by(|a, b| a.1.total_cmp(&b.1))
+            && gap_s > LONGEST_GAP_S
+        {
+            doubts.push(format!(
+                "there is no pose for {gap_s:.3} s after {at_s} s: between two poses the sensor is \
+                 taken to move straight on"
+            ));
+        }
+        doubts
+    }
+
     /// The times of the first and the last pose; `None` for a twist.
     #[must_use]
     pub fn known_s(&self) -> Option<[f64; 2]> {
@@ -97,6 +132,11 @@ impl EgoMotion {
         }
     }
 }
+
+/// Faster than cars, metres per second.
+const FASTEST_M_S: f64 = 100.0;
+/// Longer than the steps of odometry, GPS and SLAM, seconds.
+const LONGEST_GAP_S: f64 = 1.0;
 
 /// The pose after `time_s` of constant motion: the exponential of the twist.
 fn moved(linear_m_s: DVec3, angular_rad_s: DVec3, time_s: f64) -> Pose {
@@ -135,6 +175,20 @@ mod tests {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), text).unwrap();
         EgoMotion::read(file.path()).unwrap()
+    }
+
+    #[test]
+    fn poses_of_other_units_orders_and_steps_are_doubted() {
+        for (text, expected) in [
+            ("0 0 0 0 0 0 0 1\n0.1 2 0 0 0 0 0 1\n", None),
+            ("0 0 0 0 0 0 0 1\n0.1 2000 0 0 0 0 0 1\n", Some("20000 m/s at 0 s")),
+            ("0 0 0 0 1 0 0 0\n0.1 2 0 0 1 0 0 0\n", Some("on its head")),
+            ("0 0 0 0 0 0 0 1\n2.5 2 0 0 0 0 0 1\n", Some("no pose for 2.500 s after 0 s")),
+        ] {
+            let doubts = read(text).doubts();
+            assert_eq!(doubts.len(), usize::from(expected.is_some()), "{doubts:?}");
+            assert!(doubts.concat().contains(expected.unwrap_or_default()), "{doubts:?}");
+        }
     }
 
     #[test]

@@ -226,7 +226,12 @@ impl LiveArgs {
 
     fn options(&self) -> anyhow::Result<LiveOptions> {
         let ego_motion = match (&self.poses, self.twist.as_deref()) {
-            (Some(file), _) => Some(EgoMotion::read(file)?),
+            (Some(file), _) => {
+                let motion = EgoMotion::read(file)?;
+                let warn = |doubt: String| eprintln!("warning: {}: {doubt}", file.display());
+                motion.doubts().into_iter().for_each(warn);
+                Some(motion)
+            }
             (None, Some(&[x, y, z, roll, pitch, yaw])) => Some(EgoMotion::Twist {
                 linear_m_s: DVec3::new(x, y, z),
                 angular_rad_s: DVec3::new(roll, pitch, yaw).map(f64::to_radians),
