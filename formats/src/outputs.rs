@@ -17,7 +17,9 @@ impl Overwrite {
     /// # Errors
     /// Names the first that does.
     pub fn check<'a>(&self, outputs: impl IntoIterator<Item = &'a Path>) -> Result<(), Usage> {
-        let existing = outputs.into_iter().find(|path| !self.overwrite && path.exists());
+        // Devices and pipes hold nothing to lose.
+        let stands = |path: &&Path| path.is_file() || path.is_dir();
+        let existing = outputs.into_iter().find(|path| !self.overwrite && stands(path));
         let refused = |path: &Path| {
             Usage(format!("{}: it exists already: --overwrite replaces it", path.display()))
         };

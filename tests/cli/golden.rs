@@ -110,6 +110,23 @@ fn street_scenes_and_their_clusters_keep_their_bytes() {
     check(&[("street scenes with clusters", tree(&folder.at("street")))]);
 }
 
+#[test]
+fn surfaces_corruptions_and_weather_keep_their_bytes() {
+    let folder = with_shapes();
+    folder.succeeds("sample-surfaces shapes --points 64 --min-points 8 --out surfaces");
+    folder.succeeds("corrupt shapes --points 64 --out corrupted");
+    folder.succeeds("gen-scenes street --sweeps 1 --save 1 --seed 3 --adapter cpu --out street");
+    let sweep = "street/sweeps/000000.npz";
+    folder.succeeds(&format!("corrupt {sweep} --out sweeps"));
+    folder.succeeds(&format!("weather {sweep} --rain 40 --seed 2 --out rain.npz"));
+    check(&[
+        ("clouds of surfaces", tree(&folder.at("surfaces"))),
+        ("corrupted clouds", tree(&folder.at("corrupted"))),
+        ("corrupted sweeps", tree(&folder.at("sweeps"))),
+        ("a sweep in rain", of_bytes(&folder.bytes("rain.npz"))),
+    ]);
+}
+
 /// The scalar kernels are the same on every processor.
 fn on_scalar_kernels() -> Options {
     Options { kernel: Some(KernelName::Scalar), threads: 1, ..Options::default() }
