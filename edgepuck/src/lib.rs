@@ -33,7 +33,7 @@ mod scan;
 mod segment;
 mod shell;
 pub mod signals;
-mod significant_digits;
+pub mod significant_digits;
 #[cfg(feature = "models")]
 pub mod trade_record;
 mod weather;
