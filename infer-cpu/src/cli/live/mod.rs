@@ -139,6 +139,7 @@ fn rate(word: &str) -> Result<f64, String> {
 pub fn run(args: &LiveArgs) -> anyhow::Result<Outcome> {
     let options = args.options()?;
     args.check_poses(&options)?;
+    args.warn_of_poses(&options);
     let mut pipeline = args.pipeline(&options)?;
     let is_over = Arc::new(AtomicBool::new(false));
     for signal in [SIGTERM, SIGINT] {
@@ -226,12 +227,7 @@ impl LiveArgs {
 
     fn options(&self) -> anyhow::Result<LiveOptions> {
         let ego_motion = match (&self.poses, self.twist.as_deref()) {
-            (Some(file), _) => {
-                let motion = EgoMotion::read(file)?;
-                let warn = |doubt: String| eprintln!("warning: {}: {doubt}", file.display());
-                motion.doubts().into_iter().for_each(warn);
-                Some(motion)
-            }
+            (Some(file), _) => Some(EgoMotion::read(file)?),
             (None, Some(&[x, y, z, roll, pitch, yaw])) => Some(EgoMotion::Twist {
                 linear_m_s: DVec3::new(x, y, z),
                 angular_rad_s: DVec3::new(roll, pitch, yaw).map(f64::to_radians),
@@ -245,6 +241,14 @@ impl LiveArgs {
             is_recorded: self.pcap.is_some(),
             ..LiveOptions::default()
         })
+    }
+
+    /// Tells why the poses are probably not those of the sensor.
+    fn warn_of_poses(&self, options: &LiveOptions) {
+        let doubts = options.ego_motion.as_ref().map(EgoMotion::doubts).unwrap_or_default();
+        for (doubt, file) in doubts.iter().zip(self.poses.iter().cycle()) {
+            eprintln!("warning: {}: {doubt}", file.display());
+        }
     }
 
     /// Checks that poses cover the whole capture, before there is any output. The packets of a pipe
