@@ -16,11 +16,8 @@ use sim_gpu::internals::sensor::SensorProfile;
 use sim_gpu::{Caster, Mesh, Pose, Scan, Scene, Sensor};
 use std::collections::BTreeSet;
 use std::num::NonZeroU32;
+use test_support::{assert_uncorrelated, correlation};
 use tests::meshes::{icosphere, mapped};
-
-/// How many standard errors a correlation may be from 0: that of n pairs of independent numbers has
-/// the standard error 1 / sqrt(n), and 6e-7 of all seeds are farther off.
-const STANDARD_ERRORS: f64 = 5.0;
 
 /// The noise of each beam, by beam.
 type Residuals = Vec<f64>;
@@ -34,19 +31,16 @@ fn sensor() -> Sensor {
     Sensor::from(SensorProfile::builtin("vlp32c").unwrap().decimated(few))
 }
 
-fn correlation(a: &[f64], b: &[f64]) -> f64 {
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    dot(a, b) / (dot(a, a) * dot(b, b)).sqrt()
+fn pairs(a: &[f64], b: &[f64]) -> Vec<[f64; 2]> {
+    a.iter().zip(b).map(|(a, b)| [*a, *b]).collect()
 }
 
 /// That no two of these have noise in common, also if one is shifted by a beam.
 fn assert_independent(all: &[(String, Residuals)]) {
     for (i, (name, own)) in all.iter().enumerate() {
-        let bound = STANDARD_ERRORS / (own.len() as f64).sqrt();
-        assert!(correlation(&own[1..], &own[..own.len() - 1]).abs() < bound, "{name}: next beam");
+        assert_uncorrelated(&format!("{name}: next beam"), &pairs(&own[1..], own));
         for (other, others) in &all[i + 1..] {
-            let found = correlation(own, others);
-            assert!(found.abs() < bound, "{name} and {other}: {found}, not below {bound}");
+            assert_uncorrelated(&format!("{name} and {other}"), &pairs(own, others));
         }
     }
 }
@@ -139,7 +133,7 @@ fn losses_noise_and_directions_of_noise_are_independent() {
     // Noise of the range and of x are the same number of one model or the other.
     all.extend([("y".to_owned(), along(1)), ("z".to_owned(), along(2))]);
     assert_independent(&all);
-    assert!(correlation(&all[1].1, &along(0)) > 0.99);
+    assert!(correlation(&pairs(&all[1].1, &along(0))) > 0.99);
 }
 
 /// Two sets of the same sensor and poses, of two meshes of the same shape, in two views of the same

@@ -18,8 +18,7 @@ use crate::points::SweepArgs;
 use crate::preview::panel::Outline;
 use crate::segment::tint;
 use crate::{Outcome, Usage, preview};
-use formats::outputs::Overwrite;
-use formats::outputs::need_extension;
+use formats::outputs::{Overwrite, need_extension};
 use kitti::{Camera, label};
 
 #[derive(clap::Args)]
@@ -95,6 +94,7 @@ pub(crate) fn run(args: &DetectArgs) -> anyhow::Result<Outcome> {
         lines.into_bytes()
     };
     atomic::write_bytes(&args.out, written)?;
+    // Greys: clusters without an object are darker than all around them.
     let tints = labels.iter().map(|&label| match label {
         Label::Cluster(number) => objects
             .binary_search_by_key(&number, |object| object.cluster)
@@ -104,11 +104,14 @@ pub(crate) fn run(args: &DetectArgs) -> anyhow::Result<Outcome> {
     let tints: Vec<_> = tints.collect();
     let outlines: Vec<_> = objects
         .iter()
-        .map(|object| Outline {
-            corners: [0, 1, 2, 3].map(|i| object.corners()[i].truncate().to_array()),
-            class: &object.class,
-            score: object.confidence,
-            tint: object.tint(),
+        .map(|object| {
+            let [a, b, c, d, ..] = object.corners();
+            Outline {
+                corners: [a, b, c, d].map(|corner| corner.truncate().to_array()),
+                class: &object.class,
+                score: object.confidence,
+                tint: object.tint(),
+            }
         })
         .collect();
     preview::draw_from_above(&scan, &tints, &outlines, &args.input.title(), &picture)?;

@@ -10,8 +10,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use crate::Outcome;
 use crate::flags::number;
 use crate::gen_scenes::read_recipe;
-use formats::outputs::Overwrite;
-use formats::outputs::need_extension;
+use formats::outputs::{Overwrite, need_extension};
 
 #[derive(clap::Args)]
 pub struct Args {

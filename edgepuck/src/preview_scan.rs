@@ -2,8 +2,7 @@
 
 use crate::points::PointsArgs;
 use crate::{Outcome, preview};
-use formats::outputs::Overwrite;
-use formats::outputs::need_extension;
+use formats::outputs::{Overwrite, need_extension};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]

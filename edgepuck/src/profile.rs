@@ -1,8 +1,7 @@
 use crate::Outcome;
 use crate::significant_digits::digits;
 use formats::atomic;
-use formats::outputs::Overwrite;
-use formats::outputs::need_extension;
+use formats::outputs::{Overwrite, need_extension};
 use glam::DVec3;
 use sim_gpu::glam;
 use sim_gpu::internals::sensor::{BeamPattern, Layout, SensorProfile, builtin_names};

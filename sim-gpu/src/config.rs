@@ -121,7 +121,7 @@ pub fn read<T: DeserializeOwned, U, E: Into<Vec<InvalidValue>>>(
 /// Parses `text`, which is in `file`, and makes of it what is wanted by `check`.
 ///
 /// # Errors
-/// All unknown and missing keys and values of other types at once or, if there is none, all that
+/// All unknown keys, missing keys and values of other types; in a file without these, all that
 /// `check` refuses.
 pub fn parse<T: DeserializeOwned, U, E: Into<Vec<InvalidValue>>>(
     text: &str,

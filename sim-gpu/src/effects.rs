@@ -311,8 +311,8 @@ struct EffectsTable {
     weather: Option<Box<Weather>>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     motion: Option<Box<EvenMotion>>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     /// The quantum to multiples of which ranges are rounded, metres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     quantise_m: Option<SwitchOrMetres>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     intensity: Option<bool>,

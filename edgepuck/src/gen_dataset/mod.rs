@@ -233,8 +233,8 @@ fn report_empty_sets(manifest: &Manifest) -> bool {
     all_have_points
 }
 
-/// Prints the packed files from which all clouds are left out. Returns whether there is none, or
-/// another file has clouds.
+/// Prints the packed files from which all clouds are left out. Returns `false` if there are such
+/// files and no file has a cloud.
 fn report_empty_packed(manifest: &Manifest) -> bool {
     let is_empty = |packed: &&PackedRecord| packed.clouds == 0 && !packed.left_out.is_empty();
     let empty: Vec<_> = manifest.packed.iter().filter(is_empty).collect();

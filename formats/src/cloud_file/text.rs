@@ -91,12 +91,11 @@ impl Layout {
             let cause = format!("expected x, y and z, found {} column(s)", fields.len());
             return Err(line.error(cause));
         }
-        let is_header = fields.iter().all(|field| is_name(field));
+        let (n, is_header) = (fields.len(), fields.iter().all(|field| is_name(field)));
         let names: Vec<_> = match is_header {
             true => fields,
-            false => separator.fields(comment).filter(|_| fields.len() > 1).collect(),
+            false => separator.fields(comment).collect(),
         };
-        let n = separator.fields(content).count();
         let places = AXES.map(|axis| {
             let exact = names.iter().position(|name| name.eq_ignore_ascii_case(axis));
             let usual =

@@ -41,7 +41,7 @@ pub struct Clouds {
 /// What is doubtful about the meshes: all that is known, and of it what was not told yet.
 type Warnings = (BTreeSet<String>, Vec<String>);
 
-/// The points of a cloud in the unit sphere, or why there is none.
+/// The points of a cloud, in the unit sphere.
 type Points = Result<Vec<[f32; 3]>, DatasetError>;
 
 /// A mesh in memory.

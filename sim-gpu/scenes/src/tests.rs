@@ -311,18 +311,14 @@ fn errors(noisy: &Scan, clean: &Scan) -> BTreeMap<u32, f64> {
     ranges(noisy).into_iter().map(|(beam, range_m)| (beam, range_m - clean[&beam])).collect()
 }
 
-/// That the numbers of no two of these, by key, correlate: by five standard errors, 1 / sqrt(n).
+/// That the numbers of no two of these, by key, correlate.
 fn assert_independent(all: &[BTreeMap<u32, f64>]) {
     for (i, one) in all.iter().enumerate() {
         for (j, other) in all.iter().enumerate().skip(i + 1) {
             let both: Vec<[f64; 2]> =
                 one.iter().filter_map(|(key, a)| Some([*a, *other.get(key)?])).collect();
-            let sum = |of: fn(&[f64; 2]) -> f64| both.iter().map(of).sum::<f64>();
-            let correlation =
-                sum(|[a, b]| a * b) / (sum(|[a, _]| a * a) * sum(|[_, b]| b * b)).sqrt();
             assert!(both.len() > 1000, "{}", both.len());
-            let bound = 5.0 / (both.len() as f64).sqrt();
-            assert!(correlation.abs() < bound, "{i} and {j}: {correlation}, not below {bound}");
+            test_support::assert_uncorrelated(&format!("{i} and {j}"), &both);
         }
     }
 }

@@ -13,10 +13,10 @@ use toml::de::{DeString, DeTable, DeValue, Deserializer, Error};
 
 use super::{InvalidValue, one_of};
 
-/// The most mistakes that are told.
+/// The largest number of mistakes in a message.
 const MOST: usize = 20;
 
-/// The most characters of a value that are told.
+/// The largest number of characters of a value in a message.
 const MOST_CHARS: usize = 60;
 
 /// The values that stand in for a missing one, in the order in which they are tried, so that serde

@@ -146,14 +146,10 @@ pub fn doubts(root: &Path, entries: &[MeshEntry]) -> Vec<String> {
             doubts.push(format!("no {split} mesh of {}; {way}", some_of(&lack)));
         }
     }
-    // The folders of each mesh, the outermost first.
-    let folders = |relative: &str| -> Vec<String> {
-        let parts: Vec<String> = relative.split('/').map(str::to_owned).collect();
-        parts[..parts.len() - 1].to_vec()
-    };
     let is_deep = |entry: &MeshEntry| {
-        let folders = folders(&entry.relative);
-        folders.len() > 1 && folders.last().is_some_and(|last| safe_name(last) == entry.class)
+        let mut inner_first = folders(entry).rev();
+        let last = inner_first.next();
+        inner_first.next().is_some() && last.is_some_and(|last| safe_name(last) == entry.class)
     };
     if is_alone {
         doubts.push(format!("each of the {n_classes} classes has one mesh; {layouts}"));
@@ -170,8 +166,8 @@ pub fn doubts(root: &Path, entries: &[MeshEntry]) -> Vec<String> {
     }
     let is_held = |entry: &&MeshEntry| {
         let is_held =
-            |name: &String| is_validation(name) && ![&entry.class, &entry.name].contains(&name);
-        entry.split == Split::Train && folders(&entry.relative).iter().any(is_held)
+            |name: &str| is_validation(name) && ![&*entry.class, &*entry.name].contains(&name);
+        entry.split == Split::Train && folders(entry).any(is_held)
     };
     match entries.iter().filter(is_held).count() {
         0 => {}
@@ -184,10 +180,18 @@ pub fn doubts(root: &Path, entries: &[MeshEntry]) -> Vec<String> {
     doubts
 }
 
+/// The names of the folders of a mesh below the root, the outermost first.
+fn folders(entry: &MeshEntry) -> impl DoubleEndedIterator<Item = &str> {
+    let folder = entry.relative.rsplit_once('/').map(|(folder, _)| folder.split('/'));
+    folder.into_iter().flatten()
+}
+
 /// The files below `root` that no mesh needs and that are not read, and the classes that lack a
 /// mesh for it.
 fn left_out(root: &Path, entries: &[MeshEntry]) -> Option<String> {
     let (_, others) = files(root).ok()?;
+    let with_meshes: HashSet<&str> =
+        entries.iter().flat_map(|entry| entry.relative.split('/')).collect();
     let mut extensions = BTreeSet::new();
     let mut lack = BTreeSet::new();
     let mut n = 0;
@@ -201,9 +205,7 @@ fn left_out(root: &Path, entries: &[MeshEntry]) -> Option<String> {
         let folders = file.strip_prefix(root).ok().and_then(Path::parent).into_iter();
         let mut folders = folders.flat_map(Path::components).map(|part| text(part.as_os_str()));
         let class = folders.find(|name| split_called(name).is_none());
-        lack.extend(class.filter(|class| {
-            !entries.iter().any(|entry| entry.relative.split('/').any(|part| part == class))
-        }));
+        lack.extend(class.filter(|class| !with_meshes.contains(&**class)));
     }
     let extensions: Vec<&str> = extensions.iter().map(String::as_str).collect();
     let lack: Vec<&str> = lack.iter().map(String::as_str).collect();

@@ -185,7 +185,7 @@ fn a_misspelt_word_is_told_with_the_likely_one() {
     assert!(!far.contains("did you mean"), "{far}");
 }
 
-/// Broken files, each with all that is told of it: one line for each mistake, and no other.
+/// Broken files, each with its whole message: one line for each mistake, and no other.
 #[test]
 fn all_mistakes_of_a_file_are_told_at_once() {
     let folder = tempfile::tempdir().unwrap();

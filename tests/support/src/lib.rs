@@ -82,3 +82,21 @@ pub fn adapter<A>(found: Option<A>) -> Result<A, String> {
     assert!(found.is_some() || !required, "{REQUIRE_ADAPTER}=1, but {none}");
     found.ok_or_else(|| none.to_owned())
 }
+
+/// The correlation of pairs of numbers of mean 0.
+#[must_use]
+pub fn correlation(pairs: &[[f64; 2]]) -> f64 {
+    let sum = |of: fn(&[f64; 2]) -> f64| pairs.iter().map(of).sum::<f64>();
+    sum(|[a, b]| a * b) / (sum(|[a, _]| a * a) * sum(|[_, b]| b * b)).sqrt()
+}
+
+/// Checks that pairs of numbers do not correlate: for n pairs of independent numbers the correlation
+/// has the standard error 1 / sqrt(n), and 6e-7 of all seeds are five of them from 0.
+///
+/// # Panics
+/// If they do.
+pub fn assert_uncorrelated(what: &str, pairs: &[[f64; 2]]) {
+    let found = correlation(pairs);
+    let bound = 5.0 / (pairs.len() as f64).sqrt();
+    assert!(found.abs() < bound, "{what}: a correlation of {found}, not below {bound}");
+}
