@@ -4,8 +4,8 @@ use crate::{Outcome, Usage};
 use formats::Scan;
 use formats::hash::Hashing;
 use formats::outputs::Overwrite;
-use formats::rng::StreamKey;
 use formats::scan_file::{ScanFormat, write_scan};
+use formats::streams::Stream;
 use glam::DVec3;
 use sim_gpu::effects::{Effects, FogModel, Weather};
 use sim_gpu::glam;
@@ -85,7 +85,7 @@ pub fn run(args: &WeatherArgs) -> anyhow::Result<Outcome> {
     let scan = args.input.read_whole()?;
     let brightness = args.brightness.brightness_of(&scan, &args.input.sweep)?;
     let air = Air::new(&weather, sensor.beam_divergence_deg(), &limit, &sensor.range);
-    let stream = StreamKey::new(args.seed, "weather", 0);
+    let stream = Stream::Weather {}.key(args.seed);
     let sensor_m = DVec3::from_array(args.input.sensor_m(&scan));
     let (mut changed, fates) = in_weather(&scan, &brightness, sensor_m, &air, &limit, stream);
     args.brightness.restore(&mut changed);

@@ -80,6 +80,7 @@ pub mod ply;
 pub mod rows;
 #[doc(hidden)]
 pub mod split;
+pub mod streams;
 #[doc(hidden)]
 pub mod trajectory;
 #[doc(hidden)]

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 #[cfg(feature = "npz")]
 use formats::labelled::LabelledSet;
-use formats::rng::StreamKey;
+use formats::streams::Stream;
 
 use crate::engine::{Engine, Forward, Input};
 use crate::error::Error;
@@ -91,7 +91,7 @@ pub fn on_shapes_of(model: &ModelSource) -> Result<BTreeMap<String, f32>, Error>
 /// A randomly stretched shape: a solid box, the surface of a box, the surface of an ellipsoid, or
 /// two separate boxes.
 fn shape(number: u32) -> Vec<[f32; 3]> {
-    let key = StreamKey::new(0, "calibration shape", number);
+    let key = Stream::Calibration { shape: number }.key(0);
     let unit = |n: usize| 2.0 * key.unit(n as u64) - 1.0;
     // From rods and plates to cubes.
     let size = [0, 1, 2].map(|axis| (-3.0 * key.unit(axis)).exp());

@@ -1,7 +1,7 @@
 //! Test-time augmentation: several random subsets or rotations of one cloud, whose
 //! log-probabilities are averaged.
 
-use formats::rng::StreamKey;
+use formats::streams::Stream;
 
 use crate::error::Error;
 use crate::options::{Options, UpAxis};
@@ -56,7 +56,7 @@ impl TestTimeAugmentation {
         if vote == 0 {
             return self.seed;
         }
-        let [low, high, ..] = StreamKey::new(self.seed, "vote", vote).words([0; 4]);
+        let [low, high, ..] = Stream::Vote { vote }.key(self.seed).words([0; 4]);
         u64::from(high) << 32 | u64::from(low)
     }
 

@@ -5,7 +5,7 @@
 
 use std::borrow::Cow;
 
-use formats::rng::StreamKey;
+use formats::streams::Stream;
 use infer_cpu::sampler::{FarthestPoints, FpsStart};
 
 use crate::clouds::Clouds;
@@ -35,9 +35,11 @@ pub fn augment(
     (epoch, turn): (u32, u32),
     recipe: &Recipe,
 ) -> TrainingCloud {
-    let again = if turn == 0 { String::new() } else { format!(" again {turn}") };
-    let stream = StreamKey::new(recipe.seed, &format!("augment {i}{again}"), epoch);
-    let mut draws = Draws::new(stream);
+    let stream = match turn {
+        0 => Stream::Augment { cloud: i, epoch },
+        _ => Stream::AugmentAgain { cloud: i, turn, epoch },
+    };
+    let mut draws = Draws::new(stream.key(recipe.seed));
     let ChosenPoints { mut points, mut neighborhood, mut places } =
         choose(clouds, i, recipe, &mut draws);
     let n_classes = clouds.classes.len();
@@ -81,7 +83,7 @@ pub fn varied_too(held: &Clouds, recipe: &Recipe) -> Clouds {
     both.set.names = None;
     let turned = Augment { scale: [1.0; 2], shift: 0.0, stretch: 0.0, ..recipe.augment.clone() };
     for i in 0..held.len() {
-        let mut draws = Draws::new(StreamKey::new(recipe.seed, "vary validation", i as u32));
+        let mut draws = Draws::new(Stream::VaryValidation { cloud: i as u32 }.key(recipe.seed));
         let mut cloud = cluster::varied_object(held.set.cloud(i), recipe, &mut draws);
         transform(&mut cloud, &turned, &mut draws);
         both.set.push(&cloud, held.set.labels[i]);

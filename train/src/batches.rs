@@ -4,6 +4,7 @@ use std::sync::mpsc::{Receiver, sync_channel};
 use std::thread::Scope;
 
 use formats::rng::StreamKey;
+use formats::streams::Stream;
 use rayon::prelude::*;
 
 use crate::augment::{TrainingCloud, augment};
@@ -72,11 +73,11 @@ fn order(labels: &[usize], n_classes: usize, epoch: u32, recipe: &Recipe) -> Vec
             order.extend(group.iter().map(|&i| (i, turn as u32)));
         }
         let mut group = group.clone();
-        shuffle(&mut group, StreamKey::new(recipe.seed, &format!("rest of {number}"), epoch));
+        shuffle(&mut group, Stream::Rest { group: number, epoch }.key(recipe.seed));
         let turn = (share / group.len()) as u32;
         order.extend(group.iter().take(share % group.len()).map(|&i| (i, turn)));
     }
-    shuffle(&mut order, StreamKey::new(recipe.seed, "order", epoch));
+    shuffle(&mut order, Stream::Order { epoch }.key(recipe.seed));
     order
 }
 

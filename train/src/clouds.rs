@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use formats::labelled::{LabelledSet, read_labelled};
 use formats::model_card::Normalization;
 use formats::modelnet_h5_list;
-use formats::rng::StreamKey;
 use formats::split::Split;
+use formats::streams::Stream;
 
 use crate::error::Error;
 
@@ -204,7 +204,7 @@ impl Clouds {
     /// indices of both. All views of a mesh are on the same side, and each class gives the share.
     #[must_use]
     pub fn split_validation(&self, share: f64, seed: u64) -> (Vec<usize>, Vec<usize>) {
-        let stream = StreamKey::new(seed, "validation", 0);
+        let stream = Stream::Validation {}.key(seed);
         let mut instances: Vec<(usize, String, Vec<usize>)> = Vec::new();
         let mut places = std::collections::BTreeMap::new();
         for i in 0..self.len() {

@@ -4,7 +4,7 @@
 //! The method removes parts of the cloud at random. A linear model, whose inputs say which parts
 //! remain, then estimates how much each part adds to the log-probability of the class.
 
-use formats::rng::StreamKey;
+use formats::streams::Stream;
 use infer_cpu::Classifier;
 use infer_cpu::kernel;
 use infer_cpu::sampler::{FarthestPoints, FpsStart};
@@ -123,7 +123,7 @@ fn squared(a: &[f32; 3], b: &[f32; 3]) -> f32 {
 /// The parts that remain in each sample. All parts remain in the first sample, and each part
 /// remains in another sample with a probability of one half. A sample without parts is drawn again.
 fn masks(k: usize, lime: &Lime) -> Vec<Vec<bool>> {
-    let stream = StreamKey::new(lime.seed, "lime", 0);
+    let stream = Stream::Lime {}.key(lime.seed);
     let mut n = 0;
     let mut masks = vec![vec![true; k]];
     while masks.len() < lime.samples {

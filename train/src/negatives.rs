@@ -4,6 +4,7 @@
 
 use formats::labelled::LabelledSet;
 use formats::rng::StreamKey;
+use formats::streams::Stream;
 
 use crate::clouds::Clouds;
 use crate::draws::Draws;
@@ -41,8 +42,8 @@ pub fn added(clouds: Clouds, recipe: &Recipe, purpose: &str, index: u32) -> Clou
     let LabelledSet { points, offsets, labels, .. } = clouds.set.clone();
     let mut set = LabelledSet { points, offsets, labels, ..LabelledSet::default() };
     for (number, kind) in Negative::ALL.into_iter().cycle().enumerate().take(n) {
-        let stream = StreamKey::new(recipe.seed, &format!("negative {purpose} {number}"), index);
-        set.push(&negative(kind, &clouds, stream), classes.len() - 1);
+        let stream = Stream::Negative { purpose, number, epoch: index };
+        set.push(&negative(kind, &clouds, stream.key(recipe.seed)), classes.len() - 1);
     }
     Clouds { set, classes }
 }

@@ -2,7 +2,7 @@
 //! the same size.
 
 use formats::chamfer::{Chamfer, chamfer};
-use formats::rng::StreamKey;
+use formats::streams::Stream;
 use infer_cpu::sampler::RandomSubset;
 
 /// Chamfer distances to the same reference points.
@@ -29,7 +29,7 @@ impl RandomBaseline {
         };
         let reference = some(reference);
         let subset = |draw| {
-            let (key, mut drawn) = (StreamKey::new(seed, "random subsets", draw), Vec::new());
+            let (key, mut drawn) = (Stream::RandomSubset { draw }.key(seed), Vec::new());
             RandomSubset::default().draw(points.len(), chosen.len(), key, &mut drawn);
             some(&drawn.into_iter().map(|i| i as usize).collect::<Vec<_>>())
         };

@@ -1,7 +1,7 @@
 //! Selects the critical points of the clouds in a batch. The code of infer-cpu ranks and resizes
 //! the selection.
 
-use formats::rng::StreamKey;
+use formats::streams::Stream;
 use infer_cpu::sampler::{CriticalPoints, Resize};
 
 use crate::batch::Batch;
@@ -55,7 +55,7 @@ impl CriticalPointSelector {
             let first = batch.starts[cloud] as u32;
             critical.rank(maxima, &within(pooled.winners(cloud), first));
             if self.gumbel {
-                let stream = StreamKey::new(self.seed, &format!("gumbel {step}"), cloud as u32);
+                let stream = Stream::Gumbel { step, cloud: cloud as u32 }.key(self.seed);
                 rows = gumbel::top(&critical.rows, &critical.scores, self.keep, stream);
             } else {
                 self.resize.apply(&critical.rows, &critical.scores, self.keep, &mut rows);

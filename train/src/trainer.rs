@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use formats::rng::StreamKey;
+use formats::streams::Stream;
 
 use crate::batches;
 use crate::clouds::Clouds;
@@ -118,7 +118,7 @@ impl Trainer {
 
 /// The mask of `step`: 0 for what is dropped, and what is kept scaled to the same mean.
 fn dropout(recipe: &Recipe, step: u64, (clouds, width): (usize, usize)) -> Matrix {
-    let stream = StreamKey::new(recipe.seed, "dropout", 0);
+    let stream = Stream::Dropout {}.key(recipe.seed);
     let mut n = step * (clouds * width) as u64;
     let scale = (1.0 / (1.0 - recipe.dropout)) as f32;
     Matrix::from_shape_simple_fn((clouds, width), || {

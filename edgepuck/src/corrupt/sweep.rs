@@ -5,8 +5,8 @@ use crate::points::SweepArgs;
 use edgepuck_segment::{Label, Segmenter, Settings, Sweep};
 use formats::Scan;
 use formats::hash::Hashing;
-use formats::rng::StreamKey;
 use formats::scan_file::{ScanFormat, write_scan};
+use formats::streams::Stream;
 use glam::DVec3;
 use sim_gpu::effects::{Detection, Effects};
 use sim_gpu::glam;
@@ -41,7 +41,7 @@ pub(super) fn run(
     let is_dark = brightness.is_none();
     let (mut written, mut too_weak_before) = (Vec::new(), 0);
     for (entry, severity, corruption) in chosen {
-        let stream = StreamKey::new(args.seed, &format!("corrupt/{}", entry.name), severity);
+        let stream = Stream::CorruptedSweep { corruption: &entry.name, severity }.key(args.seed);
         let dark = vec![0.0; scan.len()];
         let (scan, is_ground) = (&scan, &is_ground[..]);
         let range_m = [sensor.range.min_m, sensor.range.max_m];

@@ -19,7 +19,7 @@ mod spec;
 mod testing;
 mod voxel;
 
-use formats::rng::StreamKey;
+use formats::streams::Stream;
 
 use crate::kernel::Kernels;
 
@@ -115,7 +115,7 @@ impl Sampler {
             SamplerKind::First => keep_first(n.min(spec.points.try_into().unwrap_or(n)), selected),
             SamplerKind::Random => {
                 // The key does not depend on the cloud, so that equal clouds give equal subsets.
-                let key = StreamKey::new(spec.seed, "random sampler", 0);
+                let key = Stream::RandomSampler {}.key(spec.seed);
                 random.draw(points.len(), spec.points, key, selected);
             }
             SamplerKind::Fps => {

@@ -12,6 +12,7 @@ use formats::cloud::{normalize_unit_sphere, resample};
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, Column};
 use formats::scan_file::{ScanFormat, read_scan};
+use formats::streams::Stream;
 use formats::{Scan, Split};
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -53,8 +54,8 @@ impl Cloud {
 
     fn key(config: &DatasetConfig, source: Source) -> StreamKey {
         let Source { set, variant, entry, view } = source;
-        let stream = format!("pack/{}/{variant}/{}", set.name, entry.id());
-        StreamKey::new(config.seed, &stream, view)
+        let (set, variant, mesh) = (&*set.name, variant.name(), &entry.id());
+        Stream::Pack { set, variant, mesh, view }.key(config.seed)
     }
 
     /// The points of [`Cloud::draw`], each followed by its `attributes`.

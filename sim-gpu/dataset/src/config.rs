@@ -4,6 +4,7 @@ use formats::hash::Hashing;
 use formats::rng::StreamKey;
 use formats::scan::AttributeSet;
 use formats::scan_file::ScanFormat;
+use formats::streams::Stream;
 use formats::vlp32c::Returns;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -206,12 +207,12 @@ impl SetConfig {
     }
 
     fn views_key(&self, seed: u64, id: &str) -> StreamKey {
-        StreamKey::new(seed, &format!("views/{}/{id}", self.name), 0)
+        Stream::Views { set: &self.name, mesh: id }.key(seed)
     }
 
     /// The random stream of view `view` of the mesh `id`.
     #[must_use]
     pub fn stream(&self, seed: u64, id: &str, view: u32) -> StreamKey {
-        StreamKey::new(seed, &format!("{}/{id}", self.name), view)
+        Stream::View { set: &self.name, mesh: id, view }.key(seed)
     }
 }

@@ -10,6 +10,7 @@ use formats::Split;
 use formats::cloud::{normalize_unit_sphere, resample};
 use formats::hash::Hashing;
 use formats::rng::StreamKey;
+use formats::streams::Stream;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use sim_gpu::effects::Effects;
@@ -158,10 +159,10 @@ impl Corrupted<'_> {
         }
         let target = Target::new(Surface::new(mesh, kept), Builder::Sah);
         let id = Entry::from(entry).id();
-        let jitter = StreamKey::new(self.seed, &format!("views/corrupted/{id}"), 0);
+        let jitter = Stream::CorruptedViews { mesh: &id }.key(self.seed);
         let mut drawn = Vec::new();
         for (pose, view) in self.views.poses(DVec3::ZERO, jitter).into_iter().zip(0..) {
-            let stream = StreamKey::new(self.seed, &format!("corrupted/{id}"), view);
+            let stream = Stream::Corrupted { mesh: &id, view }.key(self.seed);
             for (set, corrupted) in sets.iter().enumerate() {
                 let seen = self.points_of(corrupted, &target, pose, stream)?;
                 // A view in which nothing is seen has no cloud.
@@ -193,7 +194,7 @@ impl Corrupted<'_> {
         let ObjectCorruption { occluders, radius_m, .. } = set.corruption;
         // The stream itself draws the points of the cloud.
         let [a, b] = stream.0;
-        let places = StreamKey::new(u64::from(a) << 32 | u64::from(b), "corrupted/occluders", 0);
+        let places = Stream::Occluders {}.key(u64::from(a) << 32 | u64::from(b));
         let balls: Vec<DVec3> = (0..occluders)
             .filter(|_| !points.is_empty())
             .map(|n| {

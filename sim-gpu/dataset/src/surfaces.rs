@@ -9,7 +9,7 @@ use crate::record::{Entry, MeshFailure};
 use formats::Split;
 use formats::cloud::{normalize_unit_sphere, resample};
 use formats::hash::Hashing;
-use formats::rng::StreamKey;
+use formats::streams::Stream;
 use glam::DVec3;
 use sim_gpu::internals::bvh::Builder;
 use sim_gpu::internals::mesh::frame::{Normalize, Unit, Up};
@@ -78,8 +78,9 @@ fn draw(
     let surface = Surface::new(in_world, kept);
     let n = config.points as usize;
     let id = Entry::from(mesh).id();
-    let key = |name: &str, index| StreamKey::new(config.seed, &format!("{name}/{id}"), index);
-    let points = area_uniform(&surface, n * (1 + CANDIDATES), key("surface", 0));
+    let seed = config.seed;
+    let points =
+        area_uniform(&surface, n * (1 + CANDIDATES), Stream::Surface { mesh: &id }.key(seed));
     let points = points.ok_or_else(|| MeshFailure::new(mesh, "no triangle with an area"))?;
     let (own, candidates) = points.split_at(n);
     let rounded = |points: &[DVec3]| -> Vec<[f32; 3]> {
@@ -89,7 +90,7 @@ fn draw(
     let mut whole = rounded(own);
     normalize_unit_sphere(&mut whole);
     let mut drawn = vec![Drawn { set: 0, name: id.clone(), points: whole, n_raw: config.points }];
-    let poses = config.views.poses(DVec3::ZERO, key("views", 0));
+    let poses = config.views.poses(DVec3::ZERO, Stream::SurfaceViews { mesh: &id }.key(seed));
     if poses.is_empty() {
         return Ok(drawn);
     }
@@ -100,7 +101,9 @@ fn draw(
         let points: Vec<DVec3> = points.map(|(point, _)| frame.apply(*point)).collect();
         let n_raw = points.len() as u32;
         if n_raw >= config.min_points {
-            let points = resample(&rounded(&points), n, key("seen", view)).unwrap_or_default();
+            let points =
+                resample(&rounded(&points), n, Stream::SurfaceSeen { mesh: &id, view }.key(seed))
+                    .unwrap_or_default();
             drawn.push(Drawn { set: 1, name: format!("{id}_v{view}"), points, n_raw });
         }
     }

@@ -9,8 +9,8 @@ use std::sync::Arc;
 
 use edgepuck_shapes::Sampler;
 use formats::Scan;
-use formats::rng::StreamKey;
 use formats::scan::Attribute;
+use formats::streams::Stream;
 use formats::vlp32c::{Returns, Revolution, SEQUENCE_US, SEQUENCES_PER_PACKET};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -88,11 +88,11 @@ impl<'a> Drive<'a> {
         }
         let revolution = packets::revolution(&sensor)?;
         let (recipe, seed) = (stage.recipe(), stage.seed());
-        let s = &mut Sampler::new(StreamKey::new(seed, "drive", 0));
+        let s = &mut Sampler::new(Stream::Drive {}.key(seed));
         let start = draw_mount(stage, s);
         let glass_returned = recipe.glass_returned.at(s.uniform(0.0, 1.0));
         let off_road_m = recipe.mount.off_road_m.at(s.uniform(0.0, 1.0));
-        let stream = StreamKey::new(seed, "drive/ground", 0);
+        let stream = Stream::DriveGround {}.key(seed);
         let mut ground = Ground::draw(&recipe.ground, 0.0, s, stream);
         // Traffic along x keeps to the right.
         let most_m = ground.road_half_m - FROM_KERB_M - OWN_RADIUS_M;
@@ -201,7 +201,7 @@ impl<'a> Drive<'a> {
         request.motion = trajectory([from_s, to_s].map(|time_s| (time_s, self.pose(time_s))));
         request.deskew = true;
         request.attributes = [Attribute::Beam, Attribute::Range, Attribute::Object].into();
-        request.stream = StreamKey::new(stage.seed(), "drive/beams", number);
+        request.stream = Stream::DriveBeams { packet: number }.key(stage.seed());
         let placed = world.placed(|_, _| None);
         let mut scan = scan_objects(caster, &placed, &request)?.scan;
         for object in scan.object.iter_mut().flatten() {

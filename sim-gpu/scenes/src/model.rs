@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use edgepuck_shapes::objects::{Object, ObjectKind, object, stand};
-use formats::rng::StreamKey;
+use formats::streams::Stream;
 use glam::DVec3;
 use sim_gpu::Mesh;
 use sim_gpu::internals::bvh::Builder;
@@ -74,7 +74,7 @@ pub(crate) fn user_models(
         return Err(missing(&folder, "found none".to_owned()));
     }
     let span = objects.height_m.unwrap_or([1.0, 1.0].into());
-    let stream = StreamKey::new(seed, &format!("meshes/{name}"), 0);
+    let stream = Stream::MeshHeights { folder: name }.key(seed);
     let models = files.iter().zip(0..).map(|(file, n)| {
         let loaded = mesh::load(file)?;
         let doubts = loaded.warnings.iter();

@@ -1,7 +1,7 @@
 use std::f64::consts::TAU;
 
 use edgepuck_shapes::Sampler;
-use formats::rng::StreamKey;
+use formats::streams::Stream;
 use glam::{DQuat, DVec2, DVec3};
 use sim_gpu::internals::pose::{Pose, Trajectory};
 
@@ -37,11 +37,16 @@ impl DrawnScene {
     #[must_use]
     pub fn draw(stage: &Stage, number: u32) -> Self {
         let recipe = stage.recipe();
-        let stream = |part: &str| StreamKey::new(stage.seed(), &format!("scene/{part}"), number);
-        let s = &mut Sampler::new(stream("place"));
+        let seed = stage.seed();
+        let s = &mut Sampler::new(Stream::ScenePlaces { scene: number }.key(seed));
         let off_road_m = recipe.mount.off_road_m.at(s.uniform(0.0, 1.0));
         let road_y_m = if s.chance(0.5) { off_road_m } else { -off_road_m };
-        let ground = Ground::draw(&recipe.ground, road_y_m, s, stream("ground"));
+        let ground = Ground::draw(
+            &recipe.ground,
+            road_y_m,
+            s,
+            Stream::SceneGround { scene: number }.key(seed),
+        );
         let sensor = s.count(0, recipe.sensor.len() - 1);
         let mut pose = draw_mount(stage, s);
         pose.rotation *= DQuat::from_rotation_z(s.uniform(0.0, TAU));
@@ -49,7 +54,8 @@ impl DrawnScene {
         let share = s.uniform(0.0, 1.0);
         let ground_clearance_m = recipe.ground_clearance_m.map(|span| span.at(share));
         // A key of its own, so that a moving sensor sees the same scene as one at rest.
-        let speed_m_s = recipe.mount.speed_m_s.at(stream("speed").unit(0));
+        let speed_m_s =
+            recipe.mount.speed_m_s.at(Stream::SceneSpeed { scene: number }.key(seed).unit(0));
         let velocity_m_s = ground.along(speed_m_s);
         let own = Footprint::level(DVec2::ZERO, DVec2::splat(OWN_RADIUS_M));
         let mut placer = Placer::new(stage, &ground, s, f64::INFINITY, vec![own]);

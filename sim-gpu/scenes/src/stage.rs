@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
-use formats::rng::StreamKey;
+use formats::streams::Stream;
 use glam::{DQuat, DVec3};
 use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel};
 use sim_gpu::internals::caster::OpenCaster;
@@ -147,7 +147,7 @@ impl Stage {
     /// Adds the ground of the scene or drive number `number`, or a tile of it, to `world`.
     pub(crate) fn add_ground(&self, world: &mut Scene, mesh: &Mesh, number: u32) {
         let id = world.add(mesh, Pose::IDENTITY);
-        let drawn = StreamKey::new(self.seed, "reflectivity/ground", number).unit(0);
+        let drawn = Stream::GroundReflectivity { scene: number }.key(self.seed).unit(0);
         world[id].reflectivity = self.recipe.ground.reflectivity.at(drawn);
     }
 
@@ -166,7 +166,7 @@ impl Stage {
         let instance = &mut world[id];
         instance.scale = object.scale;
         instance.label = Some(entry.class.clone());
-        let drawn = StreamKey::new(self.seed, "reflectivity/object", object.entry as u32);
+        let drawn = Stream::ObjectReflectivity { entry: object.entry as u32 }.key(self.seed);
         instance.reflectivity = entry.reflectivity.at(drawn.unit(object.variant.into()));
         instance.glass = (!model.glass.is_empty())
             .then(|| Glass { triangles: model.glass.clone(), returned: glass_returned });

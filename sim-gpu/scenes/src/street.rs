@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
 use edgepuck_shapes::Sampler;
-use formats::rng::StreamKey;
+use formats::streams::Stream;
 use glam::{DVec2, DVec3};
 use sim_gpu::Mesh;
 use sim_gpu::internals::bvh::Builder;
@@ -106,8 +106,8 @@ impl<'a> Street<'a> {
     fn draw_block(&mut self, layer: usize, number: i32) {
         let Self { stage, ground, lanes, block_m, .. } = &*self;
         let lane = layer.checked_sub(1).map(|i| &lanes[i]);
-        let name = format!("drive/block/{layer}");
-        let s = &mut Sampler::new(StreamKey::new(stage.seed(), &name, number as u32));
+        let stream = Stream::DriveBlock { layer, block: number as u32 };
+        let s = &mut Sampler::new(stream.key(stage.seed()));
         let half_m = block_m / 2.0;
         let mut taken = Vec::new();
         if lane.is_none() {

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use formats::rng::StreamKey;
+use formats::streams::Stream;
 use glam::DQuat;
 
 use crate::recipe::Span;
@@ -26,7 +26,7 @@ pub(crate) struct Sway {
 
 impl Sway {
     pub(crate) fn draw(sway_deg: Span, speed_m_s: f64, seed: u64) -> Self {
-        let key = StreamKey::new(seed, "drive/sway", 0);
+        let key = Stream::DriveSway {}.key(seed);
         let phase_rad = |axis: u64, i: u64| TAU * key.unit(1 + 3 * axis + i);
         let share = (speed_m_s / FULL_SWAY_M_S).min(1.0);
         Self {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use formats::Scan;
 use formats::rng::StreamKey;
 use formats::scan::Attribute;
+use formats::streams::Stream;
 use glam::DVec3;
 use sim_gpu::internals::bvh::Builder;
 use sim_gpu::internals::mesh::TriangleMesh;
@@ -95,7 +96,7 @@ impl Stage {
 
     /// The key of the random numbers of instance number `part` in scans of `scene`.
     fn stream(&self, scene: &DrawnScene, part: u32) -> StreamKey {
-        StreamKey::new(self.seed(), &format!("scene/{}/beams", scene.number), part)
+        Stream::SceneBeams { scene: scene.number, part }.key(self.seed())
     }
 
     /// The ground and the objects of `scene` as one mesh, in which the objects lose their numbers

@@ -37,7 +37,7 @@ pub use sampler::Sampler;
 pub use tree::write_tree;
 pub use write::{write_obj, write_off};
 
-use formats::rng::StreamKey;
+use formats::streams::Stream;
 
 use class::FAMILIES;
 use finish::Finish;
@@ -52,7 +52,7 @@ use sim_gpu::internals::mesh::TriangleMesh;
 /// Coordinates are whole micrometres, so that text holds them exactly.
 #[must_use]
 pub fn generate(class: ShapeClass, seed: u64, instance: u32) -> TriangleMesh {
-    let stream = |part: &str| StreamKey::new(seed, &format!("shapes/{class}/{part}"), instance);
+    let stream = |part| Stream::Shape { class: class.name(), part, instance }.key(seed);
     let finish = Finish::draw(class, &mut Sampler::new(stream("finish")));
     let builder = tessellation::fit(&finish, |b| {
         build_one(FAMILIES[class as usize].0, b, &mut Sampler::new(stream("form")));

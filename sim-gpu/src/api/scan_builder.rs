@@ -9,6 +9,7 @@ use crate::scan::{ScanRequest, Scanned, scan_objects};
 use crate::scene::{check_motion, check_object, check_start};
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, AttributeSet};
+use formats::streams::{StartTime, Stream};
 use std::sync::Arc;
 
 /// A scan that [`ScanBuilder::run`] makes. Settings that are not given come from the [`Scene`].
@@ -156,11 +157,12 @@ impl<'a> ScanBuilder<'a> {
         request.attributes.clone_from(&self.attributes);
         request.stream = self.stream(self.key.name);
         request.culling = self.culling;
+        let (at, sensor) = (StartTime(self.start_s), self.key.number);
         let placed = self.scene.placed(|name, number| match (name, number) {
             (Some(name), _) => Some(self.stream(name)),
             // A scene of one mesh has the random numbers of the scan.
             (None, 0) => None,
-            (None, _) => Some(self.stream(&format!("instance/{number}"))),
+            (None, _) => Some(Stream::Instance { number, at, sensor }.key(self.seed)),
         });
         let Scanned { mut scan, tally, cast_on_cpu, .. } =
             scan_objects(&caster, &placed, &request)?;
@@ -172,8 +174,8 @@ impl<'a> ScanBuilder<'a> {
     /// The key of a name's random numbers. Scans of other times have other noise, other drops and
     /// other losses.
     fn stream(&self, name: &str) -> StreamKey {
-        let at = if self.start_s == 0.0 { String::new() } else { format!("@{}", self.start_s) };
-        StreamKey::new(self.seed, &format!("{name}{at}"), self.key.number)
+        let at = StartTime(self.start_s);
+        Stream::Scan { name, at, sensor: self.key.number }.key(self.seed)
     }
 
     fn check_instances(&self) -> Result<(), Error> {

@@ -8,7 +8,7 @@ use std::path::{Component, Path, PathBuf};
 
 use formats::Split;
 use formats::hash::{FileHash, Hashing};
-use formats::rng::StreamKey;
+use formats::streams::Stream;
 use sha2::{Digest, Sha256};
 use walkdir::{DirEntry, WalkDir};
 
@@ -400,7 +400,7 @@ impl Place {
         };
         let (class, name) = (safe_name(class), safe_name(&name));
         let split = self.split.map(|(split, _)| split).unwrap_or_else(|| {
-            let unit = StreamKey::new(seed, &format!("{class}/{name}"), 0).unit(0);
+            let unit = Stream::Split { class: &class, name: &name }.key(seed).unit(0);
             if unit < TRAIN_SHARE { Split::Train } else { Split::Test }
         });
         let (path, relative) = (self.path.clone(), self.relative.clone());

@@ -12,6 +12,7 @@ use crate::sensor::{BeamPattern, SensorProfile};
 use crate::target::Target;
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, AttributeSet};
+use formats::streams::{StartTime, Stream};
 use glam::DAffine3;
 use std::ops::Range;
 use std::sync::Arc;
@@ -88,7 +89,7 @@ impl<'a> ScanRequest<'a> {
             deskew: false,
             effects: None,
             attributes: AttributeSet::new(),
-            stream: StreamKey::new(0, "scan", 0),
+            stream: Stream::Scan { name: "scan", at: StartTime(0.0), sensor: 0 }.key(0),
             culling: Culling::On,
         }
     }

@@ -1,6 +1,6 @@
 //! `z = W x + b`.
 
-use formats::rng::StreamKey;
+use formats::streams::Stream;
 use ndarray::ArrayView2;
 
 use super::{Folded, LayerMut};
@@ -23,7 +23,7 @@ impl Linear {
     pub fn new(name: &str, inputs: usize, outputs: usize, seed: u64) -> Self {
         let limit = 1.0 / (inputs as f64).sqrt();
         let draw = |part: &str, n: usize| {
-            let stream = StreamKey::new(seed, &format!("{name}.{part}"), 0);
+            let stream = Stream::Parameter { layer: name, part }.key(seed);
             (0..n as u64).map(|i| ((2.0 * stream.unit(i) - 1.0) * limit) as f32).collect()
         };
         let parameter = |part: &str, shape: Vec<usize>| {

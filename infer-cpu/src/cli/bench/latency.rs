@@ -10,7 +10,7 @@ use std::time::Instant;
 use crate::network::open;
 use crate::{Classifier, ClassifierTeam, Options, Precision, TNets};
 use anyhow::Context;
-use formats::rng::StreamKey;
+use formats::streams::Stream;
 use serde::Serialize;
 
 use super::machine::Machine;
@@ -162,7 +162,7 @@ fn samples_ms(
 
 /// Random points in a cube, the same in every run.
 fn cloud(n: usize) -> Vec<[f32; 3]> {
-    let key = StreamKey::new(0, "benchmark cloud", 0);
+    let key = Stream::BenchmarkCloud {}.key(0);
     let unit = |i: usize| (2.0 * key.unit(i as u64) - 1.0) as f32;
     (0..n).map(|i| [unit(3 * i), unit(3 * i + 1), unit(3 * i + 2)]).collect()
 }

@@ -1,6 +1,6 @@
 use crate::on_demand::Clouds;
 use formats::Split;
-use formats::rng::StreamKey;
+use formats::streams::Stream;
 
 /// The order in which clouds are put into tars: one view of each mesh, in random order, then the
 /// next view of each. A tar therefore has all classes if it has as many clouds as there are meshes.
@@ -12,7 +12,7 @@ pub(super) struct Order {
 impl Order {
     pub(super) fn new(seed: u64, split: Split, clouds: &Clouds) -> Self {
         let views = clouds.config().sets[0].viewpoints.count().max(1);
-        let key = StreamKey::new(seed, &format!("tars/{split}"), 0);
+        let key = Stream::Tars { split: split.name() }.key(seed);
         let mut meshes: Vec<usize> = (0..clouds.len() / views).collect();
         meshes.sort_by_cached_key(|&mesh| (key.words([mesh as u32, 0, 0, 0]), mesh));
         Self { meshes, views }

@@ -20,7 +20,7 @@ mod tests;
 
 pub use standing::{Object, stand};
 
-use formats::rng::StreamKey;
+use formats::streams::Stream;
 
 use crate::primitives::{Builder, Makes, Sampler, build_one};
 use building::{barrier, fence, house_front, wall};
@@ -142,7 +142,7 @@ formats::named! {
 /// Builds object number `instance` of `kind` under `seed`.
 #[must_use]
 pub fn object(kind: ObjectKind, seed: u64, instance: u32) -> Object {
-    let mut sampler = Sampler::new(StreamKey::new(seed, &format!("objects/{kind}"), instance));
+    let mut sampler = Sampler::new(Stream::Object { kind: kind.name(), instance }.key(seed));
     let mut builder = Builder::new(EDGE_M, FLAT_RATIO);
     build_one(MAKES[kind as usize], &mut builder, &mut sampler);
     let (mut mesh, glass) = builder.finish_with_glass();
