@@ -15,7 +15,8 @@ const ROUNDS: usize = 10;
 pub struct StreamKey(pub [u32; 2]);
 
 impl StreamKey {
-    /// The key of number `index` of the streams called `name` under `seed`.
+    /// The key of number `index` of the streams called `name` under `seed`. What the product draws
+    /// is in the list of all [streams](crate::streams); tests and experiments name their own.
     ///
     /// It is the first eight bytes of SHA-256 over (seed, index, name), so that similar seeds and
     /// names have unrelated keys.

@@ -2,7 +2,7 @@
 //! of its name in `shaders/effects/`.
 
 use super::oracle;
-use super::random::{normal_deviate, random_bits};
+use super::random::{Purpose, normal_deviate, random_bits};
 use crate::effects::{Dropout, Effects, Noise, RayEffect};
 use crate::job::CastJob;
 use crate::ray::Ray;
@@ -41,13 +41,13 @@ pub fn append_outputs(
 /// The error of the range of `beam` along the ray, metres.
 #[must_use]
 pub fn noise_range(noise: &Noise, stream: StreamKey, beam: u32) -> f64 {
-    noise.mean_m + noise.sigma_m * normal_deviate(random_bits(stream, beam, 1)[0])
+    noise.mean_m + noise.sigma_m * normal_deviate(random_bits(stream, beam, Purpose::Noise)[0])
 }
 
 /// The error of each coordinate of the point of `beam`, metres, in the world frame.
 #[must_use]
 pub fn noise_xyz(noise: &Noise, stream: StreamKey, beam: u32) -> DVec3 {
-    let [x, y, z, _] = random_bits(stream, beam, 1).map(normal_deviate);
+    let [x, y, z, _] = random_bits(stream, beam, Purpose::Noise).map(normal_deviate);
     DVec3::splat(noise.mean_m) + noise.sigma_m * DVec3::new(x, y, z)
 }
 
@@ -55,7 +55,7 @@ pub fn noise_xyz(noise: &Noise, stream: StreamKey, beam: u32) -> DVec3 {
 /// has 24 bits, so that every adapter drops the same returns.
 #[must_use]
 pub fn dropout(dropout: &Dropout, stream: StreamKey, beam: u32) -> bool {
-    let unit = (random_bits(stream, beam, 2)[0] >> 8) as f32 * (1.0 / 16_777_216.0);
+    let unit = (random_bits(stream, beam, Purpose::Dropout)[0] >> 8) as f32 * (1.0 / 16_777_216.0);
     unit < dropout.probability as f32
 }
 

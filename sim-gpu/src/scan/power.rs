@@ -10,14 +10,11 @@
 //! incidence theta and range R. Shaders do not compute it: the range is known in f64 only after
 //! casting, and every adapter must detect the same returns.
 
-use crate::cpu::random::{normal_deviate, random_bits};
+use crate::cpu::random::{Purpose, normal_deviate, random_bits};
 use crate::effects::Detection;
 use crate::material::Material;
 use crate::sensor::DetectionLimit;
 use formats::rng::StreamKey;
-
-/// Selects the random bits of a beam for the receiver's noise and the error of its timing.
-const RECEIVER_PURPOSE: u32 = 3;
 
 /// Calibrated reflectivities: percent for diffuse surfaces, the rest of a byte for
 /// retro-reflectors. VLP-32C User Manual 63-9325, 6.1.
@@ -59,7 +56,7 @@ pub(super) fn is_detected(
     beam: u32,
 ) -> bool {
     let noise = detection.threshold_to_noise.map_or(0.0, |ratio| {
-        normal_deviate(random_bits(stream, beam, RECEIVER_PURPOSE)[0]) / ratio
+        normal_deviate(random_bits(stream, beam, Purpose::Receiver)[0]) / ratio
     });
     power + noise * limit.power() >= limit.power()
 }
@@ -75,6 +72,6 @@ pub(super) fn range_error(
     beam: u32,
 ) -> f64 {
     let weakest = limit.power();
-    let deviate = normal_deviate(random_bits(stream, beam, RECEIVER_PURPOSE)[1]);
+    let deviate = normal_deviate(random_bits(stream, beam, Purpose::Receiver)[1]);
     sigma_at_limit_m * (weakest / power.max(weakest)).sqrt() * deviate
 }

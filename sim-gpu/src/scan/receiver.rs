@@ -6,7 +6,7 @@ use super::object_hits::{HitId, ObjectHits};
 use super::power;
 use super::request::ScanRequest;
 use crate::config::InvalidValue;
-use crate::cpu::random::random_bits;
+use crate::cpu::random::{Purpose, random_bits};
 use crate::effects::Effects;
 use crate::resolve::Hit;
 use crate::sensor::{BeamPattern, DetectionLimit};
@@ -150,7 +150,7 @@ impl<'a> Receiver<'a> {
         else {
             return false;
         };
-        let [bits, ..] = random_bits(object.job.stream, self.axis_of(hit.beam), GLASS_PURPOSE);
+        let [bits, ..] = random_bits(object.job.stream, self.axis_of(hit.beam), Purpose::Glass);
         f64::from(bits) >= glass.returned * 2f64.powi(32)
     }
 
@@ -215,9 +215,6 @@ impl<'a> Receiver<'a> {
         }
     }
 }
-
-/// Selects the random bits that decide whether glass returns a beam; effects use lower numbers.
-const GLASS_PURPOSE: u32 = 16;
 
 /// Separates the streams of echoes of the air: the golden ratio's bits, an odd number.
 const AIR_STREAM: u32 = 0x9E37_79B9;

@@ -1,5 +1,6 @@
 //! Rain and snow: the drops in a beam that a sensor detects.
 
+use crate::cpu::random::Purpose;
 use crate::sensor::RangeLimits;
 
 pub(super) struct Beam {
@@ -36,9 +37,6 @@ const SMALLEST_MM: f64 = 0.05;
 /// Indices of refraction at 905 nm: LISA.
 const WATER: f64 = 1.328;
 const ICE: f64 = 1.3031;
-
-/// The most drops of a kind in a beam.
-const MOST: u32 = 32;
 
 /// Steps of the integral along a beam, which is smooth: the relative error of Simpson's rule is
 /// 1e-6.
@@ -182,11 +180,12 @@ impl Drops {
     }
 }
 
-/// A Poisson number of this `mean` from a uniform number in [0, 1), by inversion; at most [`MOST`].
+/// A Poisson number of this `mean` from a uniform number in [0, 1), by inversion; at most
+/// [`Purpose::MOST_DROPS`].
 fn poisson(mean: f64, uniform: f64) -> u32 {
     let mut term = (-mean).exp();
     let (mut sum, mut count) = (term, 0);
-    while uniform >= sum && count < MOST {
+    while uniform >= sum && count < Purpose::MOST_DROPS {
         count += 1;
         term *= mean / f64::from(count);
         sum += term;

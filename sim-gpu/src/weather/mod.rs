@@ -77,7 +77,7 @@ mod recorded;
 pub(crate) use recorded::without_surface;
 pub use recorded::{Fates, in_weather};
 
-use crate::cpu::random::random_bits;
+use crate::cpu::random::{Purpose, random_bits};
 use crate::effects::{FogModel, Volume, Weather};
 use crate::sensor::{DetectionLimit, RangeLimits};
 use drops::Drops;
@@ -146,11 +146,6 @@ pub struct Scattered {
     pub medium: Medium,
 }
 
-/// Select the random bits of a beam that place drops, flakes and dust.
-const RAIN_PURPOSE: u32 = 32;
-const SNOW_PURPOSE: u32 = 64;
-const DUST_PURPOSE: u32 = 96;
-
 /// The wavelength that the constants are for, 905 nm, in units of 550 nm.
 const WAVELENGTH: f64 = 905.0 / 550.0;
 
@@ -213,28 +208,28 @@ impl Air {
             let left = (-2.0 * self.depth_in_volumes(origin, direction, one.range_m)).exp();
             Scattered { power: one.power * left, brightness: one.brightness * left, ..one }
         };
-        let mut drops_of = |drops: &Option<Drops>, purpose, medium| {
+        let mut drops_of = |drops: &Option<Drops>, purpose: fn(u32) -> Purpose, medium| {
             if let Some(drops) = drops {
-                let bits = |draw| random_bits(stream, number, purpose + draw);
+                let bits = |draw| random_bits(stream, number, purpose(draw));
                 drops.draw(end_m, bits, |range_m, power| {
                     let brightness = power * range_m.powi(2);
                     take(behind_volumes(Scattered { range_m, power, brightness, medium }));
                 });
             }
         };
-        drops_of(&self.rain, RAIN_PURPOSE, Medium::Rain);
-        drops_of(&self.snow, SNOW_PURPOSE, Medium::Snow);
+        drops_of(&self.rain, Purpose::Rain, Medium::Rain);
+        drops_of(&self.snow, Purpose::Snow, Medium::Snow);
         if let Some(scattered) = self.fog.and_then(|fog| fog.scattered(beam)) {
             take(behind_volumes(scattered));
         }
         for (volume, i) in self.volumes.iter().zip(0..) {
-            if let Some(scattered) = self.scattered_in(volume, beam, DUST_PURPOSE + i) {
+            if let Some(scattered) = self.scattered_in(volume, beam, Purpose::Dust(i)) {
                 take(scattered);
             }
         }
     }
 
-    fn scattered_in(&self, volume: &Volume, beam: &AirBeam, purpose: u32) -> Option<Scattered> {
+    fn scattered_in(&self, volume: &Volume, beam: &AirBeam, purpose: Purpose) -> Option<Scattered> {
         let AirBeam { origin, direction, end_m, stream, number, .. } = *beam;
         let (enters_m, leaves_m) = inside(volume, origin, direction, end_m)?;
         let extinction = extinction_of(volume.visibility_m);

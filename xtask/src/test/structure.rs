@@ -1,6 +1,6 @@
 //! Checks of the source that neither rustc nor Clippy makes: modules do not depend on each other in
-//! circles, `unsafe` stands only where CONTRIBUTING.md allows it, libraries do not print, and links
-//! lead to files.
+//! circles, `unsafe` stands only where CONTRIBUTING.md allows it, libraries do not print, all streams
+//! of random numbers are in one list, and links lead to files.
 
 mod circles;
 mod links;
@@ -42,6 +42,7 @@ pub fn check(summary: &mut Summary) -> anyhow::Result<Counts> {
         ),
         ("links", links::broken()?),
         ("printing", crates.iter().flat_map(|found| printing(found, &printing_allowed)).collect()),
+        ("streams", crates.iter().flat_map(unlisted_streams).collect()),
     ] {
         counts = counts.and(if faults.is_empty() { Counts::PASSED } else { Counts::FAILED });
         faults.iter().for_each(|fault| summary.remark(format!("{name}: FAILED, {fault}")));
@@ -105,15 +106,16 @@ fn printing(found: &Crate, allowed: &[String]) -> Vec<String> {
         allowed.iter().any(|allowed| name == *allowed || name.starts_with(&format!("{allowed}::")))
     };
     let modules = found.modules.iter().filter(|(name, _)| found.is_library && !may_print(name));
-    let writes = modules.flat_map(|(_, module)| {
-        let writes = module
-            .paths
-            .iter()
-            .filter(|(path, _)| path.last().is_some_and(|last| WRITERS.contains(&last.as_str())));
-        writes
-            .map(|(path, line)| format!("{}:{line} has {}", module.file.display(), path.join("::")))
-    });
-    writes.collect()
+    let writes = |path: &[String]| path.last().is_some_and(|last| WRITERS.contains(&last.as_str()));
+    modules.flat_map(|(_, module)| module.lines_with(writes)).collect()
+}
+
+/// The keys of random numbers that a library makes outside the list of all streams.
+fn unlisted_streams(found: &Crate) -> Vec<String> {
+    let modules = found.modules.values().filter(|_| found.is_library);
+    let others = modules.filter(|module| !module.file.ends_with("formats/src/streams.rs"));
+    let makes_key = |path: &[String]| path.ends_with(&["StreamKey", "new"].map(str::to_owned));
+    others.flat_map(|module| module.lines_with(makes_key)).collect()
 }
 
 #[cfg(test)]
@@ -155,6 +157,15 @@ mod tests {
         let found = crate_of("//! unsafe\nmod a {\n fn f() { unsafe { g() } } }");
         assert_eq!(misplaced_unsafe(&found, &[]), ["a/src/lib.rs:3 is unsafe"]);
         assert_eq!(misplaced_unsafe(&found, &["a/src".to_owned()]), [""; 0]);
+    }
+
+    #[test]
+    fn streams_outside_the_list_are_found() {
+        let mut found = crate_of("mod b { fn f() { formats::rng::StreamKey::new(0, \"f\", 0); } }");
+        let faults = ["a/src/lib.rs:1 has formats::rng::StreamKey::new"];
+        assert_eq!(unlisted_streams(&found), faults);
+        found.is_library = false;
+        assert_eq!(unlisted_streams(&found), [""; 0]);
     }
 
     #[test]

@@ -35,6 +35,15 @@ pub struct Import {
     pub is_public: bool,
 }
 
+impl Module {
+    /// The first line of each path in its code that `is_wanted`.
+    pub fn lines_with(&self, is_wanted: impl Fn(&[String]) -> bool) -> Vec<String> {
+        let paths = self.paths.iter().filter(|(path, _)| is_wanted(path));
+        let file = self.file.display();
+        paths.map(|(path, line)| format!("{file}:{line} has {}", path.join("::"))).collect()
+    }
+}
+
 /// Reads the crate whose root is the file `root`.
 pub fn read(root: &Path) -> anyhow::Result<Modules> {
     let mut modules = Modules::new();
