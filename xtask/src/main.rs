@@ -42,6 +42,8 @@ enum Command {
     Ablate(Forwarded),
     /// Reproduce the paper's experiments, and write one report
     Reproduce(Forwarded),
+    /// Change the code in one place at a time, and count the changes that the tests notice
+    Mutants(Forwarded),
     /// Show the results of all measurements on one HTML page
     Report(Forwarded),
     /// Run the program `edgepuck` with these arguments

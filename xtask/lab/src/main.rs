@@ -11,7 +11,7 @@ mod study;
 use clap::{Parser, Subcommand};
 use edgepuck_program::{Outcome, outcome};
 use std::process::ExitCode;
-use study::{ablation, reproduction, trade};
+use study::{ablation, mutants, reproduction, trade};
 
 /// Measures Edgepuck.
 #[derive(Parser)]
@@ -33,6 +33,8 @@ enum Command {
     Ablate(ablation::Ablation),
     /// Reproduce the paper's experiments, and write one report
     Reproduce(reproduction::ReproduceArgs),
+    /// Change the code in one place at a time, and count the changes that the tests notice
+    Mutants(mutants::MutantsArgs),
     /// Show the results of all measurements on one HTML page
     Report(report::ReportArgs),
 }
@@ -47,6 +49,7 @@ fn run(command: &Command) -> anyhow::Result<Outcome> {
         Command::Trade(args) => trade::run(args),
         Command::Ablate(ablation) => ablation::run(ablation),
         Command::Reproduce(args) => reproduction::run(args),
+        Command::Mutants(args) => mutants::run(args),
         Command::Report(args) => report::run(args),
     }
 }

@@ -6,6 +6,7 @@ mod datasets;
 pub mod devices;
 pub mod frames;
 pub mod gpu;
+pub mod mutants;
 pub mod numerics;
 mod plan;
 pub mod reproduction;
