@@ -138,28 +138,59 @@ mod tests {
         serde_json::from_str(LINE).unwrap()
     }
 
+    fn header() -> Header {
+        Header { stamp: Time { sec: 10, nanosec: 250_000_000 }, frame_id: "sensor".to_owned() }
+    }
+
+    /// A quarter turn to the left about z (REP 103).
+    fn pose(z: f64) -> Pose {
+        let half = 0.5f64.sqrt();
+        let orientation = Quaternion { x: 0.0, y: 0.0, z: half, w: half };
+        Pose { position: Point { x: 1.0, y: 2.0, z }, orientation }
+    }
+
+    fn assert_near(found: &Pose, expected: &Pose) {
+        assert_eq!(found.position, expected.position);
+        let parts = |q: &Quaternion| [q.x, q.y, q.z, q.w];
+        let pairs = parts(&found.orientation).into_iter().zip(parts(&expected.orientation));
+        pairs.for_each(|(found, expected)| assert!((found - expected).abs() < 1e-15, "{found}"));
+    }
+
     #[test]
     fn a_line_becomes_a_detection() {
-        let array = detections(&[object()]);
-        let [detection] = &array.detections[..] else { panic!("{array:?}") };
-        assert_eq!(array.header.stamp, Time { sec: 10, nanosec: 250_000_000 });
-        assert_eq!((array.header.frame_id.as_str(), detection.id.as_str()), ("sensor", "7"));
-        assert_eq!(detection.bbox.center.position, Point { x: 1.0, y: 2.0, z: 3.0 });
-        assert!((detection.bbox.center.orientation.z - 0.5f64.sqrt()).abs() < 1e-15);
-        let hypothesis = &detection.results[0].hypothesis;
-        assert_eq!((hypothesis.class_id.as_str(), hypothesis.score), ("car", 0.8));
-        let nameless = Object { class: None, ..object() };
-        assert_eq!(detections(&[nameless]).detections[0].results, []);
+        let unknown = Object { class: Some("unknown".to_owned()), ..object() };
+        let nameless = Object { class: None, probability: None, last_s: 11.0, ..object() };
+        let array = detections(&[object(), unknown, nameless]);
+        let [car, unknown, nameless] = &array.detections[..] else { panic!("{array:?}") };
+        assert_eq!(array.header.stamp, Time { sec: 11, nanosec: 0 });
+        assert_eq!((&car.header, &*car.id), (&header(), "7"));
+        assert_eq!(car.bbox.size, Vector3 { x: 4.0, y: 2.0, z: 1.5 });
+        let [result] = &car.results[..] else { panic!("{car:?}") };
+        let class = |class: &str| ObjectHypothesis { class_id: class.to_owned(), score: 0.8 };
+        assert_eq!(result.hypothesis, class("car"));
+        assert_eq!(unknown.results[0].hypothesis, class("unknown"));
+        assert_eq!(result.pose.covariance, [[0.0; 6]; 6]);
+        for found in [&car.bbox.center, &result.pose.pose] {
+            assert_near(found, &pose(3.0));
+        }
+        assert_eq!(nameless.results, []);
     }
 
     #[test]
     fn a_line_becomes_a_box_and_a_text_that_a_later_one_of_its_track_replaces() {
         let array = markers(&[object(), Object { class: None, ..object() }]);
         let [cube, text, nameless, _] = &array.markers[..] else { panic!("{array:?}") };
-        assert_eq!((cube.kind, cube.id, cube.ns.as_str()), (1, 7, "boxes"));
-        assert_eq!((text.kind, text.id, text.text.as_str()), (9, 7, "car 7"));
-        assert_eq!(cube.lifetime, Duration { sec: 0, nanosec: 150_000_000 });
-        assert!(text.pose.position.z > cube.pose.position.z + 0.75);
+        assert_eq!((cube.kind, cube.id, cube.ns.as_str(), cube.action), (1, 7, "boxes", 0));
+        assert_eq!((text.kind, text.id, text.ns.as_str(), text.action), (9, 7, "names", 0));
+        assert_eq!(text.text, "car 7");
+        assert_eq!(cube.scale, Vector3 { x: 4.0, y: 2.0, z: 1.5 });
+        for marker in [cube, text] {
+            assert_eq!(marker.header, header());
+            assert_eq!(marker.lifetime, Duration { sec: 0, nanosec: 150_000_000 });
+        }
+        assert_near(&cube.pose, &pose(3.0));
+        // The middle of the letters is 0.4 m above the top of the box.
+        assert_near(&text.pose, &pose(3.0 + 0.75 + 0.4));
         let names = ["car", "pedestrian", "cyclist", "truck"];
         for (i, name) in names.iter().enumerate() {
             assert!(names[..i].iter().all(|other| color(Some(name)) != color(Some(other))));

@@ -101,10 +101,10 @@ mod tests {
         .replace('\n', " ")
     }
 
-    fn published(input: &[u8]) -> anyhow::Result<Vec<(String, usize)>> {
+    fn published(input: &[u8]) -> anyhow::Result<Vec<Encoded>> {
         let mut all = Vec::new();
         read(input, |message| {
-            all.push((message.topic, message.cdr.len()));
+            all.push(message);
             Ok(())
         })?;
         Ok(all)
@@ -112,17 +112,27 @@ mod tests {
 
     #[test]
     fn the_objects_of_a_turn_are_one_message() {
-        let lines = [line(3, "\"car\""), line(3, "null"), line(4, "\"car\"")].join("\n");
-        let all = published(lines.as_bytes()).unwrap();
-        let topics: Vec<_> = all.iter().map(|(topic, _)| topic.as_str()).collect();
-        assert_eq!(topics, ["/objects", "/objects/markers", "/objects", "/objects/markers"]);
-        assert!(all[0].1 > all[2].1);
-        assert_eq!(published(b"").unwrap(), []);
+        let lines = [line(3, "\"car\""), line(3, "null"), line(4, "\"car\"")];
+        let object = |i: usize| serde_json::from_str::<ros::Object>(&lines[i]).unwrap();
+        let expected = [vec![object(0), object(1)], vec![object(2)]].map(|turn| {
+            [
+                ("/objects", "vision_msgs/msg/Detection3DArray", ros::detections(&turn).to_cdr()),
+                (
+                    "/objects/markers",
+                    "visualization_msgs/msg/MarkerArray",
+                    ros::markers(&turn).to_cdr(),
+                ),
+            ]
+        });
+        let all = published(lines.join("\n").as_bytes()).unwrap();
+        let found = all.iter().map(|one| (&*one.topic, &*one.kind, one.cdr.clone()));
+        assert_eq!(found.collect::<Vec<_>>(), expected.concat());
+        assert!(published(b"").unwrap().is_empty());
     }
 
     #[test]
     fn input_that_is_neither_is_refused_by_its_line() {
-        let refusal = |input: &str| format!("{:#}", published(input.as_bytes()).unwrap_err());
+        let refusal = |input: &str| format!("{:#}", published(input.as_bytes()).err().unwrap());
         let broken_off = format!("{}\n{}", line(3, "null"), &line(3, "null")[..40]);
         assert!(refusal(&broken_off).starts_with("standard input: line 2: EOF while parsing"));
         assert!(refusal("hello").starts_with("standard input: line 1: expected value"));
@@ -130,7 +140,7 @@ mod tests {
         assert_eq!(refusal(&newer), "standard input: line 1: expected version 1, found 2");
         let mut recording = mcap::MAGIC.to_vec();
         recording.extend([1, 99, 0, 0, 0, 0, 0, 0, 0, 5]);
-        let cause = format!("{:#}", published(&recording).unwrap_err());
+        let cause = format!("{:#}", published(&recording).err().unwrap());
         assert!(cause.starts_with("standard input: message 1: "), "{cause}");
     }
 }
