@@ -53,6 +53,15 @@ impl Axis {
 mod tests {
     use super::*;
 
+    /// The covariance becomes F P F' + q G G', with F = [1 t; 0 1] and G = [t^2/2; t].
+    #[test]
+    fn an_acceleration_of_a_step_widens_the_covariance() {
+        let axis = Axis { place: 1.0, velocity: 2.0, p: [0.5, 0.25, 4.0] }.after(2.0, 3.0);
+        assert_eq!((axis.place, axis.velocity), (5.0, 2.0));
+        assert_eq!(axis.p, [0.5 + 1.0 + 16.0 + 36.0, 0.25 + 8.0 + 36.0, 4.0 + 36.0]);
+        assert_eq!(axis.variance(0.5), 53.75);
+    }
+
     /// Without accelerations, the filter is the weighted least-squares line through the
     /// measurements and the initial velocity.
     #[test]

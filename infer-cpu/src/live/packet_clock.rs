@@ -201,6 +201,20 @@ mod tests {
         }
     }
 
+    /// Each packet corrects a thousandth of what is left.
+    #[test]
+    fn a_live_sensor_s_time_follows_the_host_s_slowly() {
+        let mut clock = PacketClock::new(Some(HOUR_US), false);
+        clock.take(0.0, 600.0, 1000.0);
+        let sent_s = |packet: u32| f64::from(packet) * 600e-6;
+        for packet in 1..=1000 {
+            let arrival_s = 1000.0 + sent_s(packet) + 0.01;
+            let (_, time_s) = clock.take(sent_s(packet) * 1e6, 600.0, arrival_s);
+            let expected_s = 0.01 * (1.0 - 0.999f64.powi(packet as i32));
+            assert!((time_s - 1000.0 - sent_s(packet) - expected_s).abs() < 1e-6, "{packet}");
+        }
+    }
+
     #[test]
     fn a_pause_of_a_recording_is_a_restart_at_its_time_if_the_clocks_agree() {
         for (off_s, stamp_us, time_s) in [(0.0, 0.0, 17.0), (0.0, 9e6, 17.0), (3.0, 9e6, 16.0)] {

@@ -217,7 +217,7 @@ impl Tracker {
     pub fn observe(&mut self, seen: &Observation<'_>) -> &Track {
         let waits = |track: &Track| seen.time_s - track.last_s;
         // A track that already has a cluster in this turn does not take another.
-        let due = 0.5 * self.turn_s..=PATIENCE_S.max(2.5 * self.turn_s);
+        let due = 0.5 * self.turn_s..=PATIENCE_S;
         let tracks = self.tracks[..self.n_used].iter().enumerate();
         let tracks = tracks.filter(|(_, track)| due.contains(&waits(track)));
         let costs = tracks.filter_map(|(at, track)| Some((track.cost(seen)?, at)));
@@ -336,6 +336,87 @@ mod tests {
             assert_eq!(track.id, 1, "turn {turn}");
             let [vx, vy, _] = track.velocity_m_s().unwrap_or_default();
             assert!(vx.hypot(vy) < 0.4, "turn {turn}: {vx} {vy}");
+        }
+    }
+
+    #[test]
+    fn a_second_cluster_within_half_a_turn_is_another_object() {
+        for (turn_s, id) in [(0.1, 2), (0.05, 1), (0.2, 2)] {
+            let mut tracker = Tracker::new(2);
+            tracker.set_turn(turn_s);
+            tracker.observe(&seen(0.0, 5.0, 0.0));
+            assert_eq!(tracker.observe(&seen(0.04, 5.1, 0.0)).id, id, "{turn_s}");
+        }
+    }
+
+    #[test]
+    fn a_class_follows_the_views_of_two_seconds_and_none_of_an_object_before() {
+        let mut tracker = Tracker::new(1);
+        let mut mean = |turn: u32, view: Option<f64>| {
+            let views = [view.unwrap_or_default()];
+            let view = view.map(|energy| (&views[..], energy));
+            let seen = Observation { view, ..seen(f64::from(turn) * 0.1, 1.0, 0.0) };
+            let track = tracker.observe(&seen);
+            (track.log_probabilities.clone(), track.energy)
+        };
+        (0..100).for_each(|turn| {
+            mean(turn, Some(0.0));
+        });
+        (100..119).for_each(|turn| {
+            mean(turn, Some(-1.0));
+        });
+        // The latest of 20 views has a weight of 1/20 from then on.
+        let expected = -(1.0 - 0.95f64.powi(20));
+        let (found, energy) = mean(119, Some(-1.0));
+        assert!((found[0] - expected).abs() < 1e-12, "{found:?} for {expected}");
+        assert!((energy - expected).abs() < 1e-12, "{energy} for {expected}");
+        // Its memory goes to another object, which has no view yet.
+        assert_eq!(mean(200, None), (vec![], 0.0));
+    }
+
+    /// The filter of a constant velocity lags behind an acceleration: in the steady state by
+    /// a T (2 alpha - beta) / (2 beta), with alpha and beta from the tracking index (Kalata, "The
+    /// tracking index", IEEE Transactions AES-20(2), 1984).
+    #[test]
+    fn the_velocity_of_an_accelerating_car_lags_as_an_acceleration_of_3_m_s2_allows() {
+        let (acceleration, turn_s, off_m) = (3.0f64, 0.1f64, 0.1 + 0.05 * 1.0);
+        let index = 3.0 * turn_s.powi(2) / off_m;
+        let r = (4.0 + index - (8.0 * index + index.powi(2)).sqrt()) / 4.0;
+        let alpha = 1.0 - r * r;
+        let beta = 2.0 * (2.0 - alpha) - 4.0 * r;
+        let lag_m_s = acceleration * turn_s * (2.0 * alpha - beta) / (2.0 * beta);
+        let mut tracker = Tracker::new(2);
+        let mut velocity = None;
+        for turn in 0..60 {
+            let t = f64::from(turn) * turn_s;
+            let track = tracker.observe(&seen(t, 20.0 + acceleration * t * t / 2.0, 0.0));
+            assert_eq!(track.id, 1, "turn {turn}");
+            velocity = track.velocity_m_s();
+        }
+        let found_m_s = acceleration * 59.0 * turn_s - velocity.unwrap()[0];
+        assert!((found_m_s - lag_m_s).abs() < 1e-3, "{found_m_s} for {lag_m_s}");
+    }
+
+    #[test]
+    fn a_size_that_a_neighbour_inflated_decays_by_1_percent_per_turn() {
+        let mut tracker = Tracker::new(2);
+        for turn in 0..=50 {
+            let size_m = if turn == 0 { [2.0, 1.0] } else { [1.0, 1.0] };
+            let seen = Observation { size_m, ..seen(f64::from(turn) * 0.1, 9.0, 0.0) };
+            assert_eq!(tracker.observe(&seen).id, 1, "turn {turn}");
+        }
+        let [side_m, _] = tracker.tracks[0].footprint.sides_m;
+        assert!((side_m - 2.0 * 0.99f64.powi(50)).abs() < 1e-12, "{side_m}");
+    }
+
+    #[test]
+    fn of_two_tracks_at_the_same_distance_a_cluster_is_of_the_one_of_its_size() {
+        for (size_m, id) in [([0.6, 0.6], 1), ([4.2, 1.8], 2)] {
+            let mut tracker = Tracker::new(2);
+            tracker.observe(&Observation { size_m: [0.6, 0.6], ..seen(0.0, 20.0, 0.0) });
+            tracker.observe(&Observation { size_m: [4.2, 1.8], ..seen(0.0, 21.0, 0.0) });
+            let found = tracker.observe(&Observation { size_m, ..seen(0.1, 20.5, 0.0) }).id;
+            assert_eq!(found, id, "{size_m:?}");
         }
     }
 
