@@ -112,3 +112,83 @@ impl GroundFinder {
 pub fn sector(n_columns: usize, column: usize) -> usize {
     column * SECTORS / n_columns
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Which returns of a column are ground, given their ranges and heights, on a level plane at 0
+    /// whose ground may climb by 8 degrees.
+    fn seeds(returns: &[[f32; 2]]) -> Vec<bool> {
+        let at = |&[range_m, z]: &[f32; 2]| Return {
+            position: [range_m, 0.0, z],
+            range_m,
+            ..Return::default()
+        };
+        let returns: Vec<Return> = returns.iter().map(at).collect();
+        let mut finder = GroundFinder::default();
+        finder.follow(&returns, Plane::level(0.0), 8f32.to_radians().tan());
+        finder.is_seed
+    }
+
+    /// tan 8 degrees is 0.1405: the ground climbs by 0.12 m and by this slope over at most 4 m.
+    #[test]
+    fn ground_climbs_by_a_kerb_and_a_slope() {
+        let is_ground = |run_m: f32, rise_m: f32| seeds(&[[10.0, 0.0], [10.0 + run_m, rise_m]])[1];
+        for (run_m, most_m) in [(0.5, 0.190), (1.0, 0.2605), (4.0, 0.682), (20.0, 0.682)] {
+            assert!(is_ground(run_m, most_m - 2e-3) && is_ground(run_m, 2e-3 - most_m), "{run_m}");
+            assert!(!is_ground(run_m, most_m + 2e-3) && !is_ground(run_m, -2e-3 - most_m));
+        }
+        // Returns swap their order by noise, and not by more.
+        assert!(is_ground(-0.29, 0.05) && !is_ground(-0.31, 0.05));
+    }
+
+    /// A bank of 39 degrees, whose steps are each as low as a kerb.
+    #[test]
+    fn a_slope_is_measured_over_0_3_m_or_more() {
+        let bank = [0.0, 0.1, 0.2, 0.3, 0.4].map(|run_m| [10.0 + run_m, 0.8 * run_m]);
+        assert_eq!(seeds(&bank), [false; 5]);
+    }
+
+    #[test]
+    fn the_foot_of_a_steep_surface_is_no_ground_and_what_lies_before_it_is() {
+        let feet = [[9.0, 0.0], [9.5, 0.0], [9.7, 0.05]];
+        let before = |range_m: f32, z: f32| seeds(&[feet[0], feet[1], feet[2], [range_m, z]]);
+        // 0.4 m over 0.25 m from the last return that is 0.3 m after another.
+        assert_eq!(before(9.75, 0.4), [true, false, false, false]);
+        // Half as steep as 45 degrees is a bank.
+        assert_eq!(before(10.5, 0.49), [true, true, true, false]);
+        assert_eq!(before(10.5, 0.51), [true, false, false, false]);
+    }
+
+    /// Columns of one return each.
+    struct Lowest(Vec<Return>);
+
+    impl Columns for Lowest {
+        fn n_columns(&self) -> usize {
+            self.0.len()
+        }
+
+        fn column(&self, column: usize) -> &[Return] {
+            std::slice::from_ref(&self.0[column])
+        }
+    }
+
+    #[test]
+    fn the_sensor_stands_above_the_median_of_the_lowest_returns_within_20_m() {
+        let level_m = |returns: &[[f32; 2]]| {
+            let at = |&[range_m, z]: &[f32; 2]| Return {
+                position: [range_m, 0.0, z],
+                range_m,
+                ..Return::default()
+            };
+            let columns = Lowest(returns.iter().map(at).collect());
+            GroundFinder::default().level_under_sensor(&columns).z_m(3.0, 4.0)
+        };
+        let far = [[20.5, 0.5], [40.0, 0.5], [60.0, 0.5], [80.0, 1.0]];
+        let near = [[5.0, -1.75], [19.5, -1.5], [10.0, 2.0]];
+        assert_eq!(level_m(&[&far[..], &near].concat()), -1.5);
+        assert_eq!(level_m(&far), 0.5);
+        assert_eq!(level_m(&[]), 0.0);
+    }
+}

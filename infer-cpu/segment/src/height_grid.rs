@@ -267,9 +267,46 @@ mod tests {
     }
 
     #[test]
-    fn a_mean_far_above_its_surroundings_is_no_ground() {
-        let z = |sector| if sector == 90 { 1.0 } else { -2.0 };
-        let seen: Vec<_> = (85..95).map(|sector| (sector, 10.5, z(sector))).collect();
-        assert!((grid(&seen).height(90, 10.5) - -1.5).abs() < 1e-5);
+    fn one_point_gives_no_height() {
+        let mut grid = HeightGrid::default();
+        grid.reset();
+        grid.add(90, 10.5, [10.5, 0.0, -2.0]);
+        assert_eq!(grid.means(20.0).count(), 0);
+        grid.finish(Plane::level(-0.5), 0.3);
+        assert!(grid.height(90, 10.5).is_nan());
+    }
+
+    #[test]
+    fn gaps_of_up_to_15_m_are_filled_and_two_bins_behind_the_last() {
+        let known = |seen: &[(usize, f32, f32)], range_m| !grid(seen).height(90, range_m).is_nan();
+        assert!(known(&[(90, 20.5, -2.0), (90, 34.5, -1.0)], 28.5));
+        assert!(!known(&[(90, 20.5, -2.0), (90, 38.5, -1.0)], 28.5));
+        // Bins are 1 m wide here.
+        assert!(known(&[(90, 11.5, -2.0)], 13.4) && !known(&[(90, 11.5, -2.0)], 14.6));
+    }
+
+    /// Between sectors at 10.5 m lie 0.3665 m, over which ground climbs by 0.3 times that, and a
+    /// kerb of 0.15 m besides.
+    #[test]
+    fn a_mean_is_ground_up_to_a_kerb_above_what_the_slope_allows_from_anywhere_around() {
+        for (low, high, sectors) in
+            [(89, 90, 1.0), (91, 90, 1.0), (80, 90, 10.0), (176, 3, 7.0), (3, 176, 7.0)]
+        {
+            let most_m = 0.15 + 0.3 * 0.3665 * sectors;
+            let is_ground = |rise_m: f32| {
+                let grid = grid(&[(low, 10.5, -2.0), (high, 10.5, -2.0 + rise_m)]);
+                (grid.height(high, 10.5) - (rise_m - 1.5)).abs() < 1e-3
+            };
+            assert!(is_ground(most_m - 0.01), "{low} {high}");
+            assert!(!is_ground(most_m + 0.01), "{low} {high}");
+        }
+        // Along a sector, from 10.5 to 14.5 m.
+        let rises = |rise_m: f32| {
+            let grid = grid(&[(90, 10.5, -2.0), (90, 14.5, -2.0 + rise_m)]);
+            (grid.height(90, 14.5) - (rise_m - 1.5)).abs() < 1e-3
+        };
+        assert!(rises(0.15 + 1.19) && !rises(0.15 + 1.21));
+        // What lies lower, as in a hole, is ground.
+        assert!(rises(-1.0));
     }
 }

@@ -53,6 +53,31 @@ fn body_and_roof_are_one_car_though_windows_return_nothing() {
     }
 }
 
+/// Without pillars, only the search from the belt line finds the roof.
+#[test]
+fn a_roof_without_pillars_belongs_to_its_body_and_a_branch_above_it_does_not() {
+    for y in [-8.0, -12.0] {
+        let [body, roof, ..] = car(0.0, y);
+        let branch = block([-0.4, y], [1.9, 1.3], 2.42, 0.3);
+        // A wall, which is too large for a cluster, so that every ring has returns.
+        let wall = block([50.0, 0.0], [0.3, 60.0], 0.0, 16.0);
+        let scan = scan(&VLP32C, &[flat(), body, roof, branch, wall]);
+        scan.check(|segmentation| {
+            let largest = segmentation.clusters().max_by_key(|cluster| cluster.points.len());
+            let number = segmentation.labels()[largest.unwrap().points[0] as usize];
+            let share = |part| scan.share(segmentation, part, |label| label == number);
+            let shares = [1, 2, 3].map(share);
+            assert!(shares[0] > 0.6 && shares[1..] == [1.0, 0.0], "{y} m: {shares:?}");
+        });
+    }
+}
+
+/// At 80 m, beams are 0.28 m apart, more than neighbours of a near sensor may be.
+#[test]
+fn what_is_far_stays_whole() {
+    assert_clusters(&scan(&VLP32C, &[flat(), block([80.0, 0.0], [2.0, 5.0], 0.0, 3.0)]), &[&[1]]);
+}
+
 #[test]
 fn a_person_beside_a_car_is_another_cluster() {
     for x in [5.0, 10.0, 20.0] {

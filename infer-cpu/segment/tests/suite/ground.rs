@@ -73,6 +73,27 @@ fn a_street_of_8_degrees_is_ground_and_carries_boxes() {
     });
 }
 
+/// A hill of up to 20 degrees is a plane of its own, as a tilt of the sensor is.
+#[test]
+fn a_hill_of_18_degrees_is_ground() {
+    let scan = scan(&VLP32C, &[ground(18f64.to_radians().tan(), 0.0, |x, _| x.abs() < 40.0)]);
+    scan.check(|segmentation| assert!(scan.share(segmentation, 0, is_ground) > 0.99));
+}
+
+/// Its floor lies 0.5 m below the street. The mean of a sector is of both at its sides.
+#[test]
+fn a_hole_has_a_floor_of_ground() {
+    let is_hole = |x: f64, y: f64| (9.0..16.0).contains(&x) && y.abs() < 3.0;
+    let street = ground(0.0, 0.0, move |x, y| !is_hole(x, y));
+    let scan = scan(&VLP32C, &[street, ground(0.0, -0.5, is_hole)]);
+    scan.check(|segmentation| {
+        assert!(scan.share(segmentation, 0, is_ground) > 0.99);
+        assert_eq!(scan.share(segmentation, 1, is_ground), 1.0);
+        let z_m = f64::from(segmentation.ground_z_m(14.8, 0.0).unwrap());
+        assert!((z_m + HEIGHT + 0.5).abs() < 0.05, "{z_m}");
+    });
+}
+
 #[test]
 fn a_ramp_that_begins_ahead_is_ground() {
     let slope = 7f64.to_radians().tan();
