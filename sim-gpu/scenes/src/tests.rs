@@ -264,7 +264,7 @@ fn points_on_moving_objects_lie_in_their_boxes() {
     let stage = stage(&drive_recipe());
     let mut drive = Drive::new(&stage, 6.0).unwrap();
     let packets = drive.fire(0..452).unwrap();
-    let mut n_moving = 0;
+    let (mut n_moving, mut farthest_m) = (0, 0.0f64);
     for (packet, number) in packets.iter().zip(0u32..) {
         let origin = DVec3::from_array(packet.scan.origin);
         let objects = packet.scan.object.iter().flatten();
@@ -282,8 +282,11 @@ fn points_on_moving_objects_lie_in_their_boxes() {
             let outside = (in_box.abs() - truth.size_m / 2.0).max_element();
             assert!(outside < margin_m, "object {object} of packet {number}: {outside} m outside");
             n_moving += usize::from(truth.velocity_m_s != DVec3::ZERO);
+            farthest_m = farthest_m.max(truth.centre_m(time_s).length());
         }
     }
+    // The ground, and with it the sight, ends at 80 m. The drive is 2 m long.
+    assert!((70.0..83.0).contains(&farthest_m), "{farthest_m}");
     assert!(n_moving > 200, "{n_moving} points on moving objects");
 }
 
