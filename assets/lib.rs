@@ -68,9 +68,9 @@ pub const HYPERQUEUE_JOB: &str = include_str!("jobs/hyperqueue.txt");
 /// The script of a task of Kubernetes or HyperQueue, with the key `{command}`.
 pub const TASK_SCRIPT: &str = include_str!("jobs/task.txt");
 
-/// The record of `cargo xtask trade` that ships, as CSV: what `edgepuck advise`
+/// Settings of `infer-cpu` with their times and accuracies, as CSV: what `edgepuck advise`
 /// recommends from.
-pub const TRADE_RECORD: &str = include_str!("reports/trade/trade.csv");
+pub const ADVISE_RECORD: &str = include_str!("advise.csv");
 
 /// The bundled models: a model's name and the bytes of its file.
 pub const MODELS: [(&str, &[u8]); 3] = [

@@ -42,10 +42,6 @@ has_pytorch() {
     /usr/bin/python3 -c "import torch" 2>/dev/null
 }
 
-has_browser() {
-    command -v chromium >/dev/null 2>&1 || command -v google-chrome >/dev/null 2>&1
-}
-
 missing_backported="$(missing_of "$backported")"
 missing_plain="$(missing_of "$plain")"
 # Debian 12's own Mesa 22.3 traces at half the speed of its backport 25.0.
@@ -54,10 +50,9 @@ case "$(dpkg-query -W -f '${Version}' mesa-vulkan-drivers 2>/dev/null || true)" 
 esac
 missing="$missing_backported$missing_plain"
 has_llvm_mca || missing="$missing llvm"
-has_browser || missing="$missing chromium"
 has_pytorch || missing="$missing python3-torch"
 if [ -z "$missing" ]; then
-    echo "All packages are installed: $backported $plain llvm chromium python3-torch"
+    echo "All packages are installed: $backported $plain llvm python3-torch"
     exit 0
 fi
 if ! command -v apt-get >/dev/null 2>&1; then
@@ -120,10 +115,7 @@ if ! has_llvm_mca; then
         fi
     done
 fi
-# Tests that need one of these are skipped where it cannot be installed.
-if ! has_browser && apt-cache show chromium >/dev/null 2>&1; then
-    missing_plain="$missing_plain chromium"
-fi
+# Tests that need it are skipped where it cannot be installed.
 if ! has_pytorch && apt-cache show python3-torch >/dev/null 2>&1; then
     missing_plain="$missing_plain python3-torch"
 fi

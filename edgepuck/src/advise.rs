@@ -1,16 +1,31 @@
-//! `edgepuck advise`: recommends a configuration for a device, from the measurements of `cargo
-//! xtask trade`.
+//! `edgepuck advise`: recommends a configuration for a device, from measurements that are built in.
 
 use crate::flags::positive;
-use crate::sampler_config::SamplerConfig;
 use crate::significant_digits::digits;
-use crate::trade_record::{self as row, Device, Measurement, Part};
 use crate::{Outcome, Usage};
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
+use formats::interval::wilson;
+use serde::Deserialize;
 use std::cmp::Ordering;
+use std::fmt;
 use std::fmt::Write as _;
 use std::io::Write as _;
-use std::path::PathBuf;
+
+/// The clouds that every setting of the record classified.
+const TEST_SET: &str = "ModelNet40's test clouds, the half at hand";
+/// The machine that is `here` in the record.
+const MACHINE: &str = "Intel(R) Xeon(R) Processor, 2 threads, linux x86_64";
+
+formats::named! {
+    /// A device that was measured or modelled.
+    #[derive(clap::ValueEnum)]
+    pub enum Device: "device" {
+        /// A Raspberry Pi 5; its times are modelled.
+        Pi5 = "pi5",
+        /// The machine on which the record was measured.
+        Here = "here",
+    }
+}
 
 #[derive(clap::Args)]
 pub struct AdviseArgs {
@@ -33,10 +48,58 @@ pub struct AdviseArgs {
     /// Largest number of threads
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     max_threads: Option<usize>,
+}
 
-    /// CSV file of measurements that `cargo xtask trade` wrote [default: the built-in record]
-    #[arg(long, value_name = "CSV")]
-    record: Option<PathBuf>,
+/// A line of the record: a setting that classified `clouds` clouds, `right` of them correctly.
+#[derive(Clone, Deserialize)]
+struct Measurement {
+    model: String,
+    model_file: String,
+    /// The sampler, and after a colon the front end of `cpl`.
+    sampler: String,
+    points: usize,
+    precision: String,
+    /// The T-Nets that run; empty if the model has none.
+    t_nets: String,
+    threads: usize,
+    /// `None` for numbers of threads that the machine lacks.
+    ms_here: Option<f64>,
+    /// `None` for samplers that are not modelled.
+    ms_pi5: Option<f64>,
+    /// Size of the weights in the precision.
+    megabytes: f64,
+    right: usize,
+    clouds: usize,
+}
+
+impl Measurement {
+    fn ms(&self, device: Device) -> Option<f64> {
+        match device {
+            Device::Pi5 => self.ms_pi5,
+            Device::Here => self.ms_here,
+        }
+    }
+
+    fn accuracy(&self) -> f64 {
+        self.right as f64 / self.clouds as f64
+    }
+
+    /// The 95 % interval of the accuracy.
+    fn interval(&self) -> (f64, f64) {
+        wilson(self.right, self.clouds)
+    }
+}
+
+/// The setting in words.
+impl fmt::Display for Measurement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { model, sampler, points, precision, .. } = self;
+        write!(f, "{model}, {sampler} {points}, {precision}")?;
+        if !self.t_nets.is_empty() {
+            write!(f, ", T-Nets {}", self.t_nets)?;
+        }
+        write!(f, ", {} thread{}", self.threads, if self.threads == 1 { "" } else { "s" })
+    }
 }
 
 /// The time on the device, and the row.
@@ -44,31 +107,20 @@ type Timed<'a> = (f64, &'a Measurement);
 
 pub fn run(args: &AdviseArgs) -> Result<Outcome> {
     args.check()?;
-    let (name, rows) = match &args.record {
-        Some(path) => (path.display().to_string(), row::read(path)?),
-        None => ("the built-in record".to_owned(), row::bundled()?),
-    };
-    let advice = advise(args, &rows).context(name)?;
+    let advice = advise(args, &record())?;
     std::io::stdout().write_all(advice.as_bytes())?;
     Ok(Outcome::Success)
 }
 
+fn record() -> Vec<Measurement> {
+    let mut csv = csv::Reader::from_reader(edgepuck_assets::ADVISE_RECORD.as_bytes());
+    let rows: Result<_, csv::Error> = csv.deserialize().collect();
+    rows.expect("invariant: the record is built in")
+}
+
 fn advise(args: &AdviseArgs, rows: &[Measurement]) -> Result<String> {
-    // infer-cpu runs all T-Nets of a model, so other settings are not a choice.
-    let runs_all = |row: &&Measurement| matches!(row.t_nets.as_str(), "" | "both");
-    // An older record may have samplers that infer-cpu no longer has.
-    let is_known =
-        |row: &&Measurement| row.sampler.is_empty() || SamplerConfig::named(&row.sampler).is_some();
-    let is_choice =
-        |row: &&Measurement| row.part == Part::Classifier && runs_all(row) && is_known(row);
-    let choices = rows.iter().filter(is_choice);
-    let timed: Vec<Timed> = choices.filter_map(|row| Some((row.ms(args.device)?, row))).collect();
-    if timed.is_empty() {
-        bail!(
-            "holds no timings for {}; `cargo xtask trade` in a checkout measures them",
-            args.device
-        );
-    }
+    let timed: Vec<Timed> =
+        rows.iter().filter_map(|row| Some((row.ms(args.device)?, row))).collect();
     let fitting: Vec<Timed> = timed.iter().copied().filter(|timed| args.allow(timed)).collect();
     let Some(&chosen) = fitting.iter().max_by(|a, b| args.compare(a, b)) else {
         bail!("{}", args.none_fits(&timed));
@@ -94,15 +146,15 @@ impl AdviseArgs {
 
     fn allow(&self, &(ms, row): &Timed) -> bool {
         self.max_ms.is_none_or(|most| ms <= most)
-            && self.min_accuracy.is_none_or(|least| row.accuracy >= least)
-            && self.max_mb.is_none_or(|most| row.megabytes.is_some_and(|mb| mb <= most))
-            && self.max_threads.is_none_or(|most| row.threads.is_some_and(|n| n <= most))
+            && self.min_accuracy.is_none_or(|least| row.accuracy() >= least)
+            && self.max_mb.is_none_or(|most| row.megabytes <= most)
+            && self.max_threads.is_none_or(|most| row.threads <= most)
     }
 
     /// Orders settings so that the better one is greater; of equal ones, the one with fewer
     /// threads.
     fn compare(&self, a: &Timed, b: &Timed) -> Ordering {
-        let accuracy = a.1.accuracy.total_cmp(&b.1.accuracy);
+        let accuracy = a.1.accuracy().total_cmp(&b.1.accuracy());
         let speed = b.0.total_cmp(&a.0);
         let first = if self.accuracy_first() { accuracy.then(speed) } else { speed.then(accuracy) };
         first.then(b.1.threads.cmp(&a.1.threads))
@@ -112,9 +164,8 @@ impl AdviseArgs {
     fn none_fits(&self, timed: &[Timed]) -> String {
         let mut text = "no measured setting meets these limits".to_owned();
         let fastest = timed.iter().min_by(|a, b| a.0.total_cmp(&b.0));
-        let best = timed.iter().max_by(|a, b| a.1.accuracy.total_cmp(&b.1.accuracy));
-        let megabytes = |timed: &&Timed| timed.1.megabytes.unwrap_or(f64::INFINITY);
-        let smallest = timed.iter().min_by(|a, b| megabytes(a).total_cmp(&megabytes(b)));
+        let best = timed.iter().max_by(|a, b| a.1.accuracy().total_cmp(&b.1.accuracy()));
+        let smallest = timed.iter().min_by(|a, b| a.1.megabytes.total_cmp(&b.1.megabytes));
         let smallest = smallest.filter(|_| self.max_mb.is_some());
         for (what, timed) in [("fastest", fastest), ("most accurate", best), ("smallest", smallest)]
         {
@@ -130,9 +181,8 @@ impl AdviseArgs {
         let mut text = format!("{}\n\n  {}\n", one_line(chosen), command(row));
         let _ = write!(
             text,
-            "\nWhy: of {} settings measured on {} ({} clouds), {} meet the limits; ",
+            "\nWhy: of {} settings measured on {TEST_SET} ({} clouds), {} meet the limits; ",
             timed.len(),
-            row.test_set,
             row.clouds,
             fitting.len()
         );
@@ -148,17 +198,16 @@ impl AdviseArgs {
                             for the Raspberry Pi.\n"
                 .to_owned(),
             Device::Here => format!(
-                "The times were measured on {}.\n`cargo build --release --package infer-cpu` \
-                 builds infer-cpu as target/release/infer-cpu.\n",
-                row.machine
+                "The times were measured on {MACHINE}.\n`cargo build --release --package infer-cpu` \
+                 builds infer-cpu as target/release/infer-cpu.\n"
             ),
         };
+        let (low, high) = row.interval();
         // If the difference is not significant, a user may prefer the cheaper setting.
-        let as_good = |&&(other_ms, other): &&Timed| {
-            other_ms < 0.75 * ms && other.accuracy >= row.accuracy_low
-        };
+        let as_good =
+            |&&(other_ms, other): &&Timed| other_ms < 0.75 * ms && other.accuracy() >= low;
         if let Some(&cheaper) = fitting.iter().filter(as_good).min_by(|a, b| a.0.total_cmp(&b.0)) {
-            let lost = 100.0 * (row.accuracy - cheaper.1.accuracy);
+            let lost = 100.0 * (row.accuracy() - cheaper.1.accuracy());
             let saved = 100.0 * (1.0 - cheaper.0 / ms);
             let _ = writeln!(
                 text,
@@ -166,7 +215,7 @@ impl AdviseArgs {
                 one_line(cheaper)
             );
         }
-        let better = |&&(_, other): &&Timed| other.accuracy > row.accuracy_high;
+        let better = |&&(_, other): &&Timed| other.accuracy() > high;
         if let Some(&better) = timed.iter().filter(better).min_by(|a, b| a.0.total_cmp(&b.0)) {
             let _ = writeln!(
                 text,
@@ -179,28 +228,26 @@ impl AdviseArgs {
 }
 
 fn one_line((ms, row): Timed) -> String {
+    let (low, high) = row.interval();
     format!(
         "{row}: {} ms, {:.2} % ({:.2} to {:.2}), {} MB of weights",
         digits(ms),
-        100.0 * row.accuracy,
-        100.0 * row.accuracy_low,
-        100.0 * row.accuracy_high,
-        row.megabytes.map(digits).unwrap_or_default(),
+        100.0 * row.accuracy(),
+        100.0 * low,
+        100.0 * high,
+        digits(row.megabytes),
     )
 }
 
 fn command(row: &Measurement) -> String {
-    let Measurement { model_file, precision, .. } = row;
+    let Measurement { model_file, precision, points, threads, .. } = row;
     let mut words = format!("infer-cpu classify --model {model_file}");
-    // A row names the sampler, and after a colon the front end of `cpl`.
     let mut sampler = row.sampler.split(':');
     let _ = write!(words, " --sampler {}", sampler.next().unwrap_or_default());
     if let Some(front) = sampler.next() {
         let _ = write!(words, " --front {front}");
     }
-    let points = row.points.unwrap_or_default();
-    let _ = write!(words, " --points {points} --precision {precision}");
-    let _ = write!(words, " --threads {} CLOUD", row.threads.unwrap_or(1));
+    let _ = write!(words, " --points {points} --precision {precision} --threads {threads} CLOUD");
     words
 }
 
@@ -214,20 +261,24 @@ fn share(word: &str) -> Result<f64, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use infer_cpu::Precision;
+    use infer_cpu::sampler::{FrontChoice, SamplerKind};
 
     fn row(model: &str, ms_pi5: f64, right: usize, threads: usize) -> Measurement {
-        let row = Measurement {
-            part: Part::Classifier,
+        Measurement {
             model: model.to_owned(),
-            t_nets: "both".to_owned(),
             model_file: format!("{model}.safetensors"),
-            points: Some(64),
-            threads: Some(threads),
+            sampler: "fps".to_owned(),
+            points: 64,
+            precision: "f32".to_owned(),
+            t_nets: String::new(),
+            threads,
+            ms_here: None,
             ms_pi5: Some(ms_pi5),
-            megabytes: Some(2.0),
-            ..Measurement::default()
-        };
-        row.with_accuracy(right, 1000)
+            megabytes: 2.0,
+            right,
+            clouds: 1000,
+        }
     }
 
     fn rows() -> Vec<Measurement> {
@@ -241,8 +292,8 @@ mod tests {
     }
 
     fn asked(max_ms: Option<f64>, min_accuracy: Option<f64>) -> AdviseArgs {
-        let (max_mb, max_threads, record) = (None, None, None);
-        AdviseArgs { device: Device::Pi5, max_ms, min_accuracy, max_mb, max_threads, record }
+        let (max_mb, max_threads) = (None, None);
+        AdviseArgs { device: Device::Pi5, max_ms, min_accuracy, max_mb, max_threads }
     }
 
     #[test]
@@ -271,20 +322,19 @@ mod tests {
     }
 
     #[test]
-    fn a_sampler_that_infer_cpu_lacks_is_not_advised() {
-        let best = Measurement { sampler: "cpl:own:table8".to_owned(), ..row("best", 0.1, 999, 4) };
-        let rows = [rows(), vec![best]].concat();
-        let advice = advise(&asked(Some(5.0), None), &rows).unwrap();
-        assert!(advice.starts_with("large"), "{advice}");
-    }
-
-    #[test]
     fn what_was_not_measured_is_not_advised() {
         let error = advise(&asked(Some(0.1), None), &rows()).unwrap_err().to_string();
         assert!(error.contains("the fastest: small") && error.contains("most accurate: huge"));
-        let here = AdviseArgs { device: Device::Here, ..asked(Some(5.0), None) };
-        let error = advise(&here, &rows()).unwrap_err().to_string();
-        assert!(error.contains("`cargo xtask trade`"), "{error}");
         assert!(asked(None, None).check().unwrap_err().is::<Usage>());
+    }
+
+    #[test]
+    fn every_setting_of_the_record_is_one_of_infer_cpu() {
+        for row in record() {
+            let mut words = row.sampler.split(':');
+            assert!(words.next().unwrap().parse::<SamplerKind>().is_ok(), "{row}");
+            assert!(words.next().is_none_or(|front| front.parse::<FrontChoice>().is_ok()), "{row}");
+            assert!(row.precision.parse::<Precision>().is_ok(), "{row}");
+        }
     }
 }

@@ -1,7 +1,6 @@
 //! Checks and parsers for flags of several commands.
 
 use crate::Usage;
-use std::path::Path;
 
 /// Checks that this program can simplify meshes, if that is `wanted`.
 pub fn need_simplification(wanted: bool) -> Result<(), Usage> {
@@ -14,14 +13,6 @@ pub fn need_simplification(wanted: bool) -> Result<(), Usage> {
          compiler"
             .to_owned(),
     ))
-}
-
-/// Checks that `--meshes`, if present, names a folder.
-pub fn need_folder_of_meshes(meshes: Option<&Path>) -> Result<(), Usage> {
-    match meshes.filter(|path| !path.is_dir()) {
-        Some(path) => Err(Usage(format!("--meshes: expected a folder, found {}", path.display()))),
-        None => Ok(()),
-    }
 }
 
 /// The first of these flags that was given.

@@ -27,15 +27,11 @@ mod preview;
 mod preview_scan;
 mod profile;
 mod sample_surfaces;
-#[cfg(feature = "models")]
-pub mod sampler_config;
 mod scan;
 mod segment;
 mod shell;
-pub mod signals;
+mod signals;
 pub mod significant_digits;
-#[cfg(feature = "models")]
-pub mod trade_record;
 mod weather;
 
 pub use formats::outcome::{self, Outcome, Usage};

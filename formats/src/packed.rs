@@ -129,12 +129,6 @@ impl ClusterWriter {
         Ok(Self { set, ids: Vec::new(), sensor: Vec::new(), numbers: Vec::new() })
     }
 
-    /// The number of clusters so far.
-    #[must_use]
-    pub fn n_clusters(&self) -> usize {
-        self.set.labels.len()
-    }
-
     /// Appends the cluster `points`, metres in the sensor's frame, of class `label`.
     ///
     /// # Errors

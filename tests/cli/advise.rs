@@ -1,29 +1,12 @@
 //! `advise`: one configuration, chosen from measurements.
 
 use crate::Folder;
-use std::fs;
 
 #[test]
-fn the_record_that_ships_is_advised_from_in_any_folder() {
-    let advised = Folder::new().succeeds("advise --device pi5 --max-ms 5 --min-accuracy 0.85");
-    assert!(advised.contains("infer-cpu classify --model"), "{advised}");
-}
-
-#[test]
-fn bad_records_and_limits_are_named() {
+fn the_record_is_advised_from_in_any_folder() {
     let folder = Folder::new();
-    folder.write("a.csv", "part,points\nscan,1\n");
-    folder.write("empty.csv", "");
-    fs::create_dir(folder.at("folder")).unwrap();
-    for (record, cause) in [
-        ("a.csv", "expected a record"),
-        ("no.csv", "cannot read"),
-        ("folder", "cannot read"),
-        ("empty.csv", "found no rows"),
-    ] {
-        let refused = folder.exits(1, &format!("advise --device pi5 --max-ms 5 --record {record}"));
-        assert!(refused.contains(record) && refused.contains(cause), "{refused}");
-    }
+    let advised = folder.succeeds("advise --device pi5 --max-ms 5 --min-accuracy 0.85");
+    assert!(advised.contains("infer-cpu classify --model"), "{advised}");
     folder.refuses(
         2,
         &[

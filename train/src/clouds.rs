@@ -122,12 +122,6 @@ impl Clouds {
         }
     }
 
-    /// Reads the `split` of the packed data at `path` and leaves its clouds unchanged.
-    pub fn read_unmoved(path: &Path, split: Split) -> Result<Self, Error> {
-        let file = packed(path, split).unwrap_or_else(|| path.to_path_buf());
-        Self::checked(read_labelled(&file)?, path)
-    }
-
     fn checked(mut set: LabelledSet, path: &Path) -> Result<Self, Error> {
         let refuse = |cause: String| Err(Error::Data { path: path.to_path_buf(), cause });
         if set.is_empty() {

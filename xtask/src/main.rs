@@ -36,16 +36,10 @@ enum Command {
     BuildPi(build_pi::Args),
     /// Measure speed and accuracy: `cargo xtask bench --help`
     Bench(Forwarded),
-    /// Sweep every parameter from the mesh to the class, and record time and accuracy
-    Trade(Forwarded),
-    /// Measure how much each effect of a scan matters to a classifier, and its cost
-    Ablate(Forwarded),
-    /// Reproduce the paper's experiments, and write one report
+    /// Reproduce the paper's accuracies by points, sampler, dataset and noise
     Reproduce(Forwarded),
     /// Change the code in one place at a time, and count the changes that the tests notice
     Mutants(Forwarded),
-    /// Show the results of all measurements on one HTML page
-    Report(Forwarded),
     /// Run the program `edgepuck` with these arguments
     Edgepuck(Forwarded),
     /// A command of the program `edgepuck`

@@ -129,16 +129,6 @@ fn executables(messages: &str, are_tests: bool) -> impl Iterator<Item = Value> {
     })
 }
 
-/// The command line as records and pages show it.
-pub fn command_line() -> String {
-    let quoted = |word: String| match word.contains([' ', '(', '\'', ';', '&']) {
-        true => format!("{word:?}"),
-        false => word,
-    };
-    let words: Vec<String> = arguments().into_iter().map(quoted).collect();
-    format!("cargo xtask {}", words.join(" "))
-}
-
 /// The arguments that the user typed, paths as [`recorded`] writes them.
 pub fn arguments() -> Vec<String> {
     let recorded = |word: String| match word.split_once('=') {

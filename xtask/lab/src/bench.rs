@@ -2,19 +2,17 @@
 //!
 //! [`speed`] is about building and tracing, [`to_disk`] about the time of a dataset, [`embree`]
 //! compares with Embree; [`scenes`] is about scenes of many objects, [`infer`] about classifying,
-//! sampling and learning, [`pi5`] about a Raspberry Pi, [`numerics`] about errors, [`gpu`] about
-//! adapters, [`sensor`] compares a profile with real sweeps, [`frames`] is about detection in them,
-//! [`sydney`] about real objects after training on simulated scenes, [`robustness`] about strays,
-//! turns and few points, [`scale`] about the costs of many scans.
+//! sampling and learning, [`pi5`] about a Raspberry Pi, [`gpu`] about adapters, [`frames`] about
+//! detection in real sweeps, [`sydney`] about real objects after training on simulated scenes.
 
 use crate::measure::backends;
 use crate::measure::bench_mesh::{self, BenchMesh};
 use crate::measure::machine::{self, Machine};
 use crate::pi5;
-use crate::render::table::write_json;
 use crate::rivals::{casting as embree, infer};
 use crate::study::casting::{scenes, speed, to_disk};
-use crate::study::{frames, gpu, numerics, robustness, scale, sensor, sydney};
+use crate::study::{frames, gpu, sydney};
+use crate::table::write_json;
 use anyhow::Result;
 use clap::{Args, Subcommand};
 use edgepuck_program::Outcome;
@@ -46,9 +44,6 @@ pub enum Benchmark {
     PiModel(pi5::PiModelArgs),
     /// Model the run time of `infer-cpu live` on a Raspberry Pi 5, stage by stage.
     PiLive(pi5::PiLiveArgs),
-    /// Measure how numerical errors grow with scale, offset and size, and compare them with derived
-    /// bounds.
-    Growth(numerics::GrowthArgs),
     /// Check and measure a GPU in one call of some minutes, and write gpu.json.
     ///
     /// Every shader is compared with its counterpart on the CPU, and rays are aimed at the vertices
@@ -56,16 +51,10 @@ pub enum Benchmark {
     /// measured. The exit code is 1 if a comparison fails. A copy of the program runs on a machine
     /// without the workspace and without a network.
     Gpu(gpu::GpuArgs),
-    /// Compare a sensor's profile with real sweeps of the sensor: directions, noise, missing returns.
-    Sensor(sensor::SensorArgs),
     /// Detect the cars and persons in labelled sweeps of real sensors, and count false alarms.
     Frames(frames::FramesArgs),
     /// Follow the protocol of the Sydney Urban Objects benchmark, pre-trained and from scratch.
     Sydney(sydney::SydneyArgs),
-    /// Measure classifiers of whole objects on strays, turned and sparse clouds, and on no objects.
-    Robustness(robustness::RobustnessArgs),
-    /// Measure tasks of `gen-dataset --layout webdataset` of 1e6, 1e9 and 1e12 scans.
-    Scale(scale::ScaleArgs),
 }
 
 /// Meshes to cast at, and casters.
@@ -116,12 +105,8 @@ pub fn run(benchmark: &Benchmark) -> Result<Outcome> {
         Benchmark::Train(args) => infer::learn::run(args),
         Benchmark::PiModel(args) => pi5::run(args),
         Benchmark::PiLive(args) => pi5::run_live(args),
-        Benchmark::Growth(args) => numerics::run(args),
-        Benchmark::Sensor(args) => sensor::run(args),
         Benchmark::Frames(args) => frames::run(args),
         Benchmark::Sydney(args) => sydney::run(args),
-        Benchmark::Robustness(args) => robustness::run(args),
-        Benchmark::Scale(args) => scale::run(args),
     }?;
     Ok(Outcome::Success)
 }

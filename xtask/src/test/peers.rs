@@ -1,12 +1,12 @@
 //! The scripts in `tests/peers`, which compare our programs with other software.
 //!
 //! Python runs each script in an environment of pinned packages from PyPI. `EDGEPUCK_PROGRAM`,
-//! `EDGEPUCK_LAB`, `EDGEPUCK_INFER` and `EDGEPUCK_ROS2` are our programs, `EDGEPUCK_OUT` is an empty
+//! `EDGEPUCK_INFER` and `EDGEPUCK_ROS2` are our programs, `EDGEPUCK_OUT` is an empty
 //! folder, and [`SUPPORT`] is on `PYTHONPATH`. A script exits with 0 on success and with
 //! [`SKIPPED`] if it cannot run here. A script `x.py` uses the packages of `requirements.txt`, or
 //! those of `x-requirements.txt` if it exists: they conflict with the others, or are very large.
 
-use super::{compile_all, compile_lab, meanwhile::Meanwhile};
+use super::{compile_all, meanwhile::Meanwhile};
 use crate::summary::{Counts, Summary};
 use anyhow::{Context, anyhow};
 use std::fs;
@@ -15,7 +15,7 @@ use std::process::{Command, Stdio};
 use std::sync::Mutex;
 use std::thread::JoinHandle;
 use xtask::venv::{Environment, cache_dir};
-use xtask::workspace::{LAB, executable, output, root};
+use xtask::workspace::{executable, output, root};
 
 const SCRIPTS: &str = "tests/peers";
 
@@ -164,18 +164,14 @@ fn scripts() -> anyhow::Result<Vec<PathBuf>> {
 }
 
 /// Our programs, each with the environment variable that has its path.
-pub type Programs = [(&'static str, PathBuf); 4];
+pub type Programs = [(&'static str, PathBuf); 3];
 
 /// Our programs as the tests have built them: nothing is built for the peers alone.
 pub fn programs() -> anyhow::Result<Programs> {
-    let built = |mut cargo: Command| {
-        cargo.args(["--no-run", "--message-format", "json-render-diagnostics"]);
-        output(cargo.stderr(Stdio::inherit()))
-    };
-    let messages = built(compile_all(&["test"]))?;
+    let mut cargo = compile_all(&["test", "--no-run", "--message-format"]);
+    let messages = output(cargo.arg("json-render-diagnostics").stderr(Stdio::inherit()))?;
     Ok([
         ("EDGEPUCK_PROGRAM", executable(&messages, "edgepuck")?),
-        ("EDGEPUCK_LAB", executable(&built(compile_lab(&["test"]))?, LAB)?),
         ("EDGEPUCK_INFER", executable(&messages, "infer-cpu")?),
         ("EDGEPUCK_ROS2", executable(&messages, "edgepuck-ros2")?),
     ])

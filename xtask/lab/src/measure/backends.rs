@@ -15,8 +15,6 @@ pub struct Backend {
     pub caster: OpenCaster,
     /// Rays that one repeat should cast at least.
     pub rays: usize,
-    /// Whether it casts beside the CPU, so that CPU time is no measure.
-    pub is_gpu: bool,
 }
 
 impl Backend {
@@ -61,7 +59,7 @@ pub fn open(request: Option<&AdapterRequest>) -> Result<Vec<Backend>> {
 
 pub fn cpu() -> Backend {
     let caster = OpenCaster::Cpu(Effects::default());
-    Backend { caster, rays: RAYS_TO_FILL_THE_CORES, is_gpu: false }
+    Backend { caster, rays: RAYS_TO_FILL_THE_CORES }
 }
 
 /// The first adapter that has the name of `adapter`.
@@ -71,7 +69,7 @@ pub fn of_adapter(adapter: &AdapterSummary) -> Result<Backend> {
         .with_context(|| format!("opening {}", adapter.name))?;
     let is_gpu = adapter.kind != AdapterKind::Software;
     let rays = if is_gpu { RAYS_TO_FILL_A_GPU } else { RAYS_TO_FILL_THE_CORES };
-    Ok(Backend { caster, rays, is_gpu })
+    Ok(Backend { caster, rays })
 }
 
 pub fn short(name: &str) -> String {

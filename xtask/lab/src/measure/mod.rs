@@ -6,5 +6,5 @@ pub mod clock;
 pub mod machine;
 pub mod methods;
 pub mod ray_set;
-pub mod reference_network;
+pub mod reference;
 pub mod subprocess;

@@ -3,7 +3,7 @@
 
 use super::count::{Counter, Counts};
 use super::model::Machine;
-use crate::render::table::Table;
+use crate::table::Table;
 use anyhow::{Context, Result, ensure};
 use serde::Deserialize;
 use std::collections::BTreeSet;

@@ -23,7 +23,6 @@ mod plan;
 mod rows;
 
 use model::Machine;
-pub use plan::Sampler;
 
 #[derive(Args, Debug)]
 pub struct PiModelArgs {
@@ -114,45 +113,6 @@ impl Board {
 
     fn counter(&self, model: &Path) -> Result<count::Counter> {
         count::Counter::new(&self.folder, &self.binary, model)
-    }
-}
-
-/// The model of one model file on a Raspberry Pi 5.
-pub struct Modelled {
-    board: Board,
-    network: network::Network,
-    counter: count::Counter,
-}
-
-impl Modelled {
-    /// Analyses the build and the model file at `model`. Fails without an emulator that can
-    /// count: times without what is outside the inner loops would be too good.
-    pub fn open(model: &Path) -> Result<Self> {
-        let board = Board::open()?;
-        let counter = board.counter(model)?;
-        let network = network::Network::read(model)?;
-        Ok(Self { board, network, counter })
-    }
-
-    /// Milliseconds to a class of `points` of a cloud of `from`, by threads;
-    /// `None` if the network lacks what the sampler needs.
-    pub fn total_ms(
-        &self,
-        sampler: Sampler,
-        (from, points): (usize, usize),
-        precision: Precision,
-        threads: &[usize],
-    ) -> Result<Option<Vec<f64>>> {
-        let setting = plan::Setting { sampler, from, points, precision };
-        let Some(stages) = setting.stages(&self.network) else { return Ok(None) };
-        let (network, kernels) = (&self.network, &self.board.kernels);
-        let counted = rows::count(&self.counter, network, kernels, setting)?;
-        let of = |&threads: &usize| {
-            let machine = Machine { threads, ..Machine::PI_5 };
-            let other = Some(counted.other);
-            model::time(&machine, kernels, &stages, counted.columns_read, other).total_ms
-        };
-        Ok(Some(threads.iter().map(of).collect()))
     }
 }
 

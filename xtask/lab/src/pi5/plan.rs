@@ -10,7 +10,6 @@ use std::slice::from_ref;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sampler {
     All,
-    Random,
     Fps,
     /// A Critical Points Layer with a front end of its own.
     Cpl,
@@ -24,7 +23,6 @@ impl Sampler {
     pub fn word(self) -> &'static str {
         match self {
             Self::All => "all",
-            Self::Random => "random",
             Self::Fps => "fps",
             Self::Cpl => "cpl:own:truncate",
             Self::CplStn => "cpl:stn:truncate",
@@ -107,7 +105,7 @@ pub fn stages(
     let mut stages = Vec::new();
     match sampler {
         // What this does is all outside the inner loops.
-        Sampler::All | Sampler::Random => {}
+        Sampler::All => {}
         Sampler::Fps => stages.push(Stage::Farthest { points: from, picks: points }),
         Sampler::Cpl | Sampler::CplStn => {
             let front = if sampler == Sampler::Cpl { &network.front } else { &network.stn };

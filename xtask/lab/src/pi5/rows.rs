@@ -6,7 +6,7 @@ use super::kernels::{Kernel, Kernels};
 use super::model::{Machine, Other, Time, time};
 use super::network::Network;
 use super::plan::{Sampler, Setting, Stage};
-use crate::render::table::{Column, Table, digits};
+use crate::table::{Column, Table, digits};
 use anyhow::Result;
 
 /// Clouds of more points are not run under QEMU: what is counted grows by the

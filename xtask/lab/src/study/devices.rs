@@ -6,7 +6,7 @@
 use crate::measure::backends::Backend;
 use crate::measure::bench_mesh::{BenchMesh, target};
 use crate::measure::ray_set::vlp32c;
-use crate::render::table::{Column, Table, digits};
+use crate::table::{Column, Table, digits};
 use anyhow::Result;
 use edgepuck_shapes::{ShapeClass, generate};
 use glam::{DAffine3, DVec3};

@@ -1,13 +1,11 @@
-//! The files that let an interrupted study be resumed: networks, which are trained once, results, and
-//! the terms of the study.
+//! The files that let an interrupted study be resumed: networks, which are trained once, and the terms
+//! of the study.
 
 use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, ensure};
 use formats::atomic;
-use serde::Serialize;
-use serde::de::DeserializeOwned;
 use train::clouds::Clouds;
 use train::recipe::Recipe;
 use train::run::{Job, Progress};
@@ -31,26 +29,6 @@ pub fn network(out: &Path, name: &str, recipe: Recipe, clouds: &Clouds) -> anyho
         }
     };
     job.run(None, &mut report).map(|_| ()).with_context(|| format!("cannot train {name}"))
-}
-
-/// `recipe` with the fewest epochs that have at least `steps` steps on `clouds` clouds.
-pub fn of_steps(recipe: Recipe, steps: u32, clouds: usize) -> Recipe {
-    let each = (clouds / recipe.batch).max(1) as u32;
-    Recipe { epochs: steps.div_ceil(each).max(1), ..recipe }
-}
-
-/// The result in the JSON file at `path`, or the result of `make`, which is written there.
-pub fn result<T: Serialize + DeserializeOwned>(
-    path: &Path,
-    make: impl FnOnce() -> anyhow::Result<T>,
-) -> anyhow::Result<T> {
-    if path.is_file() {
-        let text = fs::read_to_string(path)?;
-        return serde_json::from_str(&text).with_context(|| path.display().to_string());
-    }
-    let result = make()?;
-    atomic::write_bytes(path, serde_json::to_string(&result)?)?;
-    Ok(result)
 }
 
 /// Writes `terms`, all that the results depend on, to `path`, unless an earlier run

@@ -2,10 +2,8 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 
-mod ablate;
 mod gpu;
 mod manifest;
-mod trade;
 
 use std::path::Path;
 use std::process::{Command, Output};

@@ -5,7 +5,7 @@ use super::comparison::{Entry, compare};
 use super::model::{shortfall, worst};
 use super::speed_tables::show;
 use crate::measure::clock::Spread;
-use crate::measure::reference_network::Network;
+use crate::measure::reference::Network;
 use anyhow::Result;
 
 /// Tolerance of log-probabilities in f32. Engines sum in different orders; over this model's layers

@@ -11,7 +11,7 @@ mod roster;
 mod speed_tables;
 
 use crate::measure::machine::Machine;
-use crate::measure::reference_network::Network;
+use crate::measure::reference::Network;
 use anyhow::Result;
 use candidate::Candidate;
 use clap::Args;

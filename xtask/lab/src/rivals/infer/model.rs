@@ -1,6 +1,6 @@
 //! The input of all engines, a random model and a cloud, and the checks of their answers.
 
-use crate::measure::reference_network::{STACKS, drawn};
+use crate::measure::reference::{STACKS, drawn};
 use anyhow::{Result, ensure};
 use formats::rng::StreamKey;
 use formats::weights::{Tensor, write_weights};
@@ -116,7 +116,7 @@ pub fn shortfall(points: &[[f32; 3]], indices: &[f64], keep: usize) -> Result<f6
 mod tests {
     use super::super::model::write_random;
     use super::*;
-    use crate::measure::reference_network::Network;
+    use crate::measure::reference::Network;
 
     #[test]
     fn the_random_model_tells_clouds_apart() {

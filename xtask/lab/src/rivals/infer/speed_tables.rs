@@ -3,7 +3,7 @@
 use super::candidate::{Arithmetic, Job};
 use super::comparison::Entry;
 use crate::measure::clock::Costs;
-use crate::render::table::{Table, digits, milliseconds};
+use crate::table::{Table, digits, milliseconds};
 
 /// A measure of an entry: its name, and seconds.
 type Figure = (&'static str, fn(&Costs) -> f64);

@@ -1,7 +1,7 @@
 //! `cargo xtask bench scenes`: what a scene of many objects costs, beside its rays alone.
 
 use crate::measure::clock::{Spread, Workload, interleave, measured, workload};
-use crate::render::table::{Table, milliseconds};
+use crate::table::{Table, milliseconds};
 use anyhow::{Context, Result};
 use clap::Args;
 use edgepuck_scenes::{DrawnScene, Recipe, Stage};

@@ -4,7 +4,7 @@ use crate::measure::backends::{Backend, short};
 use crate::measure::bench_mesh::{BenchMesh, in_a_room, target};
 use crate::measure::clock::{Costs, Spread, Workload, interleave, measured, workload};
 use crate::measure::ray_set::{RaySet, sweep_pose, vlp32c};
-use crate::render::table::{Column, Table, digits, millions_per_s, milliseconds};
+use crate::table::{Column, Table, digits, millions_per_s, milliseconds};
 use anyhow::Result;
 use serde::Serialize;
 use sim_gpu::effects::Effects;

@@ -4,7 +4,7 @@
 use crate::measure::backends::{Backend, short};
 use crate::measure::bench_mesh::some_of;
 use crate::measure::clock::{Cost, measured};
-use crate::render::table::{Table, digits};
+use crate::table::{Table, digits};
 use anyhow::{Context, Result};
 use edgepuck_dataset::{DatasetConfig, Plan, Progress, Stage, make};
 use edgepuck_program::gen_dataset;

@@ -7,7 +7,7 @@
 //! of several, to random draws of the object's points that are turned about the up axis.
 
 use super::resume;
-use crate::render::table::{Table, percent, publish};
+use crate::table::{Table, percent, publish};
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use formats::hash;

@@ -1,8 +1,9 @@
 //! `cargo xtask bench frames`: what `edgepuck detect` finds in whole sweeps of real
 //! sensors whose objects are labelled.
 
-use crate::render::table::{Table, percent, publish};
-use crate::study::sensor::{mounting::Mounting, sweep};
+mod mounting;
+
+use crate::table::{Table, percent, publish};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use edgepuck_program::detect::{Detections, Detector, Object};
@@ -243,8 +244,9 @@ fn origin_m(sweep: &LabelledSweep) -> Result<DVec3> {
     let Layout::Rotating(table) = SensorProfile::resolve("vlp32c")?.layout else {
         bail!("vlp32c: expected a table of rotating beams, found another layout");
     };
-    let sensors = sweep::by_sensor(sweep, table.beam.len())?;
-    let origins = sensors.iter().map(|returns| Mounting::fit(returns, &table).origin_m());
+    let (n_lasers, period_s) = (table.beam.len(), table.period_s());
+    let sensors = mounting::by_sensor(sweep, n_lasers)?;
+    let origins = sensors.iter().map(|returns| mounting::origin_m(returns, n_lasers, period_s));
     Ok(origins.sum::<DVec3>() / sensors.len() as f64)
 }
 

@@ -1,0 +1,128 @@
+//! Tables: the same rows as text for a terminal, as Markdown and as CSV.
+
+pub use edgepuck_program::significant_digits::digits;
+use formats::atomic;
+use serde::Serialize;
+use std::fmt;
+use std::path::Path;
+
+#[derive(Default)]
+pub struct Table {
+    pub title: String,
+    pub heading: Vec<String>,
+    pub rows: Vec<Vec<String>>,
+}
+
+/// A column of a table: its heading, and its words for an item.
+pub type Column<'a, T> = (&'a str, &'a dyn Fn(&T) -> String);
+
+impl Table {
+    pub fn new(title: impl Into<String>, heading: &[&str]) -> Self {
+        let heading = heading.iter().map(|&word| word.to_owned()).collect();
+        Self { title: title.into(), heading, rows: Vec::new() }
+    }
+
+    pub fn of<T>(title: impl Into<String>, items: &[T], columns: &[Column<'_, T>]) -> Self {
+        let mut table =
+            Self::new(title, &columns.iter().map(|column| column.0).collect::<Vec<_>>());
+        for item in items {
+            table.push(columns.iter().map(|(_, says)| says(item)).collect());
+        }
+        table
+    }
+
+    /// Adds a row, as long as the heading.
+    pub fn push(&mut self, cells: Vec<String>) {
+        debug_assert_eq!(cells.len(), self.heading.len());
+        self.rows.push(cells);
+    }
+
+    /// The heading and the rows.
+    fn lines(&self) -> impl Iterator<Item = &Vec<String>> {
+        std::iter::once(&self.heading).chain(&self.rows)
+    }
+
+    /// The heading and the rows as a CSV file.
+    pub fn to_csv(&self) -> anyhow::Result<Vec<u8>> {
+        let mut csv = csv::Writer::from_writer(Vec::new());
+        self.lines().try_for_each(|words| csv.write_record(words))?;
+        Ok(csv.into_inner()?)
+    }
+
+    /// The table as Markdown, under its title.
+    fn markdown(&self) -> String {
+        let line = |words: &Vec<String>| format!("| {} |\n", words.join(" | "));
+        let mut lines: Vec<String> = self.lines().map(line).collect();
+        lines.insert(1, line(&vec!["---".to_owned(); self.heading.len()]));
+        format!("## {}\n\n{}", self.title, lines.concat())
+    }
+}
+
+/// Prints `tables`, and writes them to the Markdown file `report`, if one is asked for.
+pub fn publish(tables: &[Table], report: Option<&Path>) -> anyhow::Result<()> {
+    tables.iter().for_each(|table| print!("{table}"));
+    if let Some(file) = report {
+        let text: Vec<String> = tables.iter().map(|table| table.markdown() + "\n").collect();
+        atomic::write_bytes(file, text.concat())?;
+    }
+    Ok(())
+}
+
+/// Writes `record` to the JSON file `file`, if one is asked for.
+pub fn write_json(record: &impl Serialize, file: Option<&Path>) -> anyhow::Result<()> {
+    if let Some(file) = file {
+        atomic::write_bytes(file, serde_json::to_string_pretty(record)? + "\n")?;
+    }
+    Ok(())
+}
+
+/// As text: the first column is flush left, the others are flush right.
+impl fmt::Display for Table {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let width = |i: usize| self.lines().map(|row| row[i].chars().count()).max().unwrap_or(0);
+        let widths: Vec<usize> = (0..self.heading.len()).map(width).collect();
+        writeln!(f, "\n{}", self.title)?;
+        for row in self.lines() {
+            for (i, (word, &width)) in row.iter().zip(&widths).enumerate() {
+                if i == 0 {
+                    write!(f, "  {word:width$}")?;
+                } else {
+                    write!(f, "  {word:>width$}")?;
+                }
+            }
+            writeln!(f)?;
+        }
+        Ok(())
+    }
+}
+
+/// `count` per `seconds`, in millions with three digits.
+pub fn millions_per_s(count: usize, seconds: f64) -> String {
+    if seconds > 0.0 { digits(count as f64 / seconds / 1e6) } else { "-".to_owned() }
+}
+
+pub fn milliseconds(seconds: f64) -> String {
+    digits(seconds * 1e3)
+}
+
+pub fn percent(share: f64) -> String {
+    format!("{:.1}", 100.0 * share)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_same_rows_are_text_and_markdown() {
+        let columns: [Column<'_, u8>; 2] =
+            [("name", &|_| "a < b".to_owned()), ("ms", &|ms| ms.to_string())];
+        let mut table = Table::of("title", &[1], &columns);
+        table.push(vec!["c".to_owned(), "10".to_owned()]);
+        assert_eq!(table.to_string(), "\ntitle\n  name   ms\n  a < b   1\n  c      10\n");
+        assert_eq!(
+            table.markdown(),
+            "## title\n\n| name | ms |\n| --- | --- |\n| a < b | 1 |\n| c | 10 |\n"
+        );
+    }
+}
