@@ -221,6 +221,24 @@ fn the_header_of_type_fusa_counts_more_frames() {
     bytes[4..8].copy_from_slice(&70_000u32.to_le_bytes());
     let header = Decoder::new(&parse(&metadata).unwrap()).header(&bytes);
     assert_eq!(header.unwrap().frame_id, 70_000);
+    metadata["data_format"]["header_type"] = json!("STANDARD");
+    assert_eq!(parse(&metadata), parse(&flat(Profile::Single)));
+}
+
+#[test]
+fn the_transform_of_the_lidar_turns_its_azimuths() {
+    let mut metadata = flat(Profile::Single);
+    for (transform, quarters) in [
+        (json!([-1, 0, 0, 0, 0, -1]), 2.0),
+        (json!([0, -1, 0, 0, 1, 0]), 1.0),
+        (json!([0, 1, 0, 0, -1, 0]), -1.0),
+    ] {
+        let mut whole = transform.as_array().unwrap().clone();
+        whole.extend(json!([0, 0, 0, 0, 1, 36.18, 0, 0, 0, 1]).as_array().unwrap().clone());
+        metadata["lidar_to_sensor_transform"] = json!(whole);
+        let yaw_rad = parse(&metadata).unwrap().yaw_rad();
+        assert_eq!(yaw_rad, quarters * std::f64::consts::FRAC_PI_2);
+    }
 }
 
 #[test]
@@ -448,6 +466,17 @@ fn a_capture_without_a_whole_frame_is_named() {
     metadata["data_format"]["column_window"] = json!([18, 10]);
     assert_eq!(read(&lost, &metadata).unwrap().len(), 28 * 3 * 2);
 
+    // Of the packet of columns 16 to 19, only the last is to be sent; it is lost.
+    metadata["data_format"]["column_window"] = json!([19, 10]);
+    let mut lost = capture(1480);
+    lost.drain(..8);
+    lost.drain(16..);
+    lost.drain(8..10);
+    let expected =
+        "packets: expected a whole frame of 24 columns, found 23 at most among 14 UDP packets";
+    assert_eq!(read(&lost, &metadata).unwrap_err(), expected);
+
+    metadata["data_format"]["column_window"] = json!([18, 10]);
     let mut fragments = capture(160);
     fragments.truncate(3);
     fragments.remove(1);

@@ -184,7 +184,9 @@ impl Group {
 /// cargo-mutants on the product's workspace.
 fn mutants(excluded: &[Excluded]) -> Command {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    command.args(["mutants", "--workspace", "--colors", "never"]).current_dir(root());
+    // Formats are features.
+    command.args(["mutants", "--workspace", "--all-features", "--colors", "never"]);
+    command.current_dir(root());
     command.args(excluded.iter().flat_map(|one| ["--exclude-re", &one.mutants]));
     command
 }
