@@ -4,9 +4,8 @@ use std::borrow::Cow;
 use std::net::IpAddr;
 use std::path::{Path, PathBuf};
 
-use formats::cloud_file::{
-    CloudFormat, check_sweep, doubtful_sweep, read_cloud_as, read_intensities,
-};
+use edgepuck_segment::doubtful_axes;
+use formats::cloud_file::{CloudFormat, check_sweep, read_cloud_as, read_intensities};
 use formats::scan_file::read_scan;
 use formats::{FormatError, Scan, Senders, ouster, pcap, velodyne};
 
@@ -34,7 +33,7 @@ pub struct PlaceArgs {
     points: PointsArgs,
 
     /// Position of the sensor in the sweep, in metres [default: that of the scan's file, or 0 0 0]
-    #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], allow_negative_numbers = true)]
+    #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"])]
     sensor: Option<Vec<f64>>,
 }
 
@@ -91,6 +90,13 @@ impl PointsArgs {
 }
 
 impl SweepArgs {
+    /// As [`SweepArgs::read`], of a sweep with z up: prints a warning if it is probably not.
+    pub fn read_upright(&self) -> Result<Scan, FormatError> {
+        let scan = self.read()?;
+        self.warn(doubtful_axes(&scan.positions));
+        Ok(scan)
+    }
+
     /// The points relative to the sensor, with their attributes.
     pub fn read(&self) -> Result<Scan, FormatError> {
         let scan = self.read_whole()?;
@@ -103,11 +109,14 @@ impl SweepArgs {
         let scan = self.place.points.read(&self.sweep)?;
         let remedy = "are they in millimetres, or from another origin? Scale them, give the sensor's \
                       position by --sensor, or the format by --format";
-        check_sweep(self.relative(&scan), &self.sweep, remedy)?;
-        if let Some(doubt) = doubtful_sweep(self.relative(&scan)) {
+        self.warn(check_sweep(self.relative(&scan), &self.sweep, remedy)?);
+        Ok(scan)
+    }
+
+    fn warn(&self, doubt: Option<String>) {
+        if let Some(doubt) = doubt {
             eprintln!("warning: {}: {doubt}", self.sweep.display());
         }
-        Ok(scan)
     }
 
     /// The position of the sensor of `scan`, metres.

@@ -25,14 +25,16 @@ pub struct SegmentArgs {
 
     /// Compute connected components of points within this many metres instead, for clouds that are
     /// not sweeps of a sensor; these have no ground
-    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    #[arg(long, value_name = "M")]
     radius: Option<f32>,
 }
 
 pub fn run(args: &SegmentArgs) -> anyhow::Result<Outcome> {
     args.overwrite.check([&*args.out])?;
-    let scan = args.input.read()?;
-    let settings = args.radius.map_or_else(Settings::default, Settings::of_components);
+    let (scan, settings) = match args.radius {
+        Some(radius_m) => (args.input.read()?, Settings::of_components(radius_m)),
+        None => (args.input.read_upright()?, Settings::default()),
+    };
     let mut segmenter = Segmenter::new(settings).map_err(|error| Usage(error.to_string()))?;
     let sweep = Sweep { points: &scan.positions, rings: scan.ring.as_deref() };
     // The first sweep allocates memory; the time of a later one is typical.

@@ -90,8 +90,9 @@ class Classifier(Remade):
         return Prediction(**self._classify(cloud, ground_z))
 
     def _classify(self, cloud: Any, ground_z: float | None) -> dict[str, Any]:
-        points = cloud.positions if isinstance(cloud, Scan) else cloud
-        return self._classifier.classify(points_of(points), ground_z)
+        is_scan = isinstance(cloud, Scan)
+        points = cloud.positions if is_scan else cloud
+        return self._classifier.classify(points_of(points), ground_z, is_scan)
 
 
 def _is_batch(cloud: Any) -> bool:

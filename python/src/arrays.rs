@@ -2,8 +2,9 @@
 
 use crate::error::{raised, warn};
 use edgepuck_program::points::PointsArgs;
+use edgepuck_segment::doubtful_axes;
 use formats::Scan;
-use formats::cloud_file::{doubtful_sweep, judge_sweep};
+use formats::cloud_file::judge_sweep;
 use formats::hash::Hashing;
 use formats::scan::{Attribute, ColumnSlot};
 use formats::scan_file::{ScanFormat, write_scan};
@@ -30,11 +31,10 @@ pub fn points(array: &PyReadonlyArray2<'_, f32>) -> PyResult<Vec<[f32; 3]>> {
 /// The points of a sweep, metres from the sensor.
 pub fn sweep(py: Python<'_>, array: &PyReadonlyArray2<'_, f32>) -> PyResult<Vec<[f32; 3]>> {
     let points = points(array)?;
-    let metres = || points.iter().map(|point| point.map(f64::from));
-    judge_sweep(metres()).map_err(|(i, cause)| {
-        raised(format!("point {i}: {cause}: subtract the sensor's position, or give metres"))
-    })?;
-    warn(py, doubtful_sweep(metres()).as_slice())?;
+    let remedy = "subtract the sensor's position, or give metres";
+    let doubt = judge_sweep(points.iter().map(|point| point.map(f64::from)), remedy)
+        .map_err(|(part, cause)| raised(format!("{part}: {cause}")))?;
+    warn(py, doubt.or_else(|| doubtful_axes(&points)).as_slice())?;
     Ok(points)
 }
 

@@ -1,5 +1,6 @@
 use crate::arrays::points;
-use crate::error::raised;
+use crate::error::{raised, warn};
+use formats::cloud_file::{Unlike, judge_object};
 use infer_cpu::Options;
 use infer_cpu::sampler::SamplerSpec;
 use numpy::{IntoPyArray, PyReadonlyArray2};
@@ -12,6 +13,8 @@ use std::sync::{Mutex, PoisonError};
 #[pyclass(module = "edgepuck._edgepuck", frozen)]
 pub struct Classifier {
     classifier: Mutex<infer_cpu::Classifier>,
+    /// Whether it learnt whole objects.
+    is_of_wholes: bool,
 }
 
 #[pymethods]
@@ -35,7 +38,8 @@ impl Classifier {
             options.sampler.get_or_insert_default().points = points;
         }
         let loaded = py.detach(|| infer_cpu::Classifier::load(Path::new(model), &options));
-        Ok(Self { classifier: Mutex::new(loaded.map_err(raised)?) })
+        let is_of_wholes = model == "edge-64";
+        Ok(Self { classifier: Mutex::new(loaded.map_err(raised)?), is_of_wholes })
     }
 
     /// The classes' names, in the order of the logits.
@@ -44,14 +48,21 @@ impl Classifier {
         self.lock().classes().iter().map(|class| class.to_string()).collect()
     }
 
-    /// Classify a cloud, `[n, 3]`, that stands on ground of this height, if it is known.
+    /// Classify a cloud, `[n, 3]`, of one side if it `is_scan`, that stands on ground of this height,
+    /// if it is known.
     fn classify<'py>(
         &self,
         py: Python<'py>,
         cloud: PyReadonlyArray2<'py, f32>,
         ground_z: Option<f32>,
+        is_scan: bool,
     ) -> PyResult<Bound<'py, PyDict>> {
         let cloud = points(&cloud)?;
+        let wide: Vec<_> = cloud.iter().map(|point| point.map(f64::from)).collect();
+        let found = judge_object(&wide).map_err(raised)?;
+        let unlike = found.or(is_scan.then_some(Unlike::OneSide));
+        let unlike = unlike.filter(|of| self.is_of_wholes || *of == Unlike::Sweep);
+        warn(py, unlike.map(|of| format!("the cloud {of}")).as_slice())?;
         let found = py.detach(|| {
             let mut classifier = self.lock();
             classifier.classify_on_ground(&cloud, ground_z).cloned()

@@ -47,7 +47,7 @@ use crate::records;
 pub use format::CloudFormat;
 #[cfg(feature = "las")]
 pub use las_write::{LasPoint, write_las};
-pub use plausible::{check_sweep, doubtful_sweep, judge_sweep};
+pub use plausible::{Unlike, check_sweep, judge_object, judge_sweep};
 use precision::Precision;
 
 /// Reads the cloud at `path` in the format of its extension.

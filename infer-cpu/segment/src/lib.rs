@@ -21,6 +21,7 @@
 //! instead.
 
 mod angle;
+mod axes;
 mod components;
 mod ground;
 mod height_grid;
@@ -37,6 +38,7 @@ mod settings;
 mod stream;
 mod sweep;
 
+pub use axes::doubtful_axes;
 pub use label::Label;
 pub use oriented_box::OrientedBox;
 pub use segmentation::{Cluster, Segmentation};

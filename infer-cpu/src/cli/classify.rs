@@ -11,7 +11,7 @@ use crate::sampler::{SamplerKind, SamplerSpec};
 use crate::{Classifier, Options, Precision, UpAxis};
 use anyhow::Context;
 use formats::FormatError;
-use formats::cloud_file::{CloudFormat, read_cloud_as};
+use formats::cloud_file::{CloudFormat, Unlike, judge_object, read_cloud_as};
 use formats::model_card::{ModelCard, Normalization};
 use formats::outcome::{joined_causes, say};
 
@@ -193,11 +193,20 @@ impl Session<'_> {
         name: &Path,
         read: Result<Vec<[f64; 3]>, FormatError>,
     ) -> anyhow::Result<()> {
-        let points = match read {
-            Ok(points) => points,
-            Err(error) => return Ok(self.fail(name, error.into())?),
+        let judged = read.map_err(anyhow::Error::from).and_then(|points| {
+            let named = || name.display().to_string();
+            let unlike = judge_object(&points).map_err(anyhow::Error::msg).with_context(named)?;
+            Ok((points, unlike))
+        });
+        let (points, unlike) = match judged {
+            Ok(judged) => judged,
+            Err(error) => return Ok(self.fail(name, error)?),
         };
-        let kind = self.kinds.as_mut().map_or(Kind::Other, |kinds| kinds.of(name));
+        let kind = match (self.kinds.as_mut().map(|kinds| kinds.of(name)), unlike) {
+            (_, Some(Unlike::Sweep)) => Kind::Unlike(Unlike::Sweep),
+            (Some(Kind::Other), Some(unlike)) => Kind::Unlike(unlike),
+            (kind, _) => kind.unwrap_or(Kind::Other),
+        };
         self.tell(name, kind);
         let classifier = match (kind, &mut self.scans) {
             (Kind::KnownScan, Some(scans)) => scans,
@@ -228,13 +237,10 @@ impl Session<'_> {
         self.told.push(kind);
         let name = name.display();
         say(match kind {
-            Kind::KnownScan => format!(
+            Kind::Unlike(unlike) => format!("warning: {name} {unlike}"),
+            _ => format!(
                 "note: {name} is a scan of one side: {SCANS}, which learnt such scans of the same \
                  classes, names it; --model chooses another"
-            ),
-            _ => format!(
-                "warning: {name} is a scan of one side, and edge-64 learnt whole objects: its answer \
-                 is often wrong; --model names a network that `edgepuck train` made of such scans"
             ),
         });
     }

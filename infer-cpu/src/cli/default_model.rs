@@ -5,7 +5,7 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf, absolute};
 
 use formats::FormatError;
-use formats::cloud_file::is_scan;
+use formats::cloud_file::{Unlike, is_scan};
 use serde::Deserialize;
 
 use crate::ModelCard;
@@ -21,10 +21,12 @@ const DEEPEST: usize = 5;
 pub enum Kind {
     /// A scan whose data set has only classes that [`SCANS`] knows.
     KnownScan,
-    /// Another scan.
-    OtherScan,
+    /// What the default model has not learnt.
+    Unlike(Unlike),
     Other,
 }
+
+const OTHER_SCAN: Kind = Kind::Unlike(Unlike::OneSide);
 
 /// What `manifest.json` of a data set says.
 #[derive(Deserialize)]
@@ -55,7 +57,7 @@ impl Kinds {
         let folders = place.ancestors().skip(1).take(DEEPEST);
         let manifest = folders.map(|folder| folder.join("manifest.json")).find(|at| at.is_file());
         let Some(manifest) = manifest else {
-            return if is_scan(file) { Kind::OtherScan } else { Kind::Other };
+            return if is_scan(file) { OTHER_SCAN } else { Kind::Other };
         };
         match &self.set {
             Some((known, kind)) if *known == manifest => *kind,
@@ -71,7 +73,7 @@ impl Kinds {
         let file = BufReader::new(File::open(manifest).ok()?);
         let Manifest { tool, meshes } = serde_json::from_reader(file).ok()?;
         let knows = |mesh: &Mesh| self.card.classes.contains(&mesh.class);
-        let kind = if meshes.iter().all(knows) { Kind::KnownScan } else { Kind::OtherScan };
+        let kind = if meshes.iter().all(knows) { Kind::KnownScan } else { OTHER_SCAN };
         (tool == "edgepuck").then_some(kind)
     }
 }

@@ -1,6 +1,6 @@
 //! Which points are ground, and the height of the ground.
 
-use edgepuck_segment::{Label, Segmenter, Settings, Sweep};
+use edgepuck_segment::{Label, Segmenter, Settings, Sweep, doubtful_axes};
 
 use crate::scanner::{HEIGHT, Surface, VLP32C, block, flat, ground, scan};
 
@@ -177,4 +177,34 @@ fn the_height_of_the_ground_is_known_between_the_beams() {
             assert!((z_m + HEIGHT - slope * x).abs() < bound, "{x} {y}: {z_m}");
         }
     });
+}
+
+/// A road beside a house, a wall alone, and a ceiling above a floor, in right and wrong axes.
+#[test]
+fn axes_are_doubted_if_another_one_points_up() {
+    let house = || block([30.0, 12.0], [60.0, 8.0], 0.0, 9.0);
+    let wall = || block([5.0, 0.0], [0.2, 20.0], 0.0, 4.0);
+    let ceiling = || block([0.0, 0.0], [30.0, 30.0], 2.6, 0.2);
+    type Turn = fn([f32; 3]) -> [f32; 3];
+    for (up, turn) in [
+        (None, (|point| point) as Turn),
+        (Some("if y does"), |[x, y, z]| [x, z, -y]),
+        (Some("if -y does"), |[x, y, z]| [-y, -z, x]),
+        (Some("if x does"), |[x, y, z]| [z, y, -x]),
+        (Some("if -z does"), |[x, y, z]| [x, -y, -z]),
+    ] {
+        for (surfaces, has_ground) in [
+            (vec![flat(), house()], true),
+            (vec![flat(), wall()], true),
+            (vec![wall()], false),
+            (vec![flat(), ceiling()], true),
+        ] {
+            let points = scan(&VLP32C, &surfaces).points.into_iter().map(turn);
+            let said = doubtful_axes(&points.collect::<Vec<_>>());
+            // A floor and a ceiling are alike.
+            let expected = up.filter(|_| has_ground);
+            assert_eq!(said.is_some(), expected.is_some(), "{up:?}: {said:?}");
+            assert!(said.unwrap_or_default().contains(expected.unwrap_or_default()));
+        }
+    }
 }

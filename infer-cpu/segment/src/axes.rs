@@ -1,0 +1,60 @@
+//! Whether z is the axis that points up.
+
+use crate::label::Label;
+use crate::segmenter::Segmenter;
+use crate::settings::Settings;
+use crate::sweep::Sweep;
+
+/// The least share of ground under another axis that casts doubt on z.
+const LEAST_GROUND: f64 = 0.2;
+/// How many times as wide the elevations above another axis must be, or as large the ground below
+/// z, to dispel the doubt: rooms and roofs have a ceiling, too.
+const CLEARLY: [f64; 2] = [3.0, 0.5];
+
+/// Why z probably does not point up in a sweep, metres from the sensor: most of its beams leave the
+/// sensor across another axis, below which more ground is found.
+#[must_use]
+pub fn doubtful_axes(points: &[[f32; 3]]) -> Option<String> {
+    let (mut squares, mut below) = ([0.0; 3], [0i64; 3]);
+    for point in points.iter().map(|point| point.map(f64::from)) {
+        let square: f64 = point.iter().map(|x| x * x).sum();
+        if square > 0.0 && square.is_finite() {
+            for axis in 0..3 {
+                squares[axis] += point[axis] * point[axis] / square;
+                below[axis] += if point[axis] > 0.0 { -1 } else { 1 };
+            }
+        }
+    }
+    let up = (0..3).rev().min_by(|&a, &b| squares[a].total_cmp(&squares[b]))?;
+    let sign = if below[up] < 0 { -1.0 } else { 1.0 };
+    if up == 2 && sign > 0.0 {
+        return None;
+    }
+    let turned = |&point: &[f32; 3]| {
+        let [ahead, aside] = [(up + 1) % 3, (up + 2) % 3].map(|axis| point[axis]);
+        [ahead, sign * aside, sign * point[up]]
+    };
+    let [found, other] =
+        [points.to_vec(), points.iter().map(turned).collect()].map(|points| ground(&points));
+    let is_across = squares[2] > CLEARLY[0] * squares[up];
+    let is_doubtful = found < other * if is_across { 1.0 } else { CLEARLY[1] };
+    (other >= LEAST_GROUND && is_doubtful).then(|| {
+        format!(
+            "{:.0} % of the points are ground if z points up, and {:.0} % if {}{} does: expected \
+             the sensor's frame, z up",
+            100.0 * found,
+            100.0 * other,
+            if sign < 0.0 { "-" } else { "" },
+            ["x", "y", "z"][up]
+        )
+    })
+}
+
+/// The share of ground among `points`, 0 to 1.
+fn ground(points: &[[f32; 3]]) -> f64 {
+    let mut segmenter =
+        Segmenter::new(Settings::default()).expect("invariant: the defaults are valid");
+    let found = segmenter.segment(&Sweep { points, rings: None });
+    let n = found.map_or(0, |found| found.labels().iter().filter(|l| **l == Label::Ground).count());
+    n as f64 / points.len().max(1) as f64
+}
