@@ -62,11 +62,15 @@ impl Mesh {
             triangles.push([index(&row[0])?, index(&row[1])?, index(&row[2])?]);
         }
         let vertices = vertices.collect();
-        process::run(py, || {
+        let (mesh, warnings) = process::run(py, || {
             let mesh = sim_gpu::Mesh::from_triangles(vertices, triangles).map_err(raised)?;
+            let warnings = mesh.warnings().to_vec();
             let mesh = mesh.scaled(unit.metres()).map_err(raised)?;
-            Ok(Self::new(&if up == Up::Y { mesh.y_up() } else { mesh }, normalize))
-        })?
+            let mesh = if up == Up::Y { mesh.y_up() } else { mesh };
+            Ok::<_, PyErr>((Self::new(&mesh, normalize), warnings))
+        })??;
+        warn(py, &warnings)?;
+        Ok(mesh)
     }
 
     /// Metres for each unit of length of the source.

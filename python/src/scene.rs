@@ -10,6 +10,7 @@ use glam::{DMat3, DQuat, DVec3};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use sim_gpu::Pose;
+use sim_gpu::internals::scene::check_object;
 use std::path::PathBuf;
 use std::sync::Mutex;
 
@@ -63,6 +64,7 @@ impl Scene {
         reflectivity: f64,
         retroreflection: f64,
     ) -> PyResult<u32> {
+        check_object(str::to_owned, scale, reflectivity, retroreflection).map_err(raised)?;
         let (pose, mut scene) = (pose_of(&pose)?, lock(&self.scene));
         let id = scene.add(&mesh.mesh, pose);
         let instance = &mut scene[id];

@@ -1,4 +1,4 @@
-use crate::error::{raised, raised_with_causes};
+use crate::error::{raised, raised_with_causes, warn};
 use crate::process;
 use crate::{arrays, segment};
 use edgepuck_scenes::{LabelledScene, Stage};
@@ -30,7 +30,9 @@ impl Scenes {
             scenes.use_sensors(&sensors);
             Ok(Stage::new(scenes, &recipe, meshes.as_deref(), seed)?)
         })?;
-        Ok(Self { stage: stage.map_err(raised_with_causes)? })
+        let stage = stage.map_err(raised_with_causes)?;
+        warn(py, stage.warnings())?;
+        Ok(Self { stage })
     }
 
     /// The classes' names, sorted.

@@ -4,7 +4,7 @@ use super::Error;
 use crate::bvh::Builder;
 use crate::mesh::frame::{Normalize, Unit, Up, WorldMesh, to_world, z_up};
 use crate::mesh::unit_frame::bounding_box;
-use crate::mesh::{LoadedMesh, TriangleMesh, check, load};
+use crate::mesh::{LoadedMesh, TriangleMesh, check, flat, load};
 use crate::target::{Surface, Target};
 use glam::{DAffine3, DVec3};
 use std::path::Path;
@@ -240,7 +240,8 @@ impl TryFrom<TriangleMesh> for Mesh {
             crate::config::InvalidValue::new("mesh", error.to_string())
         };
         check(&mesh).map_err(wrong)?;
-        Ok(Self::of(mesh))
+        let warnings = flat(&mesh).into_iter().collect();
+        Ok(Self { warnings, ..Self::of(mesh) })
     }
 }
 

@@ -14,7 +14,8 @@ impl Mesh {
     pub fn doubtful_size(&self) -> Option<String> {
         let [low, high] = self.bounds_m().map(DVec3::from_array);
         let size = high - low;
-        (!EXPECTED_M.contains(&size.max_element())).then(|| {
+        let is_expected = size == DVec3::ZERO || EXPECTED_M.contains(&size.max_element());
+        (!is_expected).then(|| {
             let likely = if size.max_element() > 1.0 { Unit::Millimetre } else { Unit::Inch };
             format!(
                 "expected a size of 1 cm to 100 m, found {} if its unit is the metre ({} if it is {})",
@@ -61,6 +62,7 @@ mod tests {
                 ),
             ),
             (0.002, Some("0.002 x 0.002 x 0.002 m")),
+            (0.0, None),
             (0.01, None),
             (100.0, None),
         ] {

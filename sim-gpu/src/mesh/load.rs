@@ -5,6 +5,7 @@ use std::path::Path;
 
 use formats::foreign::foreign;
 use formats::hash::{FileHash, Hashing};
+use glam::DVec3;
 
 use super::error::{Malformed, MeshError, ParseError};
 use super::format::MeshFormat;
@@ -48,6 +49,25 @@ pub fn load_hashed(
 
 /// Reads a mesh of `format` from a file's bytes.
 pub fn parse(bytes: &[u8], format: MeshFormat) -> Result<Parsed, ParseError> {
+    let mut parsed = parse_as(bytes, format).map_err(|error| {
+        let is_other = |other: &MeshFormat| *other != format && parse_as(bytes, *other).is_ok();
+        let expected = format.name().to_uppercase();
+        match (foreign(bytes), MeshFormat::ALL.into_iter().find(is_other)) {
+            (Some(found), _) => Malformed::Syntax(format!("expected a mesh, found {found}")).into(),
+            (None, Some(other)) => {
+                let found = other.name().to_uppercase();
+                let cause = format!("expected {expected}, found {found}: rename it to .{other}");
+                Malformed::Syntax(cause).into()
+            }
+            (None, None) => error,
+        }
+    })?;
+    parsed.cut_polygons(|_, _| ());
+    parsed.warnings.extend(flat(&parsed.mesh));
+    Ok(parsed)
+}
+
+fn parse_as(bytes: &[u8], format: MeshFormat) -> Result<Parsed, ParseError> {
     let text = without_mark(bytes);
     let parsed = match format {
         _ if bytes.is_empty() => Err(Malformed::Empty.into()),
@@ -56,13 +76,17 @@ pub fn parse(bytes: &[u8], format: MeshFormat) -> Result<Parsed, ParseError> {
         MeshFormat::Ply => ply::parse(text),
         MeshFormat::Stl => stl::parse(bytes),
     };
-    let checked = parsed.and_then(|parsed| check(&parsed.mesh).map(|()| parsed));
-    let mut parsed = checked.map_err(|error| match foreign(bytes) {
-        Some(found) => Malformed::Syntax(format!("expected a mesh, found {found}")).into(),
-        None => error,
-    })?;
-    parsed.cut_polygons(|_, _| ());
-    Ok(parsed)
+    parsed.and_then(|parsed| check(&parsed.mesh).map(|()| parsed))
+}
+
+/// A warning if no triangle of `mesh` has an area.
+pub fn flat(mesh: &TriangleMesh) -> Option<String> {
+    let has_area = |corners: &[u32; 3]| {
+        let [a, b, c] = corners.map(|corner| mesh.vertices[corner as usize]);
+        (b - a).cross(c - a) != DVec3::ZERO
+    };
+    (!mesh.triangles.iter().any(has_area))
+        .then(|| "no triangle has an area, so that no beam can hit the mesh".to_owned())
 }
 
 pub(super) fn read(path: &Path) -> Result<Vec<u8>, MeshError> {
@@ -122,6 +146,14 @@ mod tests {
         fs::write(folder.path().join("empty.off"), "").unwrap();
         fs::write(folder.path().join("bad.off"), "OFF\n3 1 0\n0 0 nan\n").unwrap();
         fs::write(folder.path().join("notes.txt"), "").unwrap();
+        fs::write(folder.path().join("off.stl"), TRIANGLE).unwrap();
+        fs::write(folder.path().join("off.obj"), TRIANGLE).unwrap();
+        let solid = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n\
+                     vertex 0 1 0\nendloop\nendfacet\nendsolid a\n";
+        fs::write(folder.path().join("stl.obj"), solid).unwrap();
+        assert_eq!(message("off.stl"), "off.stl: expected STL, found OFF: rename it to .off");
+        assert_eq!(message("off.obj"), "off.obj: expected OBJ, found OFF: rename it to .off");
+        assert_eq!(message("stl.obj"), "stl.obj: expected OBJ, found STL: rename it to .stl");
         assert_eq!(message("folder.off"), "folder.off: expected a mesh file, found a directory");
         assert_eq!(message("empty.off"), "empty.off: the file is empty");
         assert_eq!(message("bad.off"), "bad.off:3: expected a finite coordinate, found \"nan\"");

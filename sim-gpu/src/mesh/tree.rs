@@ -22,10 +22,10 @@ const TRAIN_SHARE: f64 = 0.8;
 /// The longest name. File systems allow 255 bytes, and file names append to it.
 const LONGEST_NAME: usize = 180;
 
-/// The extensions of files that accompany meshes: materials, images and texts.
-const COMPANIONS: [&str; 24] = [
-    "mtl", "png", "jpg", "jpeg", "bmp", "tga", "tif", "tiff", "webp", "gif", "dds", "txt", "md",
-    "rst", "json", "jsonl", "csv", "xml", "yaml", "yml", "toml", "pdf", "html", "log",
+/// The extensions of files that probably hold meshes, too: of other formats, and compressed.
+const OTHER_FORMATS: [&str; 24] = [
+    "3ds", "3mf", "7z", "blend", "brep", "bz2", "dae", "dxf", "fbx", "glb", "gltf", "gz", "iges",
+    "igs", "step", "stp", "tar", "usd", "usdz", "vtk", "wrl", "x3d", "xz", "zip",
 ];
 
 /// The hexadecimal digits of the hash that distinguishes equal names.
@@ -147,15 +147,15 @@ pub fn doubts(root: &Path, entries: &[MeshEntry]) -> Vec<String> {
         }
     }
     let is_deep = |entry: &MeshEntry| {
-        let mut inner_first = folders(entry).rev();
+        let counts = |name: &&str| split_called(name).is_none() || *name == entry.class;
+        let mut inner_first = folders(entry).filter(counts).rev();
         let last = inner_first.next();
         inner_first.next().is_some() && last.is_some_and(|last| safe_name(last) == entry.class)
     };
     if is_alone {
         doubts.push(format!("each of the {n_classes} classes has one mesh; {layouts}"));
     } else if n_classes > 1 && entries.len() <= 3 * n_classes && entries.iter().all(is_deep) {
-        let n = entries.len() as f64 / n_classes as f64;
-        doubts.push(format!("{n_classes} classes of {n:.0} meshes each; {layouts}"));
+        doubts.push(format!("{n_classes} classes have {} meshes; {layouts}", entries.len()));
     }
     let is_split = |name: &&str| split_called(name).is_some();
     let odd = splits.keys().find(|class| {
@@ -197,7 +197,7 @@ fn left_out(root: &Path, entries: &[MeshEntry]) -> Option<String> {
     let mut n = 0;
     for file in &others {
         let Some(extension) = file.extension().map(|e| text(e).to_lowercase()) else { continue };
-        if COMPANIONS.contains(&&*extension) {
+        if !OTHER_FORMATS.contains(&&*extension) {
             continue;
         }
         n += 1;
@@ -733,7 +733,7 @@ mod tests {
         let lack = "split the meshes otherwise";
         let held = "2 meshes in folders for validation are in the train split: training holds out \
                     its own clouds for validation";
-        let cases: [(&[&str], &[&str]); 8] = [
+        let cases: [(&[&str], &[&str]); 9] = [
             (&sound, &[]),
             (&sound[..1], &["no mesh is in the test split"]),
             (&sound[1..3], &["each of the 2 classes has one mesh"]),
@@ -744,11 +744,12 @@ mod tests {
                 &["name of a split"],
             ),
             (
-                &[&sound[..], &["a/train/1.mtl", "b/3.glb", "c/train/a.STEP", "c/b.obj.gz"]]
+                &[&sound[..], &["a/train/1.binvox", "b/3.glb", "c/train/a.STEP", "c/b.obj.gz"]]
                     .concat(),
                 &["3 files are ignored (.glb, .gz, .step); the class c has no mesh"],
             ),
-            (&ids, &["3 classes of 2 meshes each"]),
+            (&ids, &["3 classes have 6 meshes"]),
+            (&["train/a/1.off", "train/b/2.off", "test/a/3.off", "test/b/4.off"], &[]),
         ];
         for (paths, expected) in cases {
             let found = doubts(paths).join("\n");

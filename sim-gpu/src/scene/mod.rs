@@ -16,7 +16,8 @@ use crate::simplify::Simplify;
 
 mod table;
 
-pub(crate) use table::{check_motion, check_object, check_start};
+pub use table::check_object;
+pub(crate) use table::{check_motion, check_start};
 
 #[cfg(test)]
 mod tests;

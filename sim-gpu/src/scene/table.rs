@@ -171,7 +171,10 @@ fn trajectory(
 }
 
 /// Checks the numbers of an object, whose fields stand at `key`.
-pub(crate) fn check_object(
+///
+/// # Errors
+/// A number beyond its limits.
+pub fn check_object(
     key: impl Fn(&str) -> String,
     scale: [f64; 3],
     reflectivity: f64,
