@@ -1,4 +1,4 @@
-//! Scans on disk: as binary PLY, as CSV, or as NPZ files that NumPy and Open3D load
+//! Scans on disk: as binary PLY or PCD, as CSV, or as NPZ files that NumPy and Open3D load
 //! without conversion:
 //!
 //! | key | type | shape |
@@ -26,7 +26,7 @@ use crate::error::FormatError;
 use crate::hash::{FileHash, Hashing};
 use crate::number::Number;
 use crate::scan::{Attribute, Column, ColumnSlot, POSE, Scan, pose_of};
-use crate::{csv, ply};
+use crate::{csv, ply, rows};
 
 crate::named! {
     /// A file format of scans; its name is the extension.
@@ -39,6 +39,9 @@ crate::named! {
         Ply = "ply",
         /// Text with a header, which is written but not read.
         Csv = "csv",
+        /// The Point Cloud Library's format, binary, with the columns of PLY and neither origin nor
+        /// pose; it is read as a cloud.
+        Pcd = "pcd",
         /// A sensor's packets: see `vlp32c`. They hold ranges along beams instead of points, so
         /// that writing them requires the sensor.
         Pcap = "pcap",
@@ -46,9 +49,6 @@ crate::named! {
 }
 
 impl ScanFormat {
-    /// The formats of points, which [`write_scan`] writes.
-    pub const POINTS: [Self; 3] = [Self::Npz, Self::Ply, Self::Csv];
-
     /// The format of the extension of `path`, in upper or lower case.
     ///
     /// # Errors
@@ -77,7 +77,21 @@ pub fn write_scan(
             scan.check_lengths()?;
             write_archive(path, hashing, |npz| write_npz(npz, scan))
         }
-        ScanFormat::Ply => ply::write_scan(path, hashing, scan),
+        ScanFormat::Pcd if scan.origin != [0.0; 3] => {
+            let cause =
+                "PCD has no place for the origin of the points: expected .npz, .ply or .csv";
+            Err(FormatError::malformed(path, "origin", cause))
+        }
+        ScanFormat::Ply | ScanFormat::Pcd => {
+            let attributes = scan.columns().map(|(attribute, of)| (attribute.column_names(), of));
+            let positions = (rows::AXES.to_vec(), Column::Vector(&scan.positions));
+            let columns: Vec<_> = std::iter::once(positions).chain(attributes).collect();
+            let header = match format {
+                ScanFormat::Pcd => rows::pcd_header(&columns),
+                _ => rows::ply_header(scan.origin, scan.pose, &columns),
+            };
+            rows::write(path, hashing, &header, &columns)
+        }
         ScanFormat::Csv => csv::write_scan(path, hashing, scan),
         ScanFormat::Pcap => Err(FormatError::malformed(path, "extension", PACKETS)),
     }
@@ -94,6 +108,7 @@ pub fn read_scan(path: &Path) -> Result<Scan, FormatError> {
         ScanFormat::Npz => read_npz(path),
         ScanFormat::Ply => ply::read_scan(path),
         ScanFormat::Csv => refuse("CSV is written but not read"),
+        ScanFormat::Pcd => refuse("PCD is read as a cloud, without attributes"),
         ScanFormat::Pcap => refuse(PACKETS),
     }
 }

@@ -31,6 +31,48 @@ fn there_and_back(scan: &Scan, format: ScanFormat) -> Scan {
     read_scan(&path).unwrap()
 }
 
+/// The bytes by the specification of PCD 0.7: SIZE, TYPE and COUNT of each of FIELDS, and rows in
+/// their order, little-endian.
+#[test]
+fn pcd_has_the_fields_of_a_scan() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scan.pcd");
+    let mut scan = Scan {
+        positions: vec![[1.0, -2.0, 0.5], [0.25, 3.0, -1.5]],
+        ring: Some(vec![7, 300]),
+        object: Some(vec![0, 70_000]),
+        return_number: Some(vec![0, 1]),
+        intensity: Some(vec![0.5, 1.0]),
+        normal: Some(vec![[0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
+        ..Scan::default()
+    };
+    write_scan(&path, ScanFormat::Pcd, Hashing::None, &scan).unwrap();
+    let header = "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\n\
+                  FIELDS x y z ring object intensity return normal_x normal_y normal_z\n\
+                  SIZE 4 4 4 2 4 4 1 4 4 4\nTYPE F F F U U F U F F F\n\
+                  COUNT 1 1 1 1 1 1 1 1 1 1\nWIDTH 2\nHEIGHT 1\n\
+                  VIEWPOINT 0 0 0 1 0 0 0\nPOINTS 2\nDATA binary\n";
+    let mut expected = header.as_bytes().to_vec();
+    for (at, ring, object, intensity, number, normal) in [
+        ([1f32, -2.0, 0.5], 7u16, 0u32, 0.5f32, 0u8, [0f32, 0.0, 1.0]),
+        ([0.25, 3.0, -1.5], 300, 70_000, 1.0, 1, [0.0, -1.0, 0.0]),
+    ] {
+        expected.extend(at.iter().flat_map(|x| x.to_le_bytes()));
+        expected.extend(ring.to_le_bytes());
+        expected.extend(object.to_le_bytes());
+        expected.extend(intensity.to_le_bytes());
+        expected.push(number);
+        expected.extend(normal.iter().flat_map(|x| x.to_le_bytes()));
+    }
+    let found = fs::read(&path).unwrap();
+    assert_eq!(found, expected, "{}", String::from_utf8_lossy(&found));
+    let wide: Vec<_> = scan.positions.iter().map(|point| point.map(f64::from)).collect();
+    assert_eq!(formats::cloud_file::read_cloud(&path).unwrap(), wide);
+    scan.origin = [1e6, 0.0, 0.0];
+    let error = write_scan(&path, ScanFormat::Pcd, Hashing::None, &scan).unwrap_err();
+    assert!(error.to_string().contains("origin: PCD has no place for the origin"), "{error}");
+}
+
 proptest! {
     #[test]
     fn a_scan_comes_back_from_its_file(n in 0usize..40, wanted in any::<u16>()) {

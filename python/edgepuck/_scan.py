@@ -115,8 +115,8 @@ class Scan:
         return scan_of(_edgepuck.read_points(os.fspath(path), format, described, sender))
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write a file with the extension .npz, .ply or .csv, like `edgepuck scan`. An existing file is
-        replaced, as by `numpy.save`.
+        """Write a file with the extension .npz, .ply, .csv or .pcd, like `edgepuck scan`. An existing
+        file is replaced, as by `numpy.save`. Only .npz and .ply keep the pose.
 
         Raises:
             Error: The name has another extension, or the file cannot be written.

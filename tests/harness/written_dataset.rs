@@ -33,7 +33,7 @@ pub fn config() -> DatasetConfig {
     DatasetConfig {
         seed: 7,
         attributes: [Attribute::Normal].into(),
-        formats: ScanFormat::POINTS.to_vec(),
+        formats: ScanFormat::ALL.into_iter().filter(|of| *of != ScanFormat::Pcap).collect(),
         variants: vec![Variant::Clean, Variant::Noisy],
         packed_points: PACKED_POINTS,
         min_points: MIN_POINTS,

@@ -9,4 +9,4 @@ mod scan;
 pub use elements::read_elements;
 pub use header::{Element, Frame};
 #[cfg(feature = "dataset")]
-pub use scan::{read_scan, write_scan};
+pub use scan::read_scan;

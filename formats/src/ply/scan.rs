@@ -12,21 +12,7 @@ use std::path::Path;
 
 use super::elements::read_elements;
 use crate::error::FormatError;
-use crate::hash::{FileHash, Hashing};
-use crate::rows;
-use crate::scan::{Attribute, Column, ColumnSlot, Scan};
-
-/// Writes `scan` to `path`, atomically, and returns the file's hash.
-pub fn write_scan(
-    path: &Path,
-    hashing: Hashing,
-    scan: &Scan,
-) -> Result<Option<FileHash>, FormatError> {
-    let attributes = scan.columns().map(|(attribute, column)| (attribute.column_names(), column));
-    let positions = (rows::AXES.to_vec(), Column::Vector(&scan.positions));
-    let columns: Vec<_> = std::iter::once(positions).chain(attributes).collect();
-    rows::write(path, hashing, &rows::ply_header(scan.origin, scan.pose, &columns), &columns)
-}
+use crate::scan::{Attribute, ColumnSlot, Scan};
 
 /// Reads a scan, ASCII or binary, with properties in any order. Other properties are skipped.
 pub fn read_scan(path: &Path) -> Result<Scan, FormatError> {

@@ -4,6 +4,7 @@ use crate::journal::{Journal, read_json};
 use crate::layout;
 use crate::manifest::Manifest;
 use crate::tars::{self, PartManifest, RootManifest, root_file};
+use formats::cloud_file::read_cloud;
 use formats::hash::{FileHash, Hashing};
 use formats::labelled::read_labelled;
 use formats::scan_file::{ScanFormat, read_scan};
@@ -172,6 +173,9 @@ impl Expected {
         }
         let (found, expected, what) = match self.holds {
             Holds::Points(ScanFormat::Csv, points) => (csv_points(path), points, "points"),
+            Holds::Points(ScanFormat::Pcd, points) => {
+                (read_cloud(path).map(|cloud| cloud.len() as u64), points, "points")
+            }
             Holds::Points(ScanFormat::Pcap, points) => {
                 return match velodyne::count_returns(path) {
                     Err(error) => Some(error.to_string()),

@@ -47,7 +47,7 @@ impl Scan {
     }
 
     /// Writes the scan in the format that the extension names: `.npz` (NumPy, Open3D), `.ply`,
-    /// `.csv`, or `.pcap`, the packets of a VLP-32C. Missing folders are created.
+    /// `.csv`, `.pcd`, or `.pcap`, the packets of a VLP-32C. Missing folders are created.
     ///
     /// # Errors
     /// The extension names no format, or the file cannot be written. For `.pcap`: the sensor is
