@@ -1,7 +1,7 @@
 //! Files that are not of the format that their names say.
 
 use std::fs::File;
-use std::io::Read;
+use std::io::{self, Read};
 use std::path::Path;
 
 use crate::error::FormatError;
@@ -34,6 +34,30 @@ pub fn foreign(bytes: &[u8]) -> Option<&'static str> {
         [1..=127, 0, 1..=127, 0, ..] | [0, 1..=127, 0, 1..=127, ..] => Some(UTF_16),
         _ => None,
     })
+}
+
+/// The first `longest` bytes of the text at `path`, without the byte order mark that Windows'
+/// editors begin files with.
+///
+/// # Errors
+/// Errors of the system; what is not text in UTF-8, with the line.
+pub fn read_text(path: &Path, longest: u64) -> io::Result<String> {
+    let mut bytes = Vec::new();
+    File::open(path)?.take(longest).read_to_end(&mut bytes)?;
+    let wrong = |found: String| {
+        let cause = format!("expected text in UTF-8, found {found}");
+        io::Error::new(io::ErrorKind::InvalidData, cause)
+    };
+    if let Some(found) = foreign(&bytes) {
+        return Err(wrong(found.to_owned()));
+    }
+    let text = String::from_utf8(bytes).map_err(|error| {
+        let valid = error.utf8_error().valid_up_to();
+        let (before, after) = error.as_bytes().split_at(valid);
+        let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
+        wrong(format!("the byte 0x{:02X} in line {line}: save it as UTF-8", after[0]))
+    })?;
+    Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
 }
 
 /// `error`, or what was found in `content` in place of what was `expected`. Zip archives keep their

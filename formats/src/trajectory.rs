@@ -10,7 +10,7 @@
 use std::path::Path;
 
 use crate::error::FormatError;
-use crate::foreign::or_foreign_file;
+use crate::foreign::{or_foreign_file, read_text};
 
 /// A pose at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,8 +31,7 @@ pub fn read_trajectory(path: &Path, period_s: f64) -> Result<Vec<KeyedPose>, For
 
 fn read(path: &Path, period_s: f64) -> Result<Vec<KeyedPose>, FormatError> {
     let io = |source| FormatError::io(path, source);
-    let text = std::fs::read_to_string(path).map_err(io)?;
-    let text = text.trim_start_matches('\u{feff}');
+    let text = read_text(path, u64::MAX).map_err(io)?;
     let flaw =
         |line: usize, cause: &str| Err(FormatError::malformed(path, format!("line {line}"), cause));
     let mut poses: Vec<KeyedPose> = Vec::new();

@@ -1,10 +1,10 @@
 //! Reading TOML files that users write: sensors, poses and scenes.
 
 use std::fmt;
-use std::io::Read;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
+use formats::foreign::read_text;
 use serde::de::DeserializeOwned;
 
 use mistakes::Mistakes;
@@ -109,9 +109,7 @@ pub fn read<T: DeserializeOwned, U, E: Into<Vec<InvalidValue>>>(
     check: impl Fn(T) -> Result<U, E>,
 ) -> Result<U, ConfigError> {
     let failed = |source| ConfigError::Read { file: file.to_owned(), source };
-    let opened = std::fs::File::open(file).map_err(failed)?;
-    let mut text = String::new();
-    opened.take(MAX_FILE_BYTES + 1).read_to_string(&mut text).map_err(failed)?;
+    let text = read_text(file, MAX_FILE_BYTES + 1).map_err(failed)?;
     if text.len() as u64 > MAX_FILE_BYTES {
         return Err(ConfigError::TooLong { file: file.to_owned() });
     }
@@ -128,8 +126,6 @@ pub fn parse<T: DeserializeOwned, U, E: Into<Vec<InvalidValue>>>(
     file: &Path,
     check: impl Fn(T) -> Result<U, E>,
 ) -> Result<U, ConfigError> {
-    // Windows' editors begin files with a byte order mark.
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     Mistakes::find(text, |value| check(value).map_err(Into::into)).map_err(|mistakes| {
         ConfigError::Content { file: file.to_owned(), message: mistakes.to_string() }
     })

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use edgepuck_assets::TRAINING_RECIPES;
 use formats::FormatError;
+use formats::foreign::read_text;
 use formats::model_card::Normalization;
 use infer_cpu::UNKNOWN;
 use serde::{Deserialize, Serialize};
@@ -281,7 +282,7 @@ impl Recipe {
                 let cause = format!("expected a recipe's file, or one of {names}");
                 return Err(Error::Data { path: path.to_path_buf(), cause });
             }
-            None => std::fs::read_to_string(path).map_err(|e| FormatError::io(path, e))?,
+            None => read_text(path, u64::MAX).map_err(|e| FormatError::io(path, e))?,
         };
         let recipe: Self = toml::from_str(&text)
             .map_err(|error| FormatError::malformed(path, "recipe", error.to_string().trim()))?;

@@ -2,6 +2,7 @@
 
 use anyhow::Context;
 use formats::FormatError;
+use formats::foreign::read_text;
 use glam::{DMat3, DMat4, DVec3};
 use sim_gpu::glam;
 use std::f64::consts::{PI, TAU};
@@ -20,7 +21,7 @@ pub struct Camera {
 impl Camera {
     /// Reads a calibration file of the benchmark.
     pub fn read(file: &Path) -> anyhow::Result<Self> {
-        let text = std::fs::read_to_string(file).with_context(|| file.display().to_string())?;
+        let text = read_text(file, u64::MAX).with_context(|| file.display().to_string())?;
         let matrix = |key: &str, columns: usize| {
             let line = text
                 .lines()

@@ -1,14 +1,12 @@
 //! The metadata of a sensor.
 
-use std::fs::File;
-use std::io::Read;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
 use serde_json::Value;
 
 use crate::error::FormatError;
-use crate::foreign::or_foreign_file;
+use crate::foreign::{or_foreign_file, read_text};
 
 /// The longest metadata, bytes.
 const LONGEST: u64 = 4 << 20;
@@ -81,7 +79,9 @@ impl Metadata {
         path: &Path,
         profile: impl Fn(&Value) -> Result<Profile, String>,
     ) -> Result<Self, FormatError> {
-        let read = text_of(path).and_then(|text| Self::parse_as(&text, path, profile));
+        let read = read_text(path, LONGEST + 1)
+            .map_err(|source| FormatError::io(path, source))
+            .and_then(|text| Self::parse_as(&text, path, profile));
         read.map_err(|error| or_foreign_file(path, "metadata in JSON", error))
     }
 
@@ -90,7 +90,6 @@ impl Metadata {
         path: &Path,
         profile: impl Fn(&Value) -> Result<Profile, String>,
     ) -> Result<Self, FormatError> {
-        let text = text.trim_start_matches('\u{feff}');
         if text.len() as u64 > LONGEST {
             let cause = format!("expected at most {LONGEST} bytes, found more");
             return Err(FormatError::malformed(path, "metadata", cause));
@@ -248,12 +247,6 @@ impl Fields<'_> {
 
 /// The largest distance between parts of a sensor, millimetres.
 const FARTHEST_MM: f64 = 1e4;
-
-fn text_of(path: &Path) -> Result<String, FormatError> {
-    let mut text = String::new();
-    let read = File::open(path).and_then(|file| file.take(LONGEST + 1).read_to_string(&mut text));
-    read.map(|_| text).map_err(|source| FormatError::io(path, source))
-}
 
 fn whole(value: &Value, range: RangeInclusive<u16>) -> Result<u16, String> {
     let found = value.as_u64().and_then(|n| u16::try_from(n).ok()).filter(|n| range.contains(n));
