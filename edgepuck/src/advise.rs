@@ -34,19 +34,19 @@ pub struct AdviseArgs {
     device: Device,
 
     /// Longest acceptable time from a raw cloud to its class, milliseconds
-    #[arg(long, value_name = "MS", value_parser = positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "MS", value_parser = positive)]
     max_ms: Option<f64>,
 
     /// Lowest acceptable accuracy, from 0 to 1
-    #[arg(long, value_name = "SHARE", value_parser = share, allow_negative_numbers = true)]
+    #[arg(long, value_name = "SHARE", value_parser = share)]
     min_accuracy: Option<f64>,
 
     /// Largest acceptable size of the weights, megabytes
-    #[arg(long, value_name = "MB", value_parser = positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "MB", value_parser = positive)]
     max_mb: Option<f64>,
 
     /// Largest number of threads
-    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    #[arg(long, value_name = "N")]
     max_threads: Option<usize>,
 }
 

@@ -11,7 +11,7 @@ pub struct BrightnessArgs {
     white: Option<f64>,
 
     /// Reflectivity of all points, from 0 (black) to 1 (white), in place of their intensities
-    #[arg(long, value_name = "R", allow_negative_numbers = true, conflicts_with = "white")]
+    #[arg(long, value_name = "R", conflicts_with = "white")]
     reflectivity: Option<f64>,
 }
 

@@ -7,7 +7,7 @@ use crate::{
 };
 #[cfg(feature = "models")]
 use crate::{advise, detect, export_onnx, import_weights};
-use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use std::ffi::OsString;
 
 /// Turns CAD meshes into realistic LiDAR training data.
@@ -103,7 +103,7 @@ fn parsed(words: impl IntoIterator<Item = OsString>) -> Result<Cli, clap::Error>
         }
         None => command,
     });
-    Cli::from_arg_matches(&command.try_get_matches_from(words)?)
+    outcome::parsed(command, words)
 }
 
 /// Runs `command`, which signals may end.
@@ -191,7 +191,7 @@ mod tests {
                         0 => part.split_whitespace().collect(),
                         _ => vec![part],
                     });
-                    let parsed = Cli::try_parse_from(words);
+                    let parsed = parsed(words.map(OsString::from));
                     assert!(parsed.is_ok(), "{page}: {command}: {}", parsed.err().unwrap());
                     n_commands += 1;
                 }

@@ -64,20 +64,14 @@ pub(crate) fn run(args: &DetectArgs) -> anyhow::Result<Outcome> {
     let picture = args.out.with_extension("png");
     args.overwrite.check([&*args.out, &picture])?;
     let camera = args.calib.as_deref().map(Camera::read).transpose()?;
-    let scan = args.input.read()?;
+    let scan = args.input.read_upright()?;
     let options = Options { precision: args.precision, ..Options::default() };
     let mut detector = Detector::open(&args.model, &options, args.min_points)?;
     detector.min_confidence = args.min_confidence;
     let started = Instant::now();
-    let Detections { labels, objects, n_unknown } = detector.detect(&scan)?;
+    let Detections { labels, objects, n_other } = detector.detect(&scan)?;
     let elapsed_ms = 1e3 * started.elapsed().as_secs_f64();
 
-    eprintln!(
-        "{} points in {elapsed_ms:.1} ms: {} objects, {n_unknown} unknown clusters: {}",
-        scan.len(),
-        objects.len(),
-        args.out.display()
-    );
     let written = if is_json {
         serde_json::to_vec_pretty(&json!({
             "frame": "the sensor's: metres, z up, the sensor at the origin",
@@ -115,6 +109,12 @@ pub(crate) fn run(args: &DetectArgs) -> anyhow::Result<Outcome> {
         })
         .collect();
     preview::draw_from_above(&scan, &tints, &outlines, &args.input.title(), &picture)?;
+    eprintln!(
+        "{} points in {elapsed_ms:.1} ms: {} objects, {n_other} other clusters: {}",
+        scan.len(),
+        objects.len(),
+        args.out.display()
+    );
     Ok(Outcome::Success)
 }
 
@@ -141,8 +141,8 @@ pub struct Detections {
     pub labels: Vec<Label>,
     /// The clusters of known classes with enough confidence, in the order of their numbers.
     pub objects: Vec<Object>,
-    /// The number of clusters of unknown class.
-    pub n_unknown: usize,
+    /// The number of the other clusters: of unknown class, or with too little confidence.
+    pub n_other: usize,
 }
 
 impl Detector {
@@ -164,14 +164,14 @@ impl Detector {
         let sweep = Sweep { points: &scan.positions, rings: scan.ring.as_deref() };
         let segmentation = self.segmenter.segment(&sweep)?;
         let labels = segmentation.labels().to_vec();
-        let mut found = Detections { labels, objects: Vec::new(), n_unknown: 0 };
+        let mut found = Detections { labels, objects: Vec::new(), n_other: 0 };
         let mut cloud = Vec::new();
         for (cluster, number) in segmentation.clusters().zip(0..) {
             cloud.clear();
             cloud.extend(cluster.points.iter().map(|&i| scan.positions[i as usize]));
             let prediction = self.classifier.classify_on_ground(&cloud, cluster.ground_z_m)?;
             if prediction.is_unknown || prediction.confidence() < self.min_confidence {
-                found.n_unknown += 1;
+                found.n_other += 1;
                 continue;
             }
             found.objects.push(Object {

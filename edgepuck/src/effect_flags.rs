@@ -10,7 +10,7 @@ use std::path::PathBuf;
 pub struct EffectFlags {
     /// Standard deviation of the noise, metres; 0 is no noise [default: 0.01 of gen-dataset, 0 of
     /// scan]
-    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    #[arg(long, value_name = "M")]
     noise: Option<f64>,
 
     /// What the noise is added to: `range` (along the ray) or `xyz` (each coordinate)
@@ -18,11 +18,11 @@ pub struct EffectFlags {
     noise_model: NoiseModel,
 
     /// Mean of the noise, metres
-    #[arg(long, default_value_t = 0.0, value_name = "M", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.0, value_name = "M")]
     noise_mean: f64,
 
     /// Probability that a return is missing from a noisy scan
-    #[arg(long, default_value_t = 0.0, value_name = "P", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.0, value_name = "P")]
     dropout: f64,
 
     /// Round the ranges of noisy scans to multiples of M metres, or without a value, of the

@@ -14,7 +14,7 @@ use formats::outputs::{Overwrite, need_extension};
 
 #[derive(clap::Args)]
 pub struct Args {
-    /// Scene recipe: street, yard, or the path of a TOML file
+    /// Scene recipe: street, yard, room, or the path of a TOML file
     #[arg(value_name = "RECIPE", default_value = "street")]
     recipe: PathBuf,
 
@@ -25,12 +25,12 @@ pub struct Args {
 
     /// Duration of the drive, seconds
     #[arg(long, default_value_t = 60.0, value_name = "S")]
-    #[arg(value_parser = seconds, allow_negative_numbers = true)]
+    #[arg(value_parser = seconds)]
     seconds: f64,
 
     /// Speed of the sensor along the road, metres a second
     #[arg(long, default_value_t = 5.0, value_name = "M/S")]
-    #[arg(value_parser = speed, allow_negative_numbers = true)]
+    #[arg(value_parser = speed)]
     speed: f64,
 
     /// Sensor: vlp32c, with the recipe's noise and effects, or the path of a VLP-32C's profile
@@ -70,6 +70,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let mut recipe = read_recipe(&args.recipe)?;
     recipe.use_sensors(std::slice::from_ref(&args.sensor));
     let stage = Stage::new(recipe, &args.recipe, args.meshes.as_deref(), args.seed)?;
+    stage.warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
     let mut drive = Drive::new(&stage, args.speed)?;
     let started = Instant::now();
     let n_points = write(&mut drive, args.seconds, &args.out)?;

@@ -26,7 +26,7 @@ pub struct Args {
     #[arg(value_name = "SCENE|MESH...")]
     inputs: Vec<PathBuf>,
 
-    /// File to write: .npz, .ply, .csv or .pcap (VLP-32C packets, for that sensor only). If the
+    /// File to write: .npz, .ply, .csv, .pcd or .pcap (VLP-32C packets, for that sensor only). If the
     /// scene has several sensors, one file per sensor is written, and the sensor's name is appended
     /// to the file's name
     #[arg(long, value_name = "FILE")]
@@ -41,7 +41,7 @@ pub struct Args {
 
     /// Simplify meshes of a scene as gen-dataset does; applies to objects without a `simplify` key
     /// in the scene file
-    #[arg(long, value_name = "auto|M", allow_negative_numbers = true)]
+    #[arg(long, value_name = "auto|M")]
     simplify: Option<Simplify>,
 
     #[command(flatten)]
@@ -65,15 +65,15 @@ struct MeshArgs {
 
     /// Distance of the sensor from the centre of the meshes, at which it looks, metres [default:
     /// 3]
-    #[arg(long, value_name = "M", value_parser = flags::positive, allow_negative_numbers = true)]
+    #[arg(long, value_name = "M", value_parser = flags::positive)]
     distance: Option<f64>,
 
     /// Elevation of the sensor above the horizon, degrees [default: 20]
-    #[arg(long, value_name = "DEG", value_parser = flags::elevation, allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEG", value_parser = flags::elevation)]
     elevation: Option<f64>,
 
     /// Azimuth of the sensor, counterclockwise from x, degrees [default: 0]
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEG")]
     azimuth: Option<f64>,
 
     /// Unit of the meshes' coordinates: m, mm, cm, in or ft [default: m]

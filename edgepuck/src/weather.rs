@@ -18,7 +18,7 @@ pub struct WeatherArgs {
     #[command(flatten)]
     input: SweepArgs,
 
-    /// File to write: .npz, .ply or .csv. It holds the strongest return of each beam that still has
+    /// File to write: .npz, .ply, .csv or .pcd. It holds the strongest return of each beam that still has
     /// one. `intensity` is the intensity in the weather, and `medium` is the source of the return:
     /// 0 a surface, 1 rain, 2 snow, 3 fog
     #[arg(long, value_name = "FILE")]
@@ -28,15 +28,15 @@ pub struct WeatherArgs {
     overwrite: Overwrite,
 
     /// Rain, millimetres per hour
-    #[arg(long, value_name = "MM/H", allow_negative_numbers = true)]
+    #[arg(long, value_name = "MM/H")]
     rain: Option<f64>,
 
     /// Snow, millimetres of water per hour
-    #[arg(long, value_name = "MM/H", allow_negative_numbers = true)]
+    #[arg(long, value_name = "MM/H")]
     snow: Option<f64>,
 
     /// Fog with this visibility, metres
-    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    #[arg(long, value_name = "M")]
     fog: Option<f64>,
 
     /// Model of the fog's returns: `physical`, by the scattered power, or `hahner`, in proportion
@@ -46,7 +46,7 @@ pub struct WeatherArgs {
     fog_model: FogModel,
 
     /// Haze with this visibility, metres
-    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    #[arg(long, value_name = "M")]
     haze: Option<f64>,
 
     /// Sensor that recorded the scan: a built-in name or a TOML file. Its detection limit, beam
@@ -66,7 +66,7 @@ pub fn run(args: &WeatherArgs) -> anyhow::Result<Outcome> {
     let usage = |error: &dyn std::fmt::Display| Usage(error.to_string());
     let format = ScanFormat::of_path(&args.out)?;
     if format == ScanFormat::Pcap {
-        let cause = "--out: expected .npz, .ply or .csv, as packets hold a sensor's ranges";
+        let cause = "--out: expected .npz, .ply, .csv or .pcd, as packets hold a sensor's ranges";
         return Err(Usage(cause.to_owned()).into());
     }
     let weather = args.weather();

@@ -1,5 +1,6 @@
 //! The exit codes and error messages of programs.
 
+use std::ffi::OsString;
 use std::fmt::Display;
 use std::io::{self, ErrorKind, Write};
 
@@ -21,6 +22,28 @@ pub enum Outcome {
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct Usage(pub String);
+
+/// The command line `words`, whose first is the program's name. Values may be negative numbers, which
+/// are judged as any other, and not taken for flags.
+///
+/// # Errors
+/// What is wrong with the words, or the help that they ask for.
+pub fn parsed<T: clap::FromArgMatches>(
+    command: clap::Command,
+    words: impl IntoIterator<Item = impl Into<OsString> + Clone>,
+) -> Result<T, clap::Error> {
+    let mut command = with_negative_numbers(command);
+    let mut matches = command.try_get_matches_from_mut(words)?;
+    T::from_arg_matches_mut(&mut matches).map_err(|error| error.format(&mut command))
+}
+
+fn with_negative_numbers(command: clap::Command) -> clap::Command {
+    let signed = |arg: clap::Arg| {
+        let takes_values = arg.get_action().takes_values();
+        arg.allow_negative_numbers(takes_values)
+    };
+    command.mut_args(signed).mut_subcommands(with_negative_numbers)
+}
 
 /// Prints the error, if there is one, and returns the program's exit code: 0 for success, 1 for
 /// a failure, 2 for a [`Usage`], 3 if inputs were refused, and 75 for an interruption. A broken

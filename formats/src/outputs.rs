@@ -12,18 +12,20 @@ pub struct Overwrite {
 }
 
 impl Overwrite {
-    /// Checks that none of the files or folders `outputs` exists, unless they may be replaced.
+    /// Checks that none of the files or folders `outputs` exists, unless they may be replaced, and
+    /// that [they can be made](check_place).
     ///
     /// # Errors
-    /// Names the first that does.
+    /// Names the first for which this does not hold.
     pub fn check<'a>(&self, outputs: impl IntoIterator<Item = &'a Path>) -> Result<(), Usage> {
-        // Devices and pipes hold nothing to lose.
-        let stands = |path: &&Path| path.is_file() || path.is_dir();
-        let existing = outputs.into_iter().find(|path| !self.overwrite && stands(path));
-        let refused = |path: &Path| {
-            Usage(format!("{}: it exists already: --overwrite replaces it", path.display()))
-        };
-        existing.map_or(Ok(()), |path| Err(refused(path)))
+        outputs.into_iter().try_for_each(|path| {
+            // Devices and pipes hold nothing to lose.
+            if !self.overwrite && (path.is_file() || path.is_dir()) {
+                let cause = "it exists already: --overwrite replaces it";
+                return Err(Usage(format!("{}: {cause}", path.display())));
+            }
+            check_place(path)
+        })
     }
 
     /// As [`Overwrite::check`]; removes the folders that are there.
@@ -39,6 +41,28 @@ impl Overwrite {
         }
         Ok(())
     }
+}
+
+/// Checks that the output `path` can be made: in it, if it is a folder, or else in the nearest
+/// folder above it.
+///
+/// # Errors
+/// Names the output and what stands in its way.
+pub fn check_place(path: &Path) -> Result<(), Usage> {
+    let exists = path.exists();
+    if exists && !path.is_file() && !path.is_dir() {
+        return Ok(());
+    }
+    let folder = path.ancestors().skip(usize::from(path.is_file())).find(|above| above.exists());
+    let folder = folder.unwrap_or(Path::new("."));
+    let (name, place) = (path.display(), folder.display());
+    if !folder.is_dir() {
+        return Err(Usage(format!("{name}: expected a folder, found the file {place}")));
+    }
+    let made = tempfile::tempfile_in(folder);
+    made.map(drop).map_err(|error| {
+        Usage(format!("{name}: no file can be made in the folder {place}: {}", error.kind()))
+    })
 }
 
 /// Checks that the name of the file to write has one of the extensions `expected`.

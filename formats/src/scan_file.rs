@@ -49,6 +49,9 @@ crate::named! {
 }
 
 impl ScanFormat {
+    /// The formats of points with an origin.
+    pub const POINTS: [Self; 3] = [Self::Npz, Self::Ply, Self::Csv];
+
     /// The format of the extension of `path`, in upper or lower case.
     ///
     /// # Errors
@@ -83,7 +86,12 @@ pub fn write_scan(
             Err(FormatError::malformed(path, "origin", cause))
         }
         ScanFormat::Ply | ScanFormat::Pcd => {
-            let attributes = scan.columns().map(|(attribute, of)| (attribute.column_names(), of));
+            let names = |attribute| match (format, attribute) {
+                // As PCL and Open3D call them.
+                (ScanFormat::Pcd, Attribute::Normal) => vec!["normal_x", "normal_y", "normal_z"],
+                _ => attribute.column_names(),
+            };
+            let attributes = scan.columns().map(|(attribute, of)| (names(attribute), of));
             let positions = (rows::AXES.to_vec(), Column::Vector(&scan.positions));
             let columns: Vec<_> = std::iter::once(positions).chain(attributes).collect();
             let header = match format {

@@ -1,6 +1,7 @@
 //! Classifies clouds of points without a GPU.
 
-use clap::Parser;
+use clap::{CommandFactory, Parser};
+use formats::outcome::{exit_code, parsed};
 use infer_cpu::cli::{Command, run};
 use std::process::ExitCode;
 
@@ -16,5 +17,6 @@ struct Cli {
 }
 
 fn main() -> ExitCode {
-    formats::outcome::exit_code(run(&Cli::parse().command)).into()
+    let cli: Cli = parsed(Cli::command(), std::env::args_os()).unwrap_or_else(|error| error.exit());
+    exit_code(run(&cli.command)).into()
 }

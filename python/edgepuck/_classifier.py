@@ -84,15 +84,13 @@ class Classifier(Remade):
             ground_z: The height of the ground below the object, metres, for models such as
                 `street-128` that were trained with it.
         """
-        if _is_batch(cloud):
-            batch: Any = cloud
-            return [Prediction(**self._classify(one, ground_z)) for one in batch]
-        return Prediction(**self._classify(cloud, ground_z))
-
-    def _classify(self, cloud: Any, ground_z: float | None) -> dict[str, Any]:
-        is_scan = isinstance(cloud, Scan)
-        points = cloud.positions if is_scan else cloud
-        return self._classifier.classify(points_of(points), ground_z, is_scan)
+        is_batch = _is_batch(cloud)
+        clouds: Any = cloud if is_batch else [cloud]
+        found = []
+        for one in clouds:
+            points = points_of(one.positions if isinstance(one, Scan) else one)
+            found.append(Prediction(**self._classifier.classify(points, ground_z, isinstance(one, Scan))))
+        return found if is_batch else found[0]
 
 
 def _is_batch(cloud: Any) -> bool:

@@ -8,6 +8,7 @@ import pytest
 import edgepuck as ep
 
 SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0]]
+CUBE = ep.Mesh(*ep.box((1, 1, 1)))
 
 
 @pytest.mark.parametrize(
@@ -27,20 +28,24 @@ SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0]]
         (lambda: ep.Sensor("vlp99"), "vlp99"),
         (lambda: ep.Classifier("edge-65"), "edge-65: name: expected a model file, or one of edge-64, street-128"),
         (lambda: ep.Scenes("streets"), "expected a recipe's file, or one of"),
-        (lambda: ep.Sensor("vlp32c").scan(ep.Mesh(*ep.box((1, 1, 1)))).save("x.pcd"), "x.pcd"),
+        (lambda: ep.Sensor("vlp32c").scan(ep.Mesh(*ep.box((1, 1, 1)))).save("x.las"), "x.las"),
         (lambda: ep.Classifier("edge-64", precision="i9"), "i9"),
         (lambda: ep.Classifier("edge-64")(np.zeros((5, 2))), "expected points of shape"),
         (lambda: ep.Classifier("edge-64")(np.zeros(5)), "expected points of shape"),
         (lambda: ep.Classifier("edge-64")(np.full((5, 3), np.nan)), "finite"),
+        (lambda: ep.Classifier("edge-64")(np.ones((5, 3))), "found 5 in one place"),
         (lambda: ep.segment(np.zeros((5, 2))), "expected points of shape"),
         (lambda: ep.detect(np.zeros((5, 2))), "expected points of shape"),
-        (lambda: ep.detect(np.zeros((5, 3)), "no-model"), "no-model"),
+        (lambda: ep.detect(np.ones((5, 3)), "no-model"), "no-model"),
         (lambda: ep.Mesh(SQUARE, [[0, 1, 2]], units="km"), "expected one of m, mm, cm, in, ft"),
-        (lambda: ep.segment(np.zeros((5, 3)), rings=[1, 2]), "ring"),
+        (lambda: ep.segment(np.ones((5, 3)), rings=[1, 2]), "ring"),
         (lambda: ep.segment(np.zeros((2, 3)), rings=[1, 2.5]), "rings: expected whole numbers"),
         (lambda: ep.detect(np.zeros((2, 3)), rings=[1, np.nan]), "rings: expected whole numbers"),
         (lambda: ep.detect(np.full((5, 3), 49520.0)), "point 0: expected metres from the sensor"),
         (lambda: ep.segment([[1.0, 2.0, np.nan]]), "point 0: expected metres from the sensor"),
+        (lambda: ep.segment(np.zeros((5, 3))), "points: expected metres from the sensor, found no point"),
+        (lambda: ep.detect(np.full((5, 3), np.nan)), "found no point with a position"),
+        (lambda: ep.detect(np.zeros((0, 3))), "found no point with a position"),
         (lambda: ep.detect(np.zeros((3, 200))), "found [3, 200]: transpose it"),
         (lambda: ep.Classifier("edge-64")(np.zeros((2, 3, 200))), "found [3, 200]: transpose it"),
         (lambda: ep.segment(np.zeros(5, [("x", "f4"), ("y", "f4")])), "expected fields x, y and z"),
@@ -49,6 +54,10 @@ SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0]]
         (lambda: ep.Dataset("missing"), "missing: cannot be read"),
         (lambda: ep.Scene().add("chair.off"), "expected an edgepuck.Mesh"),
         (lambda: ep.Scene().add(ep.Mesh(*ep.box((1, 1, 1))), scale=[1, 2]), "expected one number or three"),
+        (lambda: ep.Scene().add(CUBE, scale=0), "scale: expected a number above 0, found 0"),
+        (lambda: ep.Scene().add(CUBE, scale=[1, -1, 1]), "scale: expected a number above 0, found -1"),
+        (lambda: ep.Scene().add(CUBE, reflectivity=80), "reflectivity: expected a number within 0..=1, found 80"),
+        (lambda: ep.Scene().add(CUBE, retroreflection=5), "retroreflection: expected a number within 0..=1"),
         (lambda: ep.Scene().move(0), "expected the number of one of 0 instances, found 0"),
         (lambda: ep.Scene().move(-1), "instance: expected a whole number"),
         (lambda: ep.Scene().scan("vlp32c"), "expected an edgepuck.Sensor, found str"),
@@ -60,13 +69,37 @@ def test_what_cannot_be_used_is_named(make, message: str) -> None:
     assert message in str(caught.value)
 
 
+FLOOR = np.stack([*np.meshgrid(*[np.linspace(-9.0, 9.0, 90)] * 2), np.full((90, 90), -1.5)], -1).reshape(-1, 3)
+
+
 @pytest.mark.parametrize(
-    ("farthest", "message"),
-    [(8000.0, "8000.000 m from the sensor"), (0.08, "are the points in metres"), (0.0, "no point")],
+    ("points", "message"),
+    [
+        (FLOOR * 500, "6408.003 m from the sensor"),
+        (FLOOR / 1000, "are the points in metres"),
+        (FLOOR + [300, 200, 30], "is the origin the position of the sensor"),
+        (FLOOR[:, [0, 2, 1]], "if y does: expected the sensor's frame, z up"),
+    ],
 )
-def test_a_sweep_that_is_probably_not_in_metres_is_told(farthest: float, message: str) -> None:
+def test_a_sweep_in_another_unit_or_frame_is_told(points: np.ndarray, message: str) -> None:
     with pytest.warns(UserWarning, match=message):
-        ep.segment(np.full((5, 3), [farthest, 0.0, 0.0]))
+        ep.segment(points)
+
+
+def test_a_mesh_without_area_is_told() -> None:
+    with pytest.warns(UserWarning, match="no triangle has an area") as told:
+        ep.Mesh(SQUARE, [[0, 1, 1]])
+    assert len(told) == 1
+
+
+def test_what_is_no_whole_object_is_told() -> None:
+    scan = ep.Sensor("vlp32c").scan(ep.Mesh(*ep.box((1, 1, 1))))
+    for cloud in [scan, FLOOR[:50] * 0.1 + [20, 0, 0]]:
+        with pytest.warns(UserWarning, match="the cloud is a scan of one side, and edge-64 learnt"):
+            ep.Classifier("edge-64")(cloud)
+    sweep = np.repeat(FLOOR * np.abs(FLOOR) ** 3 / 81, 2, axis=0)
+    with pytest.warns(UserWarning, match="the cloud looks like a sweep"):
+        ep.Classifier("street-128")(sweep)
 
 
 def test_a_scan_of_nothing_is_told() -> None:

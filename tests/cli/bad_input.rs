@@ -57,6 +57,7 @@ fn a_mesh_of_zero_area_is_scanned_to_nothing() {
     folder.write("m/flat/a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n");
     let said = folder.exits(3, "gen-dataset m --out out --adapter cpu");
     assert!(said.contains("No scan of rotational holds a point: no beam met a mesh"), "{said}");
+    assert!(said.contains("warning: flat/a.off: no triangle has an area"), "{said}");
 }
 
 #[test]
@@ -74,6 +75,9 @@ fn a_dataset_without_clouds_and_a_sensor_inside_a_mesh_are_told() {
 #[test]
 fn commands_that_cannot_be_are_usage_errors() {
     let folder = Folder::with_meshes();
+    folder.write("file", "");
+    #[cfg(target_os = "linux")]
+    folder.refuses(2, &[("gen-shapes --out /sys", "no file can be made in the folder /sys: ")]);
     folder.refuses(
         2,
         &[
@@ -82,6 +86,13 @@ fn commands_that_cannot_be_are_usage_errors() {
             ("gen-dataset meshes --noise=nan", "sigma"),
             ("gen-dataset meshes --dropout 2", "probability"),
             ("gen-dataset meshes --distance 0", "distance"),
+            ("gen-dataset meshes --distance -3", "distance_m: expected a number above 0, found -3"),
+            ("gen-dataset meshes --views -3", "'-3' for '--views <N>'"),
+            ("gen-dataset meshes --azimuth-jitter -3", "azimuth_jitter"),
+            ("scan --distance -3 --out x.npz", "expected a finite number above 0"),
+            ("detect x.npy --out x.json --min-points -3", "'-3' for '--min-points <N>'"),
+            ("train --data x --epochs -3", "'-3' for '--epochs"),
+            ("live --udp -3", "'-3' for '--udp"),
             ("gen-dataset meshes --elevation 91", "elevation"),
             ("gen-dataset meshes --shard 4/3", "--shard"),
             ("gen-dataset meshes --up x", "--up"),
@@ -99,6 +110,15 @@ fn commands_that_cannot_be_are_usage_errors() {
             ("gen-dataset meshes --sensor kinect-v2 --quantise", "kinect-v2"),
             ("gen-dataset meshes --out meshes", "--out: meshes is the folder of the meshes"),
             ("no-such-command", "no-such-command"),
+            ("gen-dataset meshes --out file", "expected a folder, found the file file"),
+            ("gen-shapes --out file", "expected a folder, found the file file"),
+            ("gen-scenes --sweeps 1 --out file/a", "expected a folder, found the file file"),
+            ("gen-drive --out file/a.pcap", "file/a.pcap: expected a folder, found the file file"),
+            (
+                "scan meshes/ring/train/ring_0001.off --out file/a.npz",
+                "file/a.npz: expected a folder, found the file file",
+            ),
+            ("train --data x.npz --out file/a.safetensors", "expected a folder, found the file"),
         ],
     );
     assert!(!folder.at("data").exists(), "nothing was written");
@@ -110,6 +130,8 @@ fn what_is_not_there_is_named() {
     fs::create_dir(folder.at("empty")).unwrap();
     folder.write("bad.toml", "name = \"x\"\n");
     folder.write("bad.npz", "PK\u{3}\u{4}");
+    folder.write("latin.toml", b"# A scene\nname = \"M\xFCller\"\n");
+    folder.write("utf16.toml", b"\xFF\xFEn\0a\0");
     folder.refuses(
         1,
         &[
@@ -124,6 +146,8 @@ fn what_is_not_there_is_named() {
             ("merge-dataset nowhere --out x", "nowhere"),
             ("scan nowhere.toml --out x.npz", "nowhere.toml"),
             ("scan bad.toml --out x.npz", "bad.toml"),
+            ("scan latin.toml --out x.npz", "in UTF-8, found the byte 0xFC in line 2: save it"),
+            ("profile utf16.toml", "expected text in UTF-8, found text in UTF-16: save it"),
             ("scan bad.toml --out x.las", "x.las"),
             ("preview nowhere.npz", "nowhere.npz"),
             ("gen-scenes --meshes nosuch --out x", "nosuch: no object of this recipe is of kind"),

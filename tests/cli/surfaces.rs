@@ -56,6 +56,7 @@ fn what_is_doubtful_about_a_mesh_is_told_once_by_every_command() {
         "corrupt shapes --views 1 --points 50 --severity 1 --only jitter --out corrupted",
         "gen-scenes own.toml --meshes own --sweeps 1 --out scenes",
         "gen-dataset shapes --views 1 --out data",
+        "gen-drive own.toml --meshes own --seconds 0.1 --out drive.pcap",
     ] {
         let said = folder.succeeds(words);
         let told = said.lines().filter(|line| line.contains("crossed.obj"));

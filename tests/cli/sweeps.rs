@@ -1,6 +1,6 @@
 //! `gen-scenes`, `segment` and `detect`.
 
-use crate::Folder;
+use crate::{Folder, in_repository};
 use formats::cloud_file::write_cloud;
 use formats::labelled::read_labelled;
 use serde_json::Value;
@@ -47,7 +47,7 @@ fn a_sweep_is_cut_and_its_clusters_are_named() {
     assert!(folder.bytes("clusters/preview.png").starts_with(b"\x89PNG"));
 
     let said = folder.succeeds(&format!("detect {sweep} --out objects.json"));
-    assert!(said.contains("unknown clusters"), "{said}");
+    assert!(said.contains(" other clusters: objects.json"), "{said}");
     let found: Value = serde_json::from_slice(&folder.bytes("objects.json")).unwrap();
     let objects = found["objects"].as_array().unwrap();
     assert!(!objects.is_empty());
@@ -79,26 +79,35 @@ fn a_sweep_is_cut_and_its_clusters_are_named() {
     assert!(said.contains("warning: edge-64: expected a model of clusters in metres"), "{said}");
 }
 
-/// SemanticKITTI's labels and the ASPRS's code of a class of the street.
-fn codes(class: &str) -> (&'static [u16], u8) {
-    match class {
-        "ground" => (&[49], 2),
-        "car" => (&[10], 1),
-        "truck" => (&[18], 1),
-        "person" => (&[30], 1),
-        "two-wheeler" => (&[11, 15, 31, 32], 1),
-        "building" => (&[50], 6),
-        "bush" => (&[70], 4),
-        "tree" => (&[70, 71], 5),
-        "clutter" => (&[99], 1),
-        _ => (&[13, 51, 80, 81], 1),
+/// SemanticKITTI's label (semantic-kitti.yaml) and the ASPRS's code (LAS 1.4, table 17) of a kind.
+fn codes(kind: &str) -> (u16, u8) {
+    match kind {
+        "air" => (1, 7),
+        "ground" => (49, 2),
+        "car" => (10, 1),
+        "bicycle" => (11, 1),
+        "truck" => (18, 1),
+        "person" => (30, 1),
+        "house-front" => (50, 6),
+        "wall" | "fence" | "barrier" => (51, 1),
+        "bush" | "hedge" => (70, 4),
+        "tree" => (70, 5),
+        "trunk" => (71, 5),
+        "pole" => (80, 1),
+        "traffic-cone" | "bin" | "clutter" => (99, 1),
+        _ => panic!("{kind}"),
     }
 }
 
+/// A yard in the rain. Points are compared whole, by the layouts of KITTI (four f32), of PCD's
+/// fields, and of LAS 1.2 (point format 0; scales and offsets from byte 131).
 #[test]
 fn sweeps_name_the_class_and_the_object_of_each_point() {
     let folder = Folder::new();
-    let scenes = "gen-scenes street --adapter cpu --seed 3 --sweeps 1 --save 1 --out";
+    let yard = std::fs::read_to_string(in_repository("assets/scenes/yard.toml")).unwrap();
+    let rain = "[[sensor]]\neffects = { weather = { rain_mm_h = 50 } }";
+    folder.write("rain.toml", yard.replace("[[sensor]]", rain));
+    let scenes = "gen-scenes rain.toml --adapter cpu --seed 3 --sweeps 1 --save 1 --out";
     for format in ["npz", "semantickitti", "pcd", "las"] {
         folder.succeeds(&format!("{scenes} {format} --format {format}"));
     }
@@ -106,33 +115,56 @@ fn sweeps_name_the_class_and_the_object_of_each_point() {
     let said: Value = serde_json::from_slice(&folder.bytes("las/sweeps/000000.json")).unwrap();
     let classes: Vec<String> = serde_json::from_value(said["classes"].clone()).unwrap();
     assert_eq!(classes[..2], ["air", "ground"]);
-    let pcd = folder.bytes("pcd/sweeps/000000.pcd");
-    let fields = "FIELDS x y z intensity ring label instance\nSIZE 4 4 4 4 2 4 4\n\
-                  TYPE F F F F U U U\nCOUNT 1 1 1 1 1 1 1\n";
-    assert!(String::from_utf8_lossy(&pcd[..300]).contains(fields));
-    // The bytes of a point, and where its class and object lie in it; LAS 1.2, table 5.
-    for (name, size, class_at, object_at) in [
-        ("semantickitti/sweeps/labels/000000.label", 4, 0, 2),
-        ("pcd/sweeps/000000.pcd", 26, 18, 22),
-        ("las/sweeps/000000.las", 20, 17, 18),
-    ] {
-        let file = folder.bytes(name);
-        let points = file[file.len() - size * scan.len()..].chunks_exact(size);
-        for (point, &object) in points.zip(scan.object.as_ref().unwrap()) {
-            let number = |at: usize| u16::from_le_bytes([point[at], point[at + 1]]);
-            assert_eq!(u32::from(number(object_at)), object, "{name}");
-            let of_object = (object as usize).checked_sub(1).map(|i| &said["objects"][i]["class"]);
-            let class = of_object.map_or("ground", |class| class.as_str().unwrap());
-            match size {
-                4 => assert!(codes(class).0.contains(&number(class_at)), "{class}"),
-                _ => assert_eq!(classes[usize::from(point[class_at])], class, "{name}"),
-            }
-            assert!(size != 20 || point[15] == codes(class).1, "{class}: {}", point[15]);
+    let [bin, label, pcd, las] = [
+        "semantickitti/sweeps/velodyne/000000.bin",
+        "semantickitti/sweeps/labels/000000.label",
+        "pcd/sweeps/000000.pcd",
+        "las/sweeps/000000.las",
+    ]
+    .map(|file| folder.bytes(file));
+    let n = scan.len();
+    assert_eq!([bin.len(), label.len()], [16 * n, 4 * n]);
+    let header = String::from_utf8_lossy(&pcd[..pcd.len() - 26 * n]);
+    assert!(header.contains("\nFIELDS x y z intensity ring label instance\nSIZE 4 4 4 4 2 4 4\n"));
+    assert!(header.contains("\nTYPE F F F F U U U\nCOUNT 1 1 1 1 1 1 1\n"), "{header}");
+    assert!(header.ends_with(&format!("POINTS {n}\nDATA binary\n")), "{header}");
+    let at_f64 = |at: usize| f64::from_le_bytes(las[at..at + 8].try_into().unwrap());
+    let las_at = u32::from_le_bytes(las[96..100].try_into().unwrap()) as usize;
+    assert_eq!(las.len() - las_at, 20 * n);
+    let objects = said["objects"].as_array().unwrap();
+    let (mut kinds, rings) = (std::collections::BTreeSet::new(), scan.ring.as_ref().unwrap());
+    for i in 0..n {
+        let intensity = scan.intensity.as_ref().unwrap()[i];
+        let [x, y, z] = scan.positions[i];
+        let row: Vec<u8> = [x, y, z, intensity].iter().flat_map(|x| x.to_le_bytes()).collect();
+        assert_eq!([&bin[16 * i..][..16], &pcd[pcd.len() - 26 * (n - i)..][..16]], [&row; 2]);
+
+        let object = scan.object.as_ref().unwrap()[i] as usize;
+        let named = |key| objects.get(object - 1).map_or("air", |of| of[key].as_str().unwrap());
+        let [kind, class] = if object == 0 { ["ground"; 2] } else { ["kind", "class"].map(named) };
+        let object = if kind == "air" { 0 } else { object as u32 };
+        kinds.insert(kind);
+        let class = classes.iter().position(|known| known == class).unwrap() as u32;
+        let (code, las_code) = codes(kind);
+        assert_eq!(label[4 * i..][..4], (object << 16 | u32::from(code)).to_le_bytes(), "{kind}");
+        let row = [&rings[i].to_le_bytes()[..], &class.to_le_bytes(), &object.to_le_bytes()];
+        assert_eq!(pcd[pcd.len() - 26 * (n - i) + 16..][..10], row.concat(), "{kind}");
+        let point = &las[las_at + 20 * i..][..20];
+        for (axis, &expected) in scan.positions[i].iter().enumerate() {
+            let [scale, offset] = [131, 155].map(|at| at_f64(at + 8 * axis));
+            let found = i32::from_le_bytes(point[4 * axis..][..4].try_into().unwrap());
+            let wrong = f64::from(found) * scale + offset - f64::from(expected);
+            assert!(wrong.abs() <= 0.5 * scale + 1e-9, "{wrong} m of {scale} m");
         }
+        let brightness = (65535.0 * intensity).round() as u16;
+        assert_eq!(point[12..14], brightness.to_le_bytes());
+        assert_eq!([point[15], point[17]], [las_code, class as u8], "{kind}");
+        assert_eq!(point[18..20], (object as u16).to_le_bytes());
     }
+    assert!(kinds.is_superset(&["air", "ground", "car"].into()), "{kinds:?}");
     for name in ["semantickitti/sweeps/velodyne/000000.bin", "pcd/sweeps/000000.pcd"] {
         let said = folder.succeeds(&format!("preview {name} --overwrite"));
-        assert!(said.contains(&format!("{} points", scan.len())), "{said}");
+        assert!(said.contains(&format!("{n} points")), "{said}");
     }
 }
 

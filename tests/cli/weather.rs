@@ -95,7 +95,7 @@ fn what_cannot_be_weathered_is_refused() {
             ("weather cloud.xyz --rain nan --out a.npz", "rain_mm_h: expected a number within"),
             ("weather cloud.xyz --fog 0 --out a.npz", "fog_visibility_m: expected a number within"),
             ("weather cloud.xyz --rain 5 --reflectivity 2 --out a.npz", "--reflectivity: expected"),
-            ("weather cloud.xyz --rain 5 --out a.pcap", "--out: expected .npz, .ply or .csv"),
+            ("weather cloud.xyz --rain 5 --out a.pcap", "--out: expected .npz, .ply, .csv or .pcd"),
             ("weather bright.bin --rain 5 --out a.npz", "around 0 to 1, found 200: give --white"),
             (
                 "weather cloud.xyz --rain 5 --reflectivity 1 --profile ./dark.toml --out a.npz",

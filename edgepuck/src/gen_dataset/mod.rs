@@ -8,16 +8,17 @@ mod summary;
 mod tars;
 
 use crate::caster::CasterArgs;
-use crate::{Outcome, Usage, flags, gen_shapes, signals};
+use crate::{Outcome, Usage, flags, gen_shapes, outcome, signals};
 use anyhow::Context;
-use clap::Parser;
 use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser};
 use edgepuck_dataset::{
     Begin, DatasetConfig, DatasetError, Layout, Manifest, MeshEntry, MeshFailure, PackedRecord,
     Plan, Progress, check_layouts, discover, doubts, make, verify,
 };
 use edgepuck_shapes as shapes;
 use formats::hash::Hashing;
+use formats::outputs::check_place;
 use settings::Settings;
 use shard::Shard;
 use sim_gpu::{Caster, Tally};
@@ -78,7 +79,7 @@ pub(crate) struct Args {
 
 /// The settings of a dataset that these `flags` ask for, such as `--distance=2,10`.
 pub fn config(flags: &[String]) -> anyhow::Result<DatasetConfig> {
-    Settings::try_parse_from(behind_name(flags))?.config()
+    outcome::parsed::<Settings>(Settings::command(), behind_name(flags))?.config()
 }
 
 /// A command line: the program's name and these `words`.
@@ -94,7 +95,7 @@ pub(crate) fn check_words_of_tasks(words: &[String]) -> anyhow::Result<()> {
         #[command(flatten)]
         args: Args,
     }
-    let parsed = Words::try_parse_from(behind_name(words));
+    let parsed = outcome::parsed(Words::command(), behind_name(words));
     let Words { args } = parsed.map_err(|error| match error.kind() {
         ErrorKind::DisplayHelp => Usage("--help: tasks make a dataset".to_owned()),
         _ => Usage(error.to_string().trim_start_matches("error: ").to_owned()),
@@ -130,6 +131,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
         let out = out.display();
         return Err(usage(format!("--out: {out} is the folder of the meshes: name another")));
     }
+    check_place(&out.join("manifest.json"))?;
     let caster = args.caster.caster()?;
     let plan = Plan {
         part: args.shard.map(|shard| (shard.number, shard.of)),

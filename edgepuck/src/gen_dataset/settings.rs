@@ -32,7 +32,7 @@ pub struct Settings {
 
     /// Distance from the mesh's centre to the sensor, metres; of two numbers, between which each
     /// view has one drawn [default: the sensor's own, or 3]
-    #[arg(long, value_name = "M[,M]")]
+    #[arg(long, value_name = "M[,M]", allow_hyphen_values = true)]
     distance: Option<FromTo>,
 
     /// Elevation of the sensor above the mesh, degrees; of two numbers, between which each view has
@@ -53,7 +53,7 @@ pub struct Settings {
     effects: EffectFlags,
 
     /// Diffuse reflectivity of the meshes, from 0 (black) to 1 (white)
-    #[arg(long, default_value_t = 1.0, value_name = "R", allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 1.0, value_name = "R")]
     reflectivity: f64,
 
     /// Take reflectivities from the colours of the meshes, which must be OBJ files: of the
@@ -69,7 +69,7 @@ pub struct Settings {
 
     /// File formats of each scan; NPZ is always written. `pcap` writes VLP-32C packets: it requires
     /// `--sensor vlp32c`, and all files then use the beam geometry of the packets
-    #[arg(long, value_delimiter = ',', default_value = "npz", value_name = "npz,ply,csv,pcap")]
+    #[arg(long, value_delimiter = ',', default_value = "npz", value_name = "npz,ply,csv,pcd,pcap")]
     format: Vec<ScanFormat>,
 
     /// Returns of each beam in the packets: strongest, last, or dual (both)
@@ -91,7 +91,7 @@ pub struct Settings {
     /// Remove triangles that are too small for the sensor to resolve: `auto` derives the error
     /// bound from the beams and distances; a number is the largest distance in metres that the
     /// surface may move
-    #[arg(long, value_name = "auto|M", allow_negative_numbers = true)]
+    #[arg(long, value_name = "auto|M")]
     simplify: Option<Simplify>,
 
     /// Seed of all random numbers

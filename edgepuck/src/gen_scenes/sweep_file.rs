@@ -72,11 +72,9 @@ pub fn write(
 ) -> anyhow::Result<()> {
     let (scan, number) = (&done.sweep.scan, done.scene.number);
     let file = |end: &str| sweeps.join(format!("{number:06}.{end}"));
-    if format == SweepFormat::Npz {
-        write_scan(&file("npz"), ScanFormat::Npz, Hashing::None, scan)?;
-        return Ok(());
-    }
-    let n_objects = done.scene.objects.len();
+    let (n_objects, n_classes) = (done.scene.objects.len(), classes(stage).len());
+    let is_narrow = format == SweepFormat::Las;
+    ensure!(!is_narrow || n_classes <= 256, "las: expected at most 254 classes, found {n_classes}");
     ensure!(n_objects < 1 << 16, "{format}: expected at most 65535 objects, found {n_objects}");
     let surfaces = surfaces(stage, &done.scene);
     let air = n_objects + 1;
@@ -92,6 +90,9 @@ pub fn write(
         rows::write(file, Hashing::None, header, columns).map(|_| ())
     };
     match format {
+        SweepFormat::Npz => {
+            write_scan(&file("npz"), ScanFormat::Npz, Hashing::None, scan)?;
+        }
         SweepFormat::SemanticKitti => {
             let of_pair = |folder, end| sweeps.join(format!("{folder}/{number:06}.{end}"));
             let labels = column(|s| u32::from(s.object) << 16 | u32::from(s.codes.0));
@@ -110,14 +111,15 @@ pub fn write(
             let points: Vec<_> = scan.positions.iter().map(|at| at.map(f64::from)).collect();
             formats::cloud_file::write_las(&file("las"), &points, |i| {
                 formats::cloud_file::LasPoint {
-                    intensity: (intensity[i] * f32::from(u16::MAX)) as u16,
+                    intensity: (intensity[i] * f32::from(u16::MAX)).round() as u16,
                     class: of_points[i].codes.1,
-                    user_data: u8::try_from(of_points[i].class).unwrap_or(u8::MAX),
+                    user_data: of_points[i].class as u8,
                     source: of_points[i].object,
                 }
             })?;
         }
-        _ => unreachable!("invariant: NPZ is written above, and builds without LAS refuse it"),
+        #[cfg(not(feature = "las"))]
+        SweepFormat::Las => unreachable!("invariant: builds without LAS refuse it"),
     }
     Ok(())
 }

@@ -77,6 +77,13 @@ pub fn draw(
         Circle::new(place, radius, tints[i].filled())
     });
     chart.draw_series(points).map_err(|error| anyhow!("drawing the points: {error}"))?;
+    // The points beyond the frame are not drawn either.
+    let is_shown = |outline: &&Outline<'_>| {
+        let middle = |axis: usize| outline.corners.iter().map(|at| at[axis]).sum::<f64>() / 4.0;
+        frame.extent(view.right).contains(&middle(0)) && frame.extent(view.up).contains(&middle(1))
+    };
+    let outlines: Vec<_> = outlines.iter().filter(is_shown).collect();
+    let (mut labels, right_edge) = (Vec::<[i32; 4]>::new(), below.get_pixel_range().0.end);
     for (i, Outline { corners, class, score, tint }) in outlines.iter().enumerate() {
         let corners = corners.map(|[x, y]| (x, y));
         let line = tint.stroke_width(2);
@@ -91,10 +98,22 @@ pub fn draw(
             .fold([f64::NEG_INFINITY; 2], |most, at| [most[0].max(at.0), most[1].max(at.1)]);
         let (name, style) = (format!("{class} {score:.2}"), text(15).color(tint));
         let (width, height) = below.estimate_text_size(&name, &style)?;
-        let behind = [(4, -2 - height as i32), (8 + width as i32, 2)];
+        let (width, height) = (width as i32, height as i32);
+        let (x, y) = chart.backend_coord(&(right, top));
+        let (left, mut low) = ((x + 4).min(right_edge - width - 4) - x, 2);
+        let end = left + width + 4;
+        let covers = |low: i32, [x0, x1, y0, y1]: &[i32; 4]| {
+            x + left < *x1 && *x0 < x + end && y + low - height - 4 < *y1 && *y0 < y + low
+        };
+        // Neighbouring labels stand above each other.
+        while labels.iter().any(|label| covers(low, label)) {
+            low -= height + 4;
+        }
+        labels.push([x + left, x + end, y + low - height - 4, y + low]);
+        let behind = [(left, low - height - 4), (end, low)];
         chart.draw_series([EmptyElement::at((right, top))
             + Rectangle::new(behind, WHITE.mix(0.6).filled())
-            + Text::new(name, (6, -(height as i32)), style)])?;
+            + Text::new(name, (left + 2, low - height - 2), style)])?;
     }
     if !outlines.is_empty() {
         chart

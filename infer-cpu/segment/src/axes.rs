@@ -11,6 +11,10 @@ const LEAST_GROUND: f64 = 0.2;
 /// z, to dispel the doubt: rooms and roofs have a ceiling, too.
 const CLEARLY: [f64; 2] = [3.0, 0.5];
 
+/// The fewest sectors of 10 degrees in which ground lies: a post or a wall from its edge is less wide
+/// than the view of a sensor.
+const FEWEST_SECTORS: u32 = 7;
+
 /// Why z probably does not point up in a sweep, metres from the sensor: most of its beams leave the
 /// sensor across another axis, below which more ground is found.
 #[must_use]
@@ -34,8 +38,13 @@ pub fn doubtful_axes(points: &[[f32; 3]]) -> Option<String> {
         let [ahead, aside] = [(up + 1) % 3, (up + 2) % 3].map(|axis| point[axis]);
         [ahead, sign * aside, sign * point[up]]
     };
-    let [found, other] =
-        [points.to_vec(), points.iter().map(turned).collect()].map(|points| ground(&points));
+    let turned: Vec<_> = points.iter().map(turned).collect();
+    let sector = |[x, y, _]: &[f32; 3]| (y.atan2(*x).to_degrees() + 180.0) / 10.0;
+    let sectors = turned.iter().fold(0u64, |seen, point| seen | 1 << sector(point) as u32);
+    if sectors.count_ones() < FEWEST_SECTORS {
+        return None;
+    }
+    let [found, other] = [ground(points), ground(&turned)];
     let is_across = squares[2] > CLEARLY[0] * squares[up];
     let is_doubtful = found < other * if is_across { 1.0 } else { CLEARLY[1] };
     (other >= LEAST_GROUND && is_doubtful).then(|| {

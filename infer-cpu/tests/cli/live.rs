@@ -335,6 +335,11 @@ fn what_cannot_be_listened_to_is_named() {
          them from other addresses than 10.0.0.1: 192.168.1.201",
     );
     refused(
+        "--pcap drive.pcap --mcap x.bag",
+        2,
+        "error: --mcap: expected a name with .mcap, found x.bag",
+    );
+    refused(
         "--pcap drive.pcap --twist 0 0 nan 0 0 0",
         2,
         "error: invalid value 'nan' for '--twist",
@@ -365,6 +370,11 @@ fn what_a_capture_lacks_is_told() {
         1,
         "error: cut.pcap: frame 0: expected 1248 bytes, found 96, since the capture has a snap length",
     );
+    folder.write("ends.pcap", &whole[..whole.len() - 100]);
+    let ran = folder.run(&format!("{LIVE} --pcap ends.pcap --stats"));
+    assert_eq!(ran.code, 1, "{}", ran.err);
+    assert!(ran.err.contains("753 packets; 0 lost"), "{}", ran.err);
+    assert!(ran.err.contains("error: ends.pcap: "), "{}", ran.err);
     // The flag that more fragments follow, in the last frame.
     let mut lost = whole.clone();
     let flags = lost.len() - 1248 + 20;

@@ -83,7 +83,9 @@ fn parse_as(bytes: &[u8], format: MeshFormat) -> Result<Parsed, ParseError> {
 pub fn flat(mesh: &TriangleMesh) -> Option<String> {
     let has_area = |corners: &[u32; 3]| {
         let [a, b, c] = corners.map(|corner| mesh.vertices[corner as usize]);
-        (b - a).cross(c - a) != DVec3::ZERO
+        let longest = (b - a).abs().max(c - a).max(a - c).max_element();
+        // Products of very short edges would be 0.
+        longest > 0.0 && ((b - a) / longest).cross((c - a) / longest) != DVec3::ZERO
     };
     (!mesh.triangles.iter().any(has_area))
         .then(|| "no triangle has an area, so that no beam can hit the mesh".to_owned())

@@ -3,7 +3,7 @@ use std::path::PathBuf;
 use crate::clouds::Clouds;
 use crate::recipe::Recipe;
 use crate::run::{Job, points_to_read};
-use formats::outputs::{Overwrite, need_extension};
+use formats::outputs::{Overwrite, check_place, need_extension};
 use formats::split::Split;
 
 use super::Usage;
@@ -109,7 +109,7 @@ fn check_output(args: &TrainArgs) -> anyhow::Result<()> {
     if !args.overwrite && !checkpoint.is_file() {
         Overwrite::default().check([&*args.out])?;
     }
-    Ok(())
+    Ok(check_place(&args.out)?)
 }
 
 fn recipe(args: &TrainArgs) -> anyhow::Result<Recipe> {

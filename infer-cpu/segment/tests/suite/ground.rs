@@ -182,6 +182,7 @@ fn the_height_of_the_ground_is_known_between_the_beams() {
 /// A road beside a house, a wall alone, and a ceiling above a floor, in right and wrong axes.
 #[test]
 fn axes_are_doubted_if_another_one_points_up() {
+    // A floor and a ceiling are alike, and so are the sides of a post.
     let house = || block([30.0, 12.0], [60.0, 8.0], 0.0, 9.0);
     let wall = || block([5.0, 0.0], [0.2, 20.0], 0.0, 4.0);
     let ceiling = || block([0.0, 0.0], [30.0, 30.0], 2.6, 0.2);
@@ -197,11 +198,11 @@ fn axes_are_doubted_if_another_one_points_up() {
             (vec![flat(), house()], true),
             (vec![flat(), wall()], true),
             (vec![wall()], false),
+            (vec![block([4.0, 0.0], [0.2, 0.1], 0.0, 6.0)], false),
             (vec![flat(), ceiling()], true),
         ] {
             let points = scan(&VLP32C, &surfaces).points.into_iter().map(turn);
             let said = doubtful_axes(&points.collect::<Vec<_>>());
-            // A floor and a ceiling are alike.
             let expected = up.filter(|_| has_ground);
             assert_eq!(said.is_some(), expected.is_some(), "{up:?}: {said:?}");
             assert!(said.unwrap_or_default().contains(expected.unwrap_or_default()));

@@ -15,6 +15,7 @@ use crate::live::{EgoMotion, Flaw, LiveOptions, Pipeline, Recorder, Timeline};
 use crate::{Classifier, Options, Precision};
 use formats::FormatError;
 use formats::ouster::Metadata;
+use formats::outputs::need_extension;
 use glam::DVec3;
 use signal_hook::consts::{SIGINT, SIGTERM};
 
@@ -51,8 +52,9 @@ probability of `resembles` from this cluster alone, or null), probability (the s
 clusters of the track), frame (of position, yaw and velocity: sensor, or world with --poses or
 --twist), position_m (the middle of the box around the points), size_m (length, width, height),
 yaw_deg (direction of the length, -90 to 90), velocity_m_s (null at first; relative to the sensor in
-its frame), points, range_m, first_s and last_s (Unix time of the first and the last point by the
-sensor's clock), latency_ms (from the arrival of the packet with the last point to this line; null
+its frame), points, range_m, first_s and last_s (Unix time of the first and the last point: the
+sensor's stamps give the intervals, and the clock of this machine or of the capture gives the
+start), latency_ms (from the arrival of the packet with the last point to this line; null
 without --udp or --realtime).
 
 SIGTERM and Ctrl-C end the program after the last objects, with exit status 0. As a service of
@@ -110,7 +112,7 @@ pub struct LiveArgs {
     /// Steady motion of the sensor in its own frame, in place of poses: metres and degrees per
     /// second
     #[arg(long, num_args = 6, value_names = ["VX", "VY", "VZ", "WX", "WY", "WZ"])]
-    #[arg(allow_negative_numbers = true, value_parser = rate)]
+    #[arg(value_parser = rate)]
     twist: Option<Vec<f64>>,
 
     /// Fewest points of a cluster that is classified
@@ -187,12 +189,13 @@ pub fn run(args: &LiveArgs) -> anyhow::Result<Outcome> {
         !is_over.load(Ordering::Relaxed) && outputs.are_wanted() && uncovered.is_none()
     });
     let ended = outputs.end(&pipeline);
-    let read = read?;
+    let mut read = read?;
     ended?;
     uncovered.map_or(Ok(()), Err)?;
-    if args.stats {
+    if args.stats && read.n_packets > 0 {
         report::print(&pipeline, &read);
     }
+    read.error.take().map_or(Ok(()), Err)?;
     if !args.stats && read.capture.first_unread.is_some() {
         eprintln!("warning: {} UDP packets{}", read.n_packets, read.capture);
     }
@@ -286,6 +289,9 @@ impl LiveArgs {
     }
 
     fn outputs(&self) -> anyhow::Result<Outputs> {
+        if let Some(file) = self.mcap.as_deref().filter(|file| file.extension().is_some()) {
+            need_extension("--mcap", file, &["mcap"])?;
+        }
         let recorder = self.mcap.as_deref().map(Recorder::create).transpose()?;
         let prints = self.json || !(self.stats || recorder.is_some());
         Ok(Outputs::new(prints, recorder))

@@ -88,6 +88,8 @@ pub struct Read {
     pub capture: pcap::Counts,
     /// Packets that were dropped because the queue was full.
     pub n_overrun: u64,
+    /// Why a capture was read no further.
+    pub error: Option<anyhow::Error>,
 }
 
 /// A thread that receives packets, and their queue.
@@ -134,7 +136,7 @@ impl Source {
     pub fn run(self, mut take: impl FnMut(Tick<'_>) -> bool) -> anyhow::Result<Read> {
         let read = match self {
             Self::Udp(listener) => listener.run(&mut take)?,
-            Self::Capture { file, sensor, timeline } => replay(&file, sensor, timeline, &mut take)?,
+            Self::Capture { file, sensor, timeline } => replay(&file, sensor, timeline, &mut take),
         };
         take(Tick::End);
         Ok(read)
@@ -245,9 +247,9 @@ fn replay(
     mut sensor: Sensor,
     mut timeline: Option<Box<Timeline>>,
     take: &mut impl FnMut(Tick<'_>) -> bool,
-) -> anyhow::Result<Read> {
+) -> Read {
     let (mut read, start, mut first_s) = (Read::default(), Instant::now(), None);
-    let capture = pcap::read(file, |packet| {
+    let ended = pcap::read(file, |packet| {
         read.n_packets += 1;
         if !sensor.sent(&packet.payload, packet.source) {
             return ControlFlow::Continue(());
@@ -266,6 +268,7 @@ fn replay(
             true => ControlFlow::Continue(()),
             false => ControlFlow::Break(()),
         }
-    })?;
-    Ok(Read { senders: sensor.senders, capture, ..read })
+    });
+    let error = ended.map(|capture| read.capture = capture).err().map(anyhow::Error::from);
+    Read { senders: sensor.senders, error, ..read }
 }
