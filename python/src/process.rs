@@ -129,9 +129,7 @@ impl LazyCaster {
 /// The names of the adapters that can cast, the CPU last.
 #[pyfunction]
 pub fn adapters(py: Python<'_>) -> Vec<String> {
-    let found = py.detach(sim_gpu::internals::gpu::list_adapters);
-    let names = found.into_iter().map(|adapter| adapter.name);
-    names.chain(["cpu".to_owned()]).collect()
+    py.detach(Caster::adapters)
 }
 
 /// Run a command of the program `edgepuck`, whose name comes first, and raise what it reports.

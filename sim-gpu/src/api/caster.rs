@@ -72,6 +72,22 @@ impl Caster {
         }
     }
 
+    /// The names of the adapters that there are, best first, and `cpu` at the end:
+    /// [`Caster::named`] takes each.
+    ///
+    /// ```
+    /// # use sim_gpu::Caster;
+    /// assert_eq!(Caster::adapters().last().unwrap(), Caster::cpu().name());
+    /// ```
+    #[must_use]
+    pub fn adapters() -> Vec<String> {
+        #[cfg(feature = "gpu")]
+        let found = crate::gpu::list_adapters().into_iter().map(|adapter| adapter.name);
+        #[cfg(not(feature = "gpu"))]
+        let found = std::iter::empty();
+        found.chain(["cpu".to_owned()]).collect()
+    }
+
     /// The adapter's name, or `cpu`.
     #[must_use]
     pub fn name(&self) -> &str {
