@@ -238,7 +238,7 @@ fn manifests_that_are_missing_or_invalid_are_refused() {
     miscounting.write(&layout::manifest(out)).unwrap();
     let problems = verify(out).unwrap().problems;
     assert!(problems.iter().all(|problem| problem.what == expected), "{problems:?}");
-    assert_eq!(problems.len(), 3, "one for each format");
+    assert_eq!(problems.len(), 4, "one for each format");
 
     let refused = |change: &dyn Fn(&mut Manifest)| {
         let mut changed = manifest.clone();

@@ -62,8 +62,6 @@ impl ScanFormat {
     }
 }
 
-const PACKETS: &str = "packets hold a sensor's ranges, not points";
-
 /// Writes `scan` to `path`, atomically, and returns the file's hash. Equal scans give equal bytes.
 ///
 /// # Errors
@@ -101,7 +99,10 @@ pub fn write_scan(
             rows::write(path, hashing, &header, &columns)
         }
         ScanFormat::Csv => csv::write_scan(path, hashing, scan),
-        ScanFormat::Pcap => Err(FormatError::malformed(path, "extension", PACKETS)),
+        ScanFormat::Pcap => {
+            let cause = "packets hold a sensor's ranges, not points: `edgepuck scan` writes them";
+            Err(FormatError::malformed(path, "extension", cause))
+        }
     }
 }
 
@@ -117,7 +118,7 @@ pub fn read_scan(path: &Path) -> Result<Scan, FormatError> {
         ScanFormat::Ply => ply::read_scan(path),
         ScanFormat::Csv => refuse("CSV is written but not read"),
         ScanFormat::Pcd => refuse("PCD is read as a cloud, without attributes"),
-        ScanFormat::Pcap => refuse(PACKETS),
+        ScanFormat::Pcap => refuse("packets hold a sensor's ranges, not points"),
     }
 }
 

@@ -105,9 +105,6 @@ pub fn scan_of(columns: &Bound<'_, PyDict>) -> PyResult<Scan> {
 #[pyfunction]
 pub fn save_scan(path: PathBuf, columns: &Bound<'_, PyDict>) -> PyResult<()> {
     let format = ScanFormat::of_path(&path).map_err(raised)?;
-    if format == ScanFormat::Pcap {
-        return Err(raised(format!("{}: `edgepuck scan` writes packets", path.display())));
-    }
     write_scan(&path, format, Hashing::None, &scan_of(columns)?).map_err(raised)?;
     Ok(())
 }

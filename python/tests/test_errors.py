@@ -29,6 +29,7 @@ CUBE = ep.Mesh(*ep.box((1, 1, 1)))
         (lambda: ep.Classifier("edge-65"), "edge-65: name: expected a model file, or one of edge-64, street-128"),
         (lambda: ep.Scenes("streets"), "expected a recipe's file, or one of"),
         (lambda: ep.Sensor("vlp32c").scan(ep.Mesh(*ep.box((1, 1, 1)))).save("x.las"), "x.las"),
+        (lambda: ep.Sensor("vlp32c").scan(CUBE).save("x.pcap"), "`edgepuck scan` writes them"),
         (lambda: ep.Classifier("edge-64", precision="i9"), "i9"),
         (lambda: ep.Classifier("edge-64")(np.zeros((5, 2))), "expected points of shape"),
         (lambda: ep.Classifier("edge-64")(np.zeros(5)), "expected points of shape"),

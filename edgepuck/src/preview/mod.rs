@@ -144,4 +144,23 @@ mod tests {
         let heading = row_heading("noisy", &noisy, &frame);
         assert_eq!(heading, "noisy: 3 points, 2 of them outside the frame");
     }
+
+    #[test]
+    fn boxes_outside_the_frame_are_not_drawn() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("above.png");
+        let scan = sphere(99, false);
+        let picture = |corners: Option<[f64; 2]>| {
+            let [low, high] = corners.unwrap_or_default();
+            let corners = [[low, 0.0], [high, 0.0], [high, 0.5], [low, 0.5]];
+            let tint = plotters::style::RGBColor(9, 9, 9);
+            let outline = panel::Outline { corners, class: "car", score: 0.5, tint };
+            let outlines = if high > low { vec![outline] } else { vec![] };
+            draw_from_above(&scan, &[tint; 99], &outlines, "", &out).unwrap();
+            fs::read(&out).unwrap()
+        };
+        let without = picture(None);
+        assert!(picture(Some([900.0, 901.0])) == without);
+        assert!(picture(Some([0.0, 0.5])) != without);
+    }
 }
