@@ -5,6 +5,7 @@
 //! shards and the order of evaluation. The key names the stream, and the counter the number in it.
 
 use sha2::{Digest, Sha256};
+use std::fmt::{Arguments, Write};
 
 const MULTIPLIER: [u32; 2] = [0xD251_1F53, 0xCD9E_8D57];
 const WEYL: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];
@@ -22,11 +23,16 @@ impl StreamKey {
     /// names have unrelated keys.
     #[must_use]
     pub fn new(seed: u64, name: &str, index: u32) -> Self {
-        let mut hash = Sha256::new();
-        hash.update(seed.to_le_bytes());
-        hash.update(index.to_le_bytes());
-        hash.update(name.as_bytes());
-        let digest = hash.finalize();
+        Self::named(seed, format_args!("{name}"), index)
+    }
+
+    /// As [`StreamKey::new`]. It allocates no memory, since samplers draw for each cloud.
+    pub(crate) fn named(seed: u64, name: Arguments<'_>, index: u32) -> Self {
+        let mut hash = Hashed(Sha256::new());
+        hash.0.update(seed.to_le_bytes());
+        hash.0.update(index.to_le_bytes());
+        hash.write_fmt(name).expect("invariant: to write to a hash never fails");
+        let digest = hash.0.finalize();
         let word =
             |i: usize| u32::from_le_bytes([digest[i], digest[i + 1], digest[i + 2], digest[i + 3]]);
         Self([word(0), word(4)])
@@ -60,6 +66,16 @@ impl StreamKey {
         let [low, high, ..] = self.words([n as u32, (n >> 32) as u32, 0, 1]);
         let bits = (u64::from(high) << 32 | u64::from(low)) >> 11;
         bits as f64 * (1.0 / (1u64 << 53) as f64)
+    }
+}
+
+/// A hash of what is written.
+struct Hashed(Sha256);
+
+impl Write for Hashed {
+    fn write_str(&mut self, text: &str) -> std::fmt::Result {
+        self.0.update(text.as_bytes());
+        Ok(())
     }
 }
 

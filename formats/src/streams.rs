@@ -22,7 +22,7 @@ macro_rules! streams {
             #[must_use]
             pub fn key(self, seed: u64) -> StreamKey {
                 match self {
-                    $(Self::$stream { $($field),* } => StreamKey::new(seed, &format!($name), $index),)+
+                    $(Self::$stream { $($field),* } => StreamKey::named(seed, format_args!($name), $index),)+
                 }
             }
         }
