@@ -4,6 +4,7 @@
 use crate::shell::posix_quoted;
 use crate::{Outcome, Usage, gen_dataset};
 use edgepuck_assets::{HYPERQUEUE_JOB, KUBERNETES_JOB, SLURM_JOB, TASK_SCRIPT};
+use std::io::Write;
 
 formats::named! {
     /// A program that runs tasks on a cluster.
@@ -53,7 +54,7 @@ pub struct ClusterArgs {
 }
 
 pub fn run(args: &ClusterArgs) -> anyhow::Result<Outcome> {
-    print!("{}", job_file(args)?);
+    std::io::stdout().write_all(job_file(args)?.as_bytes())?;
     Ok(Outcome::Success)
 }
 

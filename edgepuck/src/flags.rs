@@ -20,6 +20,11 @@ pub fn first_given(flags: &[(bool, &'static str)]) -> Option<&'static str> {
     flags.iter().find(|(is_given, _)| *is_given).map(|(_, flag)| *flag)
 }
 
+/// Parses a finite number.
+pub fn finite(word: &str) -> Result<f64, String> {
+    number(word, |x| x.is_finite(), "a finite number")
+}
+
 /// Parses a finite number above 0.
 pub fn positive(word: &str) -> Result<f64, String> {
     number(word, |x| *x > 0.0 && x.is_finite(), "a finite number above 0")

@@ -2,6 +2,8 @@
 
 mod sweep_file;
 
+use std::ffi::OsStr;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -66,7 +68,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     ensure!(args.format != SweepFormat::Las || cfg!(feature = "las"), Usage(cause));
     let mut recipe = read_recipe(&args.recipe)?;
     let outputs = ["packed", "sweeps"].map(|folder| args.out.join(folder));
-    args.overwrite.clear(outputs.iter().map(PathBuf::as_path))?;
+    args.overwrite.clear(outputs.iter().map(PathBuf::as_path), is_written)?;
     recipe.use_sensors(&args.sensor);
     let meshes = args.meshes.as_deref();
     let caster = args.caster.caster()?;
@@ -105,9 +107,10 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
         n_points / args.sweeps as usize,
         f64::from(args.sweeps) / seconds
     );
-    println!("{:<16} {:>9} {:>9}", "class", "train", "test");
+    let mut out = std::io::stdout().lock();
+    writeln!(out, "{:<16} {:>9} {:>9}", "class", "train", "test")?;
     for ((class, train), test) in stage.classes().iter().zip(&counts.train).zip(&counts.test) {
-        println!("{class:<16} {train:>9} {test:>9}");
+        writeln!(out, "{class:<16} {train:>9} {test:>9}")?;
     }
     if counts.test.iter().all(|n| *n == 0) {
         eprintln!("warning: no cluster is in the test part, which has every tenth of --sweeps");
@@ -118,6 +121,19 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
         args.out.join("preview.png").display()
     );
     Ok(Outcome::Success)
+}
+
+/// Whether this command writes files of this name: packed clusters, and sweeps by their numbers.
+fn is_written(file: &Path) -> bool {
+    let text = |part: Option<&OsStr>| part.unwrap_or_default().to_string_lossy().into_owned();
+    let (stem, extension) = (text(file.file_stem()), text(file.extension()));
+    match &*extension {
+        "npz" if ["train", "test"].contains(&&*stem) => true,
+        "npz" | "json" | "bin" | "label" | "pcd" | "las" => {
+            stem.len() == 6 && stem.parse::<u32>().is_ok()
+        }
+        _ => false,
+    }
 }
 
 /// Reads a built-in recipe by its name, or the recipe in a file.

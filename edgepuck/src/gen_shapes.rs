@@ -4,7 +4,7 @@ use crate::Outcome;
 use anyhow::Context;
 use edgepuck_shapes as shapes;
 use formats::outputs::Overwrite;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -36,7 +36,15 @@ pub const TEST_PER_CLASS: u32 = 10;
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let classes = shapes::ShapeClass::ALL.map(|class| args.out.join(class.name()));
-    args.overwrite.clear(classes.iter().map(PathBuf::as_path))?;
+    let is_shape = |file: &Path| {
+        // CLASS/SPLIT/CLASS_NUMBER.off
+        let class = file.ancestors().nth(2).and_then(Path::file_name).unwrap_or_default();
+        let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+        let number = stem.strip_prefix(&format!("{}_", class.to_string_lossy()));
+        file.extension().is_some_and(|extension| extension == "off")
+            && number.is_some_and(|number| number.parse::<u32>().is_ok())
+    };
+    args.overwrite.clear(classes.iter().map(PathBuf::as_path), is_shape)?;
     shapes::write_tree(&args.out, args.seed, args.train, args.test)
         .context("cannot write the shapes")?;
     let classes = shapes::ShapeClass::ALL.len() as u32;

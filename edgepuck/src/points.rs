@@ -5,7 +5,9 @@ use std::net::IpAddr;
 use std::path::{Path, PathBuf};
 
 use edgepuck_segment::doubtful_axes;
-use formats::cloud_file::{CloudFormat, check_sweep, read_cloud_as, read_intensities};
+use formats::cloud_file::{
+    CloudFormat, check_sweep, read_cloud_as, read_intensities, read_viewpoint,
+};
 use formats::scan_file::read_scan;
 use formats::{FormatError, Scan, Senders, ouster, pcap, velodyne};
 
@@ -33,7 +35,7 @@ pub struct PlaceArgs {
     points: PointsArgs,
 
     /// Position of the sensor in the sweep, in metres [default: that of the scan's file, or 0 0 0]
-    #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"])]
+    #[arg(long, num_args = 3, value_names = ["X", "Y", "Z"], value_parser = crate::flags::finite)]
     sensor: Option<Vec<f64>>,
 }
 
@@ -68,7 +70,8 @@ impl PointsArgs {
             Some(scan) => Scan { origin, positions, ..scan },
             None => {
                 let intensity = read_intensities(file, self.format)?;
-                Scan { origin, positions, intensity, ..Scan::default() }
+                let pose = read_viewpoint(file, self.format)?;
+                Scan { origin, positions, intensity, pose, ..Scan::default() }
             }
         })
     }

@@ -5,7 +5,8 @@ use formats::outputs::{Overwrite, need_extension};
 use glam::DVec3;
 use sim_gpu::glam;
 use sim_gpu::internals::sensor::{BeamPattern, Layout, SensorProfile, builtin_names};
-use std::fmt::Write;
+use std::fmt::Write as _;
+use std::io::Write as _;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -27,10 +28,11 @@ pub struct ProfileArgs {
 /// Lists the built-in sensors, or describes one sensor. Prints warnings about unusual values of a
 /// valid profile to standard error.
 pub fn run(args: &ProfileArgs) -> anyhow::Result<Outcome> {
+    let mut out = std::io::stdout().lock();
     let Some(name) = &args.sensor else {
         for name in builtin_names() {
             let sensor = SensorProfile::builtin(name).expect("invariant: a built-in name");
-            println!("{name:<20} {}", sensor.description);
+            writeln!(out, "{name:<20} {}", sensor.description)?;
         }
         return Ok(Outcome::Success);
     };
@@ -38,7 +40,7 @@ pub fn run(args: &ProfileArgs) -> anyhow::Result<Outcome> {
     args.overwrite.check(args.beams.as_deref())?;
     let sensor = SensorProfile::resolve(name)?;
     let pattern = sensor.pattern();
-    print!("{}", described(&sensor, &pattern));
+    out.write_all(described(&sensor, &pattern).as_bytes())?;
     for oddity in oddities(&sensor, &pattern) {
         eprintln!("warning: {oddity}");
     }

@@ -1,7 +1,7 @@
 //! The one rule for outputs that exist already, and for the names of outputs.
 
 use crate::outcome::Usage;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The flag of commands that write files.
 #[derive(clap::Args, Debug, Default)]
@@ -28,19 +28,45 @@ impl Overwrite {
         })
     }
 
-    /// As [`Overwrite::check`]; removes the folders that are there.
+    /// As [`Overwrite::check`]; removes the folders that are there, if all files in them are those
+    /// of an earlier run, `is_ours`.
     ///
     /// # Errors
-    /// As [`Overwrite::check`], or a folder cannot be removed.
-    pub fn clear<'a>(&self, folders: impl IntoIterator<Item = &'a Path>) -> anyhow::Result<()> {
-        for folder in folders {
-            self.check([folder])?;
-            if folder.exists() {
-                std::fs::remove_dir_all(folder)?;
+    /// As [`Overwrite::check`], a folder has another file, or it cannot be removed.
+    pub fn clear<'a>(
+        &self,
+        folders: impl IntoIterator<Item = &'a Path>,
+        is_ours: impl Fn(&Path) -> bool,
+    ) -> anyhow::Result<()> {
+        let folders: Vec<&Path> = folders.into_iter().collect();
+        self.check(folders.iter().copied())?;
+        for folder in folders.iter().filter(|folder| folder.exists()) {
+            if let Some(other) = other_file(folder, &is_ours)? {
+                let cause = "another file than this command writes is in a folder to replace: \
+                             move it, or choose another --out";
+                return Err(Usage(format!("{}: {cause}", other.display())).into());
             }
+        }
+        for folder in folders.into_iter().filter(|folder| folder.exists()) {
+            std::fs::remove_dir_all(folder)?;
         }
         Ok(())
     }
+}
+
+/// A file in `folder` or below that is not `is_ours`.
+fn other_file(folder: &Path, is_ours: &impl Fn(&Path) -> bool) -> std::io::Result<Option<PathBuf>> {
+    for entry in std::fs::read_dir(folder)? {
+        let path = entry?.path();
+        let other = match path.is_dir() && !path.is_symlink() {
+            true => other_file(&path, is_ours)?,
+            false => (!is_ours(&path)).then_some(path),
+        };
+        if other.is_some() {
+            return Ok(other);
+        }
+    }
+    Ok(None)
 }
 
 /// Checks that the output `path` can be made: in it, if it is a folder, or else in the nearest

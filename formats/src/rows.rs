@@ -67,9 +67,10 @@ pub fn ply_header(origin: [f64; 3], pose: Option<[f64; 16]>, columns: &Columns<'
     header + "end_header\n"
 }
 
-/// The header of PCD 0.7.
+/// The header of PCD 0.7. The `pose` of the sensor is its VIEWPOINT, a translation and a quaternion
+/// w, x, y, z; PCL leaves the points where they are.
 #[must_use]
-pub fn pcd_header(columns: &Columns<'_>) -> String {
+pub fn pcd_header(pose: Option<[f64; 16]>, columns: &Columns<'_>) -> String {
     let lines = ["FIELDS", "SIZE", "TYPE", "COUNT"].map(|key| {
         let words = columns.iter().flat_map(|(names, column)| {
             let [_, kind, size] = types(column);
@@ -83,11 +84,34 @@ pub fn pcd_header(columns: &Columns<'_>) -> String {
         format!("{key} {}\n", words.collect::<Vec<_>>().join(" "))
     });
     let n = n_points(columns);
+    let viewpoint = pose.map_or([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], viewpoint_of);
+    let viewpoint = viewpoint.map(|x| x.to_string()).join(" ");
     format!(
         "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\n{}WIDTH {n}\nHEIGHT 1\n\
-         VIEWPOINT 0 0 0 1 0 0 0\nPOINTS {n}\nDATA binary\n",
+         VIEWPOINT {viewpoint}\nPOINTS {n}\nDATA binary\n",
         lines.concat()
     )
+}
+
+/// The position of a pose and its rotation as a quaternion w, x, y, z.
+fn viewpoint_of(pose: [f64; 16]) -> [f64; 7] {
+    let m = |row: usize, column: usize| pose[4 * row + column];
+    let trace = m(0, 0) + m(1, 1) + m(2, 2);
+    let largest = (0..3).fold(0, |best, i| if m(i, i) > m(best, best) { i } else { best });
+    // Shepperd's method: divides by the largest of the four.
+    let mut q = [0.0; 4];
+    if trace > m(largest, largest) {
+        let s = 2.0 * (1.0 + trace).sqrt();
+        q = [s / 4.0, (m(2, 1) - m(1, 2)) / s, (m(0, 2) - m(2, 0)) / s, (m(1, 0) - m(0, 1)) / s];
+    } else {
+        let [i, j, k] = [0, 1, 2].map(|step| (largest + step) % 3);
+        let s = 2.0 * (1.0 + m(i, i) - m(j, j) - m(k, k)).sqrt();
+        q[0] = (m(k, j) - m(j, k)) / s;
+        q[1 + i] = s / 4.0;
+        q[1 + j] = (m(j, i) + m(i, j)) / s;
+        q[1 + k] = (m(k, i) + m(i, k)) / s;
+    }
+    [m(0, 3), m(1, 3), m(2, 3), q[0], q[1], q[2], q[3]]
 }
 
 /// The type of a column's numbers in PLY, and the type and the size in PCD.

@@ -93,7 +93,7 @@ pub fn write_scan(
             let positions = (rows::AXES.to_vec(), Column::Vector(&scan.positions));
             let columns: Vec<_> = std::iter::once(positions).chain(attributes).collect();
             let header = match format {
-                ScanFormat::Pcd => rows::pcd_header(&columns),
+                ScanFormat::Pcd => rows::pcd_header(scan.pose, &columns),
                 _ => rows::ply_header(scan.origin, scan.pose, &columns),
             };
             rows::write(path, hashing, &header, &columns)

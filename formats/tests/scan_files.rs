@@ -68,6 +68,32 @@ fn pcd_has_the_fields_of_a_scan() {
     assert_eq!(found, expected, "{}", String::from_utf8_lossy(&found));
     let wide: Vec<_> = scan.positions.iter().map(|point| point.map(f64::from)).collect();
     assert_eq!(formats::cloud_file::read_cloud(&path).unwrap(), wide);
+    // A sensor that looks left from (20, 0, 1.7), one that looks back, and one on its head.
+    let half = 0.5f64.sqrt();
+    for (rotation, quaternion) in [
+        ([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]], [half, 0.0, 0.0, half]),
+        ([[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]], [0.0, 0.0, 0.0, 1.0]),
+        ([[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]], [0.0, 1.0, 0.0, 0.0]),
+    ] {
+        let place = [20.0, 0.0, 1.7];
+        let mut pose = [0.0; 16];
+        (0..3).for_each(|row| {
+            pose[4 * row..4 * row + 3].copy_from_slice(&rotation[row]);
+            pose[4 * row + 3] = place[row];
+        });
+        pose[15] = 1.0;
+        scan.pose = Some(pose);
+        write_scan(&path, ScanFormat::Pcd, Hashing::None, &scan).unwrap();
+        let bytes = fs::read(&path).unwrap();
+        let header = String::from_utf8_lossy(&bytes[..400]).into_owned();
+        let line = header.lines().find_map(|line| line.strip_prefix("VIEWPOINT ")).unwrap();
+        let numbers: Vec<f64> = line.split(' ').map(|word| word.parse().unwrap()).collect();
+        let near = |a: f64, b: f64| (a - b).abs() < 1e-15;
+        let expected = [&place[..], &quaternion].concat();
+        assert!(numbers.iter().zip(expected).all(|(a, b)| near(*a, b)), "{line}");
+        let read = formats::cloud_file::read_viewpoint(&path, None).unwrap().unwrap();
+        assert!(read.iter().zip(pose).all(|(a, b)| near(*a, b)), "{read:?}");
+    }
     scan.origin = [1e6, 0.0, 0.0];
     let error = write_scan(&path, ScanFormat::Pcd, Hashing::None, &scan).unwrap_err();
     assert!(error.to_string().contains("origin: PCD has no place for the origin"), "{error}");

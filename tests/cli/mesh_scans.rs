@@ -48,6 +48,15 @@ fn a_mesh_in_millimetres_is_read_by_its_unit_or_warned_of() {
     ] {
         assert!(said.contains(part), "{said}");
     }
+    let sensor = "[[sensor]]\nprofile = \"vlp32c\"\nposition_m = [-2, 0, 0.5]\nyaw_deg = 0\n";
+    for (units, is_doubted) in [("", true), ("units = \"mm\"\n", false)] {
+        let object = format!("[[object]]\nmesh = \"mm.obj\"\nup = \"z\"\n{units}");
+        folder.write("scene.toml", object + sensor);
+        let output =
+            folder.edgepuck("scan scene.toml --out s.npz --overwrite --adapter cpu").output();
+        let said = String::from_utf8_lossy(&output.unwrap().stderr).into_owned();
+        assert_eq!(said.contains("mm.obj: expected a size of 1 cm to 100 m"), is_doubted, "{said}");
+    }
     let said = folder.exits(3, "scan m.obj --distance 900 --out none.npz --adapter cpu");
     assert!(said.contains("no beam returned a point"), "{said}");
 }

@@ -32,6 +32,13 @@ fn scenes_are_scanned_cut_labelled_and_packed_alike_every_time() {
     let scan = folder.scan("one/sweeps/000001.npz");
     let on_objects = scan.object.unwrap().iter().filter(|&&object| object > 0).count() as u64;
     assert_eq!(points, on_objects);
+
+    // Every tenth sweep is in the test part. Training ends with a test, and says so at once.
+    folder.succeeds("gen-scenes yard --adapter cpu --sweeps 9 --save 0 --out few");
+    folder.write("metric.toml", "points = 16\nnormalization = \"metric\"\n");
+    let said = folder.exits(1, "train --data few/packed --recipe metric.toml --out m.safetensors");
+    assert!(said.contains("its test part is empty") && !said.contains("epoch 1"), "{said}");
+    assert!(!folder.at("m.run").exists());
 }
 
 #[test]
@@ -39,6 +46,11 @@ fn a_sweep_is_cut_and_its_clusters_are_named() {
     let folder = Folder::new();
     let said = folder.succeeds("gen-scenes --adapter cpu --sweeps 1 --save 1 --out scenes");
     assert!(said.contains("warning: no cluster is in the test part"), "{said}");
+    // Files of others stay, whatever is replaced.
+    std::fs::write(folder.at("scenes/sweeps/mine.bin"), "mine").unwrap();
+    let said = folder.exits(2, "gen-scenes --adapter cpu --sweeps 1 --out scenes --overwrite");
+    assert!(said.contains("mine.bin: another file than this command writes"), "{said}");
+    assert!(folder.at("scenes/packed/train.npz").exists());
     let sweep = "scenes/sweeps/000000.npz";
     let said = folder.succeeds(&format!("segment {sweep} --out clusters"));
     assert!(said.contains("clusters, "), "{said}");

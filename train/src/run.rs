@@ -99,6 +99,9 @@ impl Job<'_> {
             );
             return Err(Error::Data { path: data.into(), cause });
         }
+        // A run ends with its test, which would fail after hours.
+        let classes = recipe.classes(&all.classes);
+        test.map(|path| read_test(recipe, &classes, path, data)).transpose()?;
         let folder = out.with_extension("run");
         fs::create_dir_all(&folder).map_err(|source| FormatError::io(&folder, source))?;
         atomic::sweep_leftovers(&folder)?;
@@ -108,6 +111,25 @@ impl Job<'_> {
         }
         run.finish(&self, test, &clouds, &held)
     }
+}
+
+/// The clouds of the test at `path`, which have the `classes` of a network for `data`, and the
+/// number of classes that they themselves have.
+fn read_test(
+    recipe: &Recipe,
+    classes: &[String],
+    path: &Path,
+    data: &str,
+) -> Result<(Clouds, usize), Error> {
+    let most_points = points_to_read(recipe);
+    let mut clouds = Clouds::read_for(recipe.normalization, path, Split::Test, most_points)?;
+    let n_classes = clouds.classes.len();
+    clouds.classes = recipe.classes(&clouds.classes);
+    if clouds.classes != classes {
+        let cause = format!("expected the classes of {data}, found {:?}", clouds.classes);
+        return Err(Error::Data { path: path.to_path_buf(), cause });
+    }
+    Ok((clouds, n_classes))
 }
 
 fn check(clouds: &Clouds, recipe: &Recipe, data: &str) -> Result<(), Error> {
@@ -314,15 +336,7 @@ impl<'a> Run<'a> {
     }
 
     fn test(&self, model: &Path, test: &Path, data: &str) -> Result<String, Error> {
-        let recipe = &self.trainer.recipe;
-        let most_points = points_to_read(recipe);
-        let mut clouds = Clouds::read_for(recipe.normalization, test, Split::Test, most_points)?;
-        let n_classes = clouds.classes.len();
-        clouds.classes = recipe.classes(&clouds.classes);
-        if clouds.classes != self.classes {
-            let cause = format!("expected the classes of {data}, found {:?}", clouds.classes);
-            return Err(Error::Data { path: test.to_path_buf(), cause });
-        }
+        let (clouds, n_classes) = read_test(&self.trainer.recipe, &self.classes, test, data)?;
         Ok(accuracy_report::summary(
             &confusion(model, &clouds, &Options::default())?,
             n_classes,

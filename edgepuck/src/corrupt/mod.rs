@@ -11,6 +11,7 @@ use crate::{Outcome, Usage};
 use formats::outputs::Overwrite;
 use plan::{Entry, Plan};
 use sim_gpu::Sensor;
+use std::io::Write;
 use std::path::PathBuf;
 
 #[derive(clap::Args)]
@@ -69,7 +70,7 @@ pub struct CorruptArgs {
 pub fn run(args: &CorruptArgs) -> anyhow::Result<Outcome> {
     let plan = Plan::read(args.plan.as_deref())?;
     if args.list {
-        print!("{}", listed(&plan));
+        std::io::stdout().write_all(listed(&plan).as_bytes())?;
         return Ok(Outcome::Success);
     }
     args.overwrite.check([&*args.out])?;

@@ -104,7 +104,7 @@ pub fn write(
             columns.push((vec!["ring"], Column::U16(done.sweep.rings())));
             columns.push((vec!["label"], Column::U32(&label)));
             columns.push((vec!["instance"], Column::U32(&instance)));
-            write(&file("pcd"), &rows::pcd_header(&columns), &columns)?;
+            write(&file("pcd"), &rows::pcd_header(None, &columns), &columns)?;
         }
         #[cfg(feature = "las")]
         SweepFormat::Las => {

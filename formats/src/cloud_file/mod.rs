@@ -138,6 +138,23 @@ pub fn read_intensities(
     }
 }
 
+/// Reads the sensor's pose in a PCD file, its VIEWPOINT, a matrix of 4 by 4 row by row; `None` in
+/// other formats, and if it is the identity.
+///
+/// # Errors
+/// As [`read_cloud`].
+pub fn read_viewpoint(
+    path: &Path,
+    format: Option<CloudFormat>,
+) -> Result<Option<[f64; 16]>, FormatError> {
+    let (file, format) = open(path, format)?;
+    match format {
+        #[cfg(feature = "pcd")]
+        CloudFormat::Pcd => pcd::read_pose(&mut BufReader::new(file), path),
+        _ => Ok(None),
+    }
+}
+
 fn open(path: &Path, format: Option<CloudFormat>) -> Result<(File, CloudFormat), FormatError> {
     if path.is_dir() {
         let cause = "expected a file, found a folder: name the files in it";

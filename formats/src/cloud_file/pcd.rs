@@ -35,6 +35,30 @@ pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3
     }
 }
 
+/// The pose from which the points were seen, from the sensor's frame to that of the points.
+pub(super) fn read_pose(
+    reader: &mut impl BufRead,
+    name: &Path,
+) -> Result<Option<[f64; 16]>, FormatError> {
+    let header = read_header(&mut Lines::new(reader, name), name)?;
+    Ok(header.viewpoint.and_then(pose_of_viewpoint))
+}
+
+/// The pose of a VIEWPOINT; `None` if it is the identity, or its quaternion is 0.
+fn pose_of_viewpoint([tx, ty, tz, w, x, y, z]: [f64; 7]) -> Option<[f64; 16]> {
+    let square = w * w + x * x + y * y + z * z;
+    let s = 2.0 / square;
+    let pose = [
+        [1.0 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y), tx],
+        [s * (x * y + w * z), 1.0 - s * (x * x + z * z), s * (y * z - w * x), ty],
+        [s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y), tz],
+        [0.0, 0.0, 0.0, 1.0],
+    ];
+    let pose: [f64; 16] = std::array::from_fn(|i| pose[i / 4][i % 4]);
+    let is_identity = (0..16).all(|i| pose[i] == f64::from(u8::from(i % 5 == 0)));
+    (!is_identity && pose.iter().all(|x| x.is_finite())).then_some(pose)
+}
+
 fn read_ascii<R: BufRead>(
     lines: &mut Lines<'_, R>,
     n: u64,

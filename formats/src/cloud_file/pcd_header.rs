@@ -12,6 +12,8 @@ pub(super) struct Header {
     pub n: u64,
     pub encoding: Encoding,
     fields: Vec<Field>,
+    /// Where the points were seen from: a translation and a quaternion w, x, y, z.
+    pub viewpoint: Option<[f64; 7]>,
 }
 
 /// One field: `count` numbers of `size` bytes.
@@ -50,7 +52,7 @@ pub(super) fn read_header<R: BufRead>(
     let missing =
         |key: &str| FormatError::malformed(name, "header", format!("the line {key} is missing"));
     let mut fields: Vec<Field> = Vec::new();
-    let (mut points, mut width, mut height) = (None, None, None);
+    let (mut points, mut width, mut height, mut viewpoint) = (None, None, None, None);
     while let Some(line) = lines.next()? {
         let content = line.text.split('#').next().unwrap_or_default();
         let mut words = content.split_ascii_whitespace();
@@ -79,11 +81,15 @@ pub(super) fn read_header<R: BufRead>(
             "POINTS" => points = Some(line.count(words.next().unwrap_or_default())?),
             "WIDTH" => width = Some(line.count(words.next().unwrap_or_default())?),
             "HEIGHT" => height = Some(line.count(words.next().unwrap_or_default())?),
+            "VIEWPOINT" => {
+                let numbers: Vec<f64> = words.map_while(|word| word.parse().ok()).collect();
+                viewpoint = numbers.try_into().ok();
+            }
             "DATA" => {
                 let encoding = Encoding::named(&line, words.next().unwrap_or_default())?;
                 let n = points.or_else(|| width?.checked_mul(height?));
                 let n = n.ok_or_else(|| missing("POINTS"))?;
-                return Ok(Header { n, fields, encoding });
+                return Ok(Header { n, fields, encoding, viewpoint });
             }
             _ => {}
         }

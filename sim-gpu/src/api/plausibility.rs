@@ -26,6 +26,16 @@ impl Mesh {
         })
     }
 
+    /// As [`Mesh::doubtful_size`], of a mesh of a scene, which may be a terrain: only a solid of more
+    /// than 200 m, or of less than 1 cm, is doubted.
+    pub(crate) fn doubtful_unit(&self) -> Option<String> {
+        let [low, high] = self.bounds_m().map(DVec3::from_array);
+        let size = high - low;
+        let (least, most) = (size.min_element(), size.max_element());
+        let is_doubtful = most > 200.0 && least > most / 10.0 || most < 0.01;
+        self.doubtful_size().filter(|_| is_doubtful)
+    }
+
     /// Whether one of `sensors_m` stands inside its bounding box: it then sees the mesh from inside.
     #[doc(hidden)]
     #[must_use]
@@ -71,6 +81,15 @@ mod tests {
             let (found, part) = (found.unwrap_or_default(), expected.unwrap_or_default());
             assert!(found.contains(part), "{found}");
         }
+    }
+
+    #[test]
+    fn of_a_scene_s_meshes_terrains_are_not_doubted() {
+        let solid = |size| tetrahedron(size).doubtful_unit().is_some();
+        assert_eq!([0.001, 1.0, 150.0, 4300.0].map(solid), [true, false, false, true]);
+        let corners = [[0.0; 3], [900.0, 0.0, 0.0], [0.0, 900.0, 30.0]];
+        let terrain = Mesh::from_triangles(corners.to_vec(), vec![[0, 1, 2]]).unwrap();
+        assert_eq!(terrain.doubtful_unit(), None);
     }
 
     #[test]

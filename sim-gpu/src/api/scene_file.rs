@@ -3,7 +3,7 @@
 use super::{Error, Instance, Mesh, MountedSensor, Scene, Sensor};
 use crate::bvh::Builder;
 use crate::material::{Material, Materials};
-use crate::mesh::frame::{Normalize, to_world};
+use crate::mesh::frame::{Normalize, Unit, to_world};
 use crate::mesh::validate::triangle_stats;
 use crate::mesh::{LoadedMesh, TriangleMesh, load};
 use crate::pose::Pose;
@@ -61,7 +61,7 @@ fn materials(object: &SceneObject) -> Result<Option<Materials>, Error> {
 
 /// The mesh of `object`, and what simplification made of it if it was asked for.
 fn mesh(file: &SceneFile, object: &SceneObject) -> Result<(Mesh, Option<Simplified>), Error> {
-    let LoadedMesh { mesh, format, warnings, .. } = load(&object.mesh)?;
+    let LoadedMesh { mesh, format, mut warnings, .. } = load(&object.mesh)?;
     let mesh = mesh.in_metres(object.units);
     let up = object.up.unwrap_or(format.default_up());
     let normalize = object.normalize.unwrap_or(Normalize::None);
@@ -75,6 +75,10 @@ fn mesh(file: &SceneFile, object: &SceneObject) -> Result<(Mesh, Option<Simplifi
             (Mesh::from_target(target, centre), Some(simplified))
         }
     };
+    if object.units == Unit::Metre && normalize == Normalize::None {
+        let doubt = mesh.doubtful_unit();
+        warnings.extend(doubt.map(|doubt| doubt + "; `units` of the object names another unit"));
+    }
     Ok((mesh.with_warnings(&object.mesh, &warnings), simplified))
 }
 
