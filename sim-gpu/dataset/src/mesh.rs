@@ -99,7 +99,7 @@ pub(crate) fn doubts(
     let mesh = scene.instances().first().map(|instance| &instance.mesh);
     let is_scaled = config.normalize != Normalize::None;
     let size = mesh
-        .filter(|_| !is_scaled)
+        .filter(|_| !is_scaled && config.units == Unit::Metre)
         .and_then(Mesh::doubtful_size)
         .map(|doubt| format!("{doubt}; --units names another unit"));
     let inside = mesh.is_some_and(|mesh| mesh.surrounds(sensors_m)).then(|| {

@@ -131,6 +131,7 @@ pub fn doubts(root: &Path, entries: &[MeshEntry]) -> Vec<String> {
     for entry in entries {
         splits.entry(&entry.class).or_default().insert(entry.split);
     }
+    let way = "another seed, or folders CLASS/{train,test}, split the meshes otherwise";
     let layouts = "expected CLASS/NAME, CLASS/{train,test}/NAME or CLASS/ID/NAME, with one mesh in \
                    each ID, in the folder";
     let n_classes = splits.len();
@@ -140,9 +141,8 @@ pub fn doubts(root: &Path, entries: &[MeshEntry]) -> Vec<String> {
         let lack = splits.iter().filter(|(_, splits)| !splits.contains(&split));
         let lack: Vec<&str> = lack.map(|(class, _)| *class).collect();
         if lack.len() == n_classes {
-            doubts.push(format!("no mesh is in the {split} split; {layouts}"));
+            doubts.push(format!("no mesh is in the {split} split; {way}"));
         } else if !lack.is_empty() && !is_alone {
-            let way = "another seed, or folders CLASS/{train,test}, split the meshes otherwise";
             doubts.push(format!("no {split} mesh of {}; {way}", some_of(&lack)));
         }
     }
@@ -735,7 +735,7 @@ mod tests {
                     its own clouds for validation";
         let cases: [(&[&str], &[&str]); 9] = [
             (&sound, &[]),
-            (&sound[..1], &["no mesh is in the test split"]),
+            (&sound[..1], &["no mesh is in the test split", lack]),
             (&sound[1..3], &["each of the 2 classes has one mesh"]),
             (&sound[..3], &["no test mesh of b", lack]),
             (&["a/train/1.off", "a/val/2.off", "a/valid/3.off", "a/test/1.off"], &[held]),
