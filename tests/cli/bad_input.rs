@@ -194,7 +194,7 @@ fn what_is_doubtful_about_meshes_is_told_once() {
                    first is face 2";
     let said = folder.succeeds("gen-dataset meshes --out out --adapter cpu --up z --sensor vlp32c");
     assert_eq!(said.matches(&format!("warning: tie/{warning}")).count(), 1, "{said}");
-    assert_eq!(said.matches("split; expected CLASS/NAME").count(), 1, "{said}");
+    assert_eq!(said.matches("split; another seed").count(), 1, "{said}");
     let object = "[[object]]\nname = \"one\"\nmesh = \"meshes/tie/a.obj\"\nup = \"z\"\n";
     let sensor = "[[sensor]]\nprofile = \"vlp32c\"\nposition_m = [1, 0.5, 9]\npitch_deg = 90\n";
     folder.write("scene.toml", object.to_owned() + &object.replace("one", "two") + sensor);
