@@ -40,7 +40,7 @@ pub fn foreign(bytes: &[u8]) -> Option<&'static str> {
 /// editors begin files with.
 ///
 /// # Errors
-/// Errors of the system; what is not text in UTF-8, with the line.
+/// The file cannot be read, or it is not UTF-8; the error names the line.
 pub fn read_text(path: &Path, longest: u64) -> io::Result<String> {
     let mut bytes = Vec::new();
     File::open(path)?.take(longest).read_to_end(&mut bytes)?;

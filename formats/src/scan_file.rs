@@ -39,8 +39,8 @@ crate::named! {
         Ply = "ply",
         /// Text with a header, which is written but not read.
         Csv = "csv",
-        /// The Point Cloud Library's format, binary, with the columns of PLY and neither origin nor
-        /// pose; it is read as a cloud.
+        /// The Point Cloud Library's format, binary, with the columns of PLY, the pose as its
+        /// VIEWPOINT, and no origin; it is read as a cloud.
         Pcd = "pcd",
         /// A sensor's packets: see `vlp32c`. They hold ranges along beams instead of points, so
         /// that writing them requires the sensor.

@@ -116,7 +116,7 @@ class Scan:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a file with the extension .npz, .ply, .csv or .pcd, like `edgepuck scan`. An existing
-        file is replaced, as by `numpy.save`. Only .npz and .ply keep the pose.
+        file is replaced, as by `numpy.save`. All but .csv keep the pose.
 
         Raises:
             Error: The name has another extension, or the file cannot be written.

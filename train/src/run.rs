@@ -101,7 +101,7 @@ impl Job<'_> {
         }
         // A run ends with its test, which would fail after hours.
         let classes = recipe.classes(&all.classes);
-        test.map(|path| read_test(recipe, &classes, path, data)).transpose()?;
+        let test = test.map(|path| Test::read(recipe, &classes, path, data)).transpose()?;
         let folder = out.with_extension("run");
         fs::create_dir_all(&folder).map_err(|source| FormatError::io(&folder, source))?;
         atomic::sweep_leftovers(&folder)?;
@@ -109,27 +109,42 @@ impl Job<'_> {
         while run.trainer.epoch < run.trainer.recipe.epochs {
             run.epoch(&clouds, &held)?;
         }
-        run.finish(&self, test, &clouds, &held)
+        run.finish(&self, test.as_ref(), &clouds, &held)
     }
 }
 
-/// The clouds of the test at `path`, which have the `classes` of a network for `data`, and the
-/// number of classes that they themselves have.
-fn read_test(
-    recipe: &Recipe,
-    classes: &[String],
-    path: &Path,
-    data: &str,
-) -> Result<(Clouds, usize), Error> {
-    let most_points = points_to_read(recipe);
-    let mut clouds = Clouds::read_for(recipe.normalization, path, Split::Test, most_points)?;
-    let n_classes = clouds.classes.len();
-    clouds.classes = recipe.classes(&clouds.classes);
-    if clouds.classes != classes {
-        let cause = format!("expected the classes of {data}, found {:?}", clouds.classes);
-        return Err(Error::Data { path: path.to_path_buf(), cause });
+/// The clouds on which a finished network is measured.
+struct Test<'a> {
+    path: &'a Path,
+    clouds: Clouds,
+    /// The number of classes of the clouds themselves, without one that the recipe adds.
+    n_classes: usize,
+}
+
+impl<'a> Test<'a> {
+    /// Reads the clouds at `path`, which must have the `classes` of a network for `data`.
+    fn read(
+        recipe: &Recipe,
+        classes: &[String],
+        path: &'a Path,
+        data: &str,
+    ) -> Result<Self, Error> {
+        let most_points = points_to_read(recipe);
+        let mut clouds = Clouds::read_for(recipe.normalization, path, Split::Test, most_points)?;
+        let n_classes = clouds.classes.len();
+        clouds.classes = recipe.classes(&clouds.classes);
+        if clouds.classes != classes {
+            let cause = format!("expected the classes of {data}, found {:?}", clouds.classes);
+            return Err(Error::Data { path: path.to_path_buf(), cause });
+        }
+        Ok(Self { path, clouds, n_classes })
     }
-    Ok((clouds, n_classes))
+
+    /// The accuracy of `model` as a line of text.
+    fn accuracy(&self, model: &Path) -> Result<String, Error> {
+        let confusion = confusion(model, &self.clouds, &Options::default())?;
+        Ok(accuracy_report::summary(&confusion, self.n_classes, self.path))
+    }
 }
 
 fn check(clouds: &Clouds, recipe: &Recipe, data: &str) -> Result<(), Error> {
@@ -294,7 +309,7 @@ impl<'a> Run<'a> {
     fn finish(
         &mut self,
         job: &Job<'_>,
-        test: Option<&Path>,
+        test: Option<&Test<'_>>,
         clouds: &Clouds,
         held: &Clouds,
     ) -> Result<Option<String>, Error> {
@@ -303,7 +318,7 @@ impl<'a> Run<'a> {
         let mut card = self.card(None);
         model_file::ship(&shipped, &mut self.trainer.model, &card)?;
         self.calibrate(&mut card, &shipped, held)?;
-        let accuracy = test.map(|path| self.test(&shipped, path, job.data)).transpose()?;
+        let accuracy = test.map(|test| test.accuracy(&shipped)).transpose()?;
         let activation_ranges = infer_cpu::activation_ranges_of_set(&shipped, &clouds.set)?;
         let card = ModelCard { activation_ranges, accuracy: accuracy.clone(), ..card };
         model_file::ship(&shipped, &mut self.trainer.model, &card)?;
@@ -333,14 +348,5 @@ impl<'a> Run<'a> {
             card.unknown_energy = quantile(energies.collect(), share);
         }
         Ok(())
-    }
-
-    fn test(&self, model: &Path, test: &Path, data: &str) -> Result<String, Error> {
-        let (clouds, n_classes) = read_test(&self.trainer.recipe, &self.classes, test, data)?;
-        Ok(accuracy_report::summary(
-            &confusion(model, &clouds, &Options::default())?,
-            n_classes,
-            test,
-        ))
     }
 }

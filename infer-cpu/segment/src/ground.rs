@@ -117,14 +117,14 @@ pub fn sector(n_columns: usize, column: usize) -> usize {
 mod tests {
     use super::*;
 
+    /// A return ahead, at a range and a height.
+    fn at(&[range_m, z]: &[f32; 2]) -> Return {
+        Return { position: [range_m, 0.0, z], range_m, ..Return::default() }
+    }
+
     /// Which returns of a column are ground, given their ranges and heights, on a level plane at 0
     /// whose ground may climb by 8 degrees.
     fn seeds(returns: &[[f32; 2]]) -> Vec<bool> {
-        let at = |&[range_m, z]: &[f32; 2]| Return {
-            position: [range_m, 0.0, z],
-            range_m,
-            ..Return::default()
-        };
         let returns: Vec<Return> = returns.iter().map(at).collect();
         let mut finder = GroundFinder::default();
         finder.follow(&returns, Plane::level(0.0), 8f32.to_radians().tan());
@@ -177,11 +177,6 @@ mod tests {
     #[test]
     fn the_sensor_stands_above_the_median_of_the_lowest_returns_within_20_m() {
         let level_m = |returns: &[[f32; 2]]| {
-            let at = |&[range_m, z]: &[f32; 2]| Return {
-                position: [range_m, 0.0, z],
-                range_m,
-                ..Return::default()
-            };
             let columns = Lowest(returns.iter().map(at).collect());
             GroundFinder::default().level_under_sensor(&columns).z_m(3.0, 4.0)
         };
