@@ -147,10 +147,9 @@ pub fn read_viewpoint(
     path: &Path,
     format: Option<CloudFormat>,
 ) -> Result<Option<[f64; 16]>, FormatError> {
-    let (file, format) = open(path, format)?;
-    match format {
+    match open(path, format)? {
         #[cfg(feature = "pcd")]
-        CloudFormat::Pcd => pcd::read_pose(&mut BufReader::new(file), path),
+        (file, CloudFormat::Pcd) => pcd::read_pose(&mut BufReader::new(file), path),
         _ => Ok(None),
     }
 }

@@ -168,8 +168,9 @@ pub type Programs = [(&'static str, PathBuf); 3];
 
 /// Our programs as the tests have built them: nothing is built for the peers alone.
 pub fn programs() -> anyhow::Result<Programs> {
-    let mut cargo = compile_all(&["test", "--no-run", "--message-format"]);
-    let messages = output(cargo.arg("json-render-diagnostics").stderr(Stdio::inherit()))?;
+    let mut cargo = compile_all(&["test", "--no-run"]);
+    cargo.args(["--message-format", "json-render-diagnostics"]).stderr(Stdio::inherit());
+    let messages = output(&mut cargo)?;
     Ok([
         ("EDGEPUCK_PROGRAM", executable(&messages, "edgepuck")?),
         ("EDGEPUCK_INFER", executable(&messages, "infer-cpu")?),
