@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use edgepuck_segment::doubtful_axes;
 use formats::cloud_file::{
-    CloudFormat, check_sweep, read_cloud_as, read_intensities, read_viewpoint,
+    CloudFormat, check_sweep, coarse_coordinates, read_cloud_as, read_intensities, read_viewpoint,
 };
 use formats::scan_file::read_scan;
 use formats::{FormatError, Scan, Senders, ouster, pcap, velodyne};
@@ -113,10 +113,12 @@ impl SweepArgs {
         let remedy = "are they in millimetres, or from another origin? Scale them, give the sensor's \
                       position by --sensor, or the format by --format";
         self.warn(check_sweep(self.relative(&scan), &self.sweep, remedy)?);
+        self.warn(coarse_coordinates(points_from(&scan, [0.0; 3])));
         Ok(scan)
     }
 
-    fn warn(&self, doubt: Option<String>) {
+    /// Prints what is doubtful in the sweep.
+    pub fn warn(&self, doubt: Option<String>) {
         if let Some(doubt) = doubt {
             eprintln!("warning: {}: {doubt}", self.sweep.display());
         }
@@ -130,14 +132,19 @@ impl SweepArgs {
 
     /// The points from the sensor, metres.
     fn relative<'a>(&self, scan: &'a Scan) -> impl Iterator<Item = [f64; 3]> + use<'a> {
-        let (sensor, origin) = (self.sensor_m(scan), scan.origin);
-        scan.positions.iter().map(move |point| {
-            [0, 1, 2].map(|axis| f64::from(point[axis]) + origin[axis] - sensor[axis])
-        })
+        points_from(scan, self.sensor_m(scan))
     }
 
     /// The title of a picture of the sweep.
     pub fn title(&self) -> Cow<'_, str> {
         self.sweep.file_stem().unwrap_or_default().to_string_lossy()
     }
+}
+
+/// The points of `scan` from a place, metres.
+fn points_from(scan: &Scan, place_m: [f64; 3]) -> impl Iterator<Item = [f64; 3]> {
+    let origin = scan.origin;
+    scan.positions.iter().map(move |point| {
+        [0, 1, 2].map(|axis| f64::from(point[axis]) + origin[axis] - place_m[axis])
+    })
 }

@@ -1,6 +1,7 @@
 use crate::points::SweepArgs;
 use crate::{Outcome, Usage, preview};
 use edgepuck_segment::{Label, Segmentation, Segmenter, Settings, Sweep};
+use formats::atomic::UnfinishedFolder;
 use formats::cloud_file::write_cloud;
 use formats::hash::Hashing;
 use formats::outputs::Overwrite;
@@ -43,6 +44,7 @@ pub fn run(args: &SegmentArgs) -> anyhow::Result<Outcome> {
     let segmentation = segmenter.segment(&sweep)?;
     let elapsed_ms = 1e3 * start.elapsed().as_secs_f64();
 
+    let begun = UnfinishedFolder::begin_new(&args.out);
     write_clusters(&args.out, &scan, segmentation)?;
     let tints: Vec<_> = segmentation.labels().iter().map(|label| tint(*label)).collect();
     write_ply(&args.out.join("sweep.ply"), &scan.positions, &tints)?;
@@ -53,6 +55,7 @@ pub fn run(args: &SegmentArgs) -> anyhow::Result<Outcome> {
         &args.input.title(),
         &args.out.join("preview.png"),
     )?;
+    begun.into_iter().for_each(UnfinishedFolder::finish);
     let ground = segmentation.labels().iter().filter(|label| **label == Label::Ground).count();
     eprintln!(
         "{} points in {elapsed_ms:.1} ms: {} clusters, {:.0} % ground: {}",

@@ -53,6 +53,13 @@ impl UnfinishedFolder {
         Self(path.to_path_buf())
     }
 
+    /// Begins the folder at `path`; `None` if it has entries already, which others may need.
+    #[must_use]
+    pub fn begin_new(path: &Path) -> Option<Self> {
+        let has_entries = fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_some());
+        (!has_entries).then(|| Self::begin(path))
+    }
+
     /// Keeps the folder.
     pub fn finish(self) {
         unfinished().remove(&self.0);
@@ -362,6 +369,9 @@ mod tests {
             }
         }
         assert_eq!(names(folder.path()), ["kept"]);
+        assert!(UnfinishedFolder::begin_new(&folder.path().join("new")).is_some());
+        // With files of others, it stays.
+        assert!(UnfinishedFolder::begin_new(folder.path()).is_none());
     }
 
     #[test]

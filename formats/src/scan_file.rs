@@ -22,10 +22,11 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::archive::{NpzReader, NpzWriter, Values, write_archive};
+use crate::cloud_file::read_npz_pose;
 use crate::error::FormatError;
 use crate::hash::{FileHash, Hashing};
 use crate::number::Number;
-use crate::scan::{Attribute, Column, ColumnSlot, POSE, Scan, pose_of};
+use crate::scan::{Attribute, Column, ColumnSlot, Scan};
 use crate::{csv, ply, rows};
 
 crate::named! {
@@ -163,11 +164,7 @@ fn read_npz(path: &Path) -> Result<Scan, FormatError> {
         scan.origin =
             origin.try_into().map_err(|_| npz.error("origin", "expected three numbers"))?;
     }
-    if npz.has("pose") {
-        let pose = npz.array::<f64>("pose")?;
-        let pose = pose_of(&pose.elements).filter(|_| pose.shape == [4, 4]);
-        scan.pose = Some(pose.ok_or_else(|| npz.error("pose", POSE))?);
-    }
+    scan.pose = read_npz_pose(&mut npz)?;
     for attribute in Attribute::ALL {
         let key = attribute.name();
         if !npz.has(key) {

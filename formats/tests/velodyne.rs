@@ -261,6 +261,49 @@ fn an_interface_tells_its_clock() {
     }
 }
 
+/// A network may deliver packets twice or in another order, and the hour may end in a turn.
+#[test]
+fn a_turn_is_that_of_the_packets_times() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = capture(folder.path(), Returns::Strongest);
+    let of_frames = |frames: &[Vec<u8>]| {
+        let path = folder.path().join("changed.pcap");
+        fs::write(&path, classic(1, frames, 65_535)).unwrap();
+        read_turn(&path, &mut Senders::default()).map(|(scan, _)| scan)
+    };
+    let sorted = |scan: &Scan| {
+        let mut rows: Vec<_> = scan.positions.iter().zip(scan.time_s.as_ref().unwrap()).collect();
+        rows.sort_by(|a, b| a.partial_cmp(b).unwrap());
+        format!("{rows:?}")
+    };
+    let frames = frames(&fs::read(&file).unwrap());
+    let expected = of_frames(&frames).unwrap();
+    let repeated: Vec<_> = frames.iter().flat_map(|frame| [frame.clone(), frame.clone()]).collect();
+    assert_eq!(of_frames(&repeated).unwrap(), expected);
+    let echoed: Vec<_> = [&frames[..9], &frames[3..5], &frames[9..]].concat();
+    assert_eq!(of_frames(&echoed).unwrap(), expected);
+    let mut swapped = frames.clone();
+    swapped.swap(7, 8);
+    swapped.swap(90, 92);
+    assert_eq!(sorted(&of_frames(&swapped).unwrap()), sorted(&expected));
+
+    let mut at_the_hour = frames.clone();
+    let stamp = |frame: &[u8]| {
+        let bytes = <[u8; 4]>::try_from(&frame[frame.len() - 6..frame.len() - 2]).unwrap();
+        u64::from(u32::from_le_bytes(bytes))
+    };
+    for frame in &mut at_the_hour {
+        let moved = (stamp(frame) + 3_600_000_000 - stamp(&frames[40])) % 3_600_000_000;
+        let at = frame.len() - 6;
+        frame[at..at + 4].copy_from_slice(&(moved as u32).to_le_bytes());
+    }
+    assert_eq!(of_frames(&at_the_hour).unwrap(), expected);
+    // What is left after a gap of a third is no turn.
+    let gap = [&frames[..40], &frames[100..]].concat();
+    let error = of_frames(&gap).unwrap_err().to_string();
+    assert!(error.contains("degrees of one"), "{error}");
+}
+
 #[test]
 fn what_a_capture_lacks_is_told() {
     let folder = tempfile::tempdir().unwrap();

@@ -31,7 +31,7 @@ pub fn points(array: &PyReadonlyArray2<'_, f32>) -> PyResult<Vec<[f32; 3]>> {
 /// The points of a sweep, metres from the sensor.
 pub fn sweep(py: Python<'_>, array: &PyReadonlyArray2<'_, f32>) -> PyResult<Vec<[f32; 3]>> {
     let points = points(array)?;
-    let remedy = "subtract the sensor's position, or give metres";
+    let remedy = "subtract the sensor's position before rounding to 32 bits, or give metres";
     let doubt = judge_sweep(points.iter().map(|point| point.map(f64::from)), remedy)
         .map_err(|(part, cause)| raised(format!("{part}: {cause}")))?;
     warn(py, doubt.or_else(|| doubtful_axes(&points)).as_slice())?;

@@ -59,7 +59,7 @@ impl Classifier {
     ) -> PyResult<Bound<'py, PyDict>> {
         let cloud = points(&cloud)?;
         let wide: Vec<_> = cloud.iter().map(|point| point.map(f64::from)).collect();
-        let found = judge_object(&wide).map_err(raised)?;
+        let found = judge_object(&wide, [0.0; 3]).map_err(raised)?;
         let unlike = found.or(is_scan.then_some(Unlike::OneSide));
         let unlike = unlike.filter(|of| self.is_of_wholes || *of == Unlike::Sweep);
         warn(py, unlike.map(|of| format!("the cloud {of}")).as_slice())?;

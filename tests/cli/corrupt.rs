@@ -1,6 +1,7 @@
 //! `corrupt`: corruptions of sweeps and of mesh scans.
 
 use crate::Folder;
+use formats::cloud_file::write_cloud;
 use formats::labelled::read_labelled;
 use std::collections::BTreeMap;
 
@@ -46,6 +47,11 @@ fn a_sweep_is_corrupted_in_every_way_and_twice_alike() {
         assert_eq!(scan.len(), *count, "{file}");
         assert!(scan.positions != sweep.positions || scan.intensity != sweep.intensity, "{file}");
     }
+    // Of a camera, y points downwards.
+    let camera = sweep.positions.iter().map(|&[x, y, z]| [x, 1.8 - z, y].map(f64::from));
+    write_cloud(&folder.at("camera.npy"), &camera.collect::<Vec<_>>()).unwrap();
+    let said = folder.succeeds("corrupt camera.npy --reflectivity 0.5 --only wet-ground --out wet");
+    assert!(said.contains("camera.npy: ") && said.contains("ground if z points up"), "{said}");
     // A higher severity leaves fewer points.
     for name in ["wet-ground", "beam-missing", "incomplete-echo", "cross-sensor"] {
         let left = |n: u32| found[&format!("{name}-{n}.npz")];

@@ -235,6 +235,12 @@ fn every_command_reads_points_of_every_format() {
     folder.refuses(1, &[(segment, "give the sensor's position by --sensor")]);
     let said = folder.succeeds(&format!("{segment} --sensor {east} {north} 0"));
     assert!(said.contains(" 2 clusters"), "{said}");
+    assert!(!said.contains("numbers of 32 bits"), "{said}");
+    let rounded: Vec<_> = far.iter().map(|point| point.map(|x| f64::from(x as f32))).collect();
+    write_cloud(&folder.at("rounded.npy"), &rounded).unwrap();
+    let segment = "segment rounded.npy --overwrite --out clusters --radius 0.3";
+    let said = folder.succeeds(&format!("{segment} --sensor {east} {north} 0"));
+    assert!(said.contains("32 bits, which are 0.5 m apart at 533401"), "{said}");
     folder.succeeds("preview utm.las --out out.png");
     folder.write("objects.json", "mine");
     folder.refuses(

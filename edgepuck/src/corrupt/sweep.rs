@@ -2,8 +2,9 @@ use super::plan::{Plan, chosen};
 use super::{CorruptArgs, Written, usage, write_list};
 use crate::Outcome;
 use crate::points::SweepArgs;
-use edgepuck_segment::{Label, Segmenter, Settings, Sweep};
+use edgepuck_segment::{Label, Segmenter, Settings, Sweep, doubtful_axes};
 use formats::Scan;
+use formats::atomic::UnfinishedFolder;
 use formats::hash::Hashing;
 use formats::scan_file::{ScanFormat, write_scan};
 use formats::streams::Stream;
@@ -34,10 +35,11 @@ pub(super) fn run(
     let limit = limit.unwrap_or(DetectionLimit { reflectivity: 1.0, range_m: 1.0 });
     let sensor_m = DVec3::from_array(input.sensor_m(&scan));
     let is_ground = match any(|corruption| matches!(corruption, Corruption::WetGround { .. })) {
-        true => ground(&scan, sensor_m)?,
+        true => ground(input, &scan, sensor_m)?,
         false => Vec::new(),
     };
 
+    let begun = UnfinishedFolder::begin_new(&args.out);
     let is_dark = brightness.is_none();
     let (mut written, mut too_weak_before) = (Vec::new(), 0);
     for (entry, severity, corruption) in chosen {
@@ -70,6 +72,7 @@ pub(super) fn run(
         written.push(Written { file, corruption, severity, count, of, by });
     }
     write_list(&written, &args.out)?;
+    begun.into_iter().for_each(UnfinishedFolder::finish);
     if too_weak_before > 0 {
         eprintln!(
             "warning: {too_weak_before} of the points are below the profile's detection limit as \
@@ -114,10 +117,11 @@ fn corrupted(recorded: &Recorded, corruption: &Corruption, sensor: &SensorProfil
 }
 
 /// Whether each point is on the ground, by the segmentation that a robot runs.
-fn ground(scan: &Scan, sensor_m: DVec3) -> anyhow::Result<Vec<bool>> {
+fn ground(input: &SweepArgs, scan: &Scan, sensor_m: DVec3) -> anyhow::Result<Vec<bool>> {
     let origin = DVec3::from_array(scan.origin) - sensor_m;
     let from_sensor = |point: &[f32; 3]| (origin + DVec3::from(point.map(f64::from))).as_vec3();
     let points: Vec<[f32; 3]> = scan.positions.iter().map(|p| from_sensor(p).to_array()).collect();
+    input.warn(doubtful_axes(&points));
     let mut segmenter = Segmenter::new(Settings::default()).map_err(usage)?;
     let found = segmenter.segment(&Sweep { points: &points, rings: scan.ring.as_deref() })?;
     Ok(found.labels().iter().map(|label| *label == Label::Ground).collect())

@@ -10,6 +10,11 @@ use std::path::Path;
 
 use super::Object;
 
+/// The most that products of a rotation's rows may be off: KITTI rounds to 7 digits, others to 3.
+const NOT_A_ROTATION: f64 = 0.01;
+/// The largest sine of a camera's elevation, 64 degrees.
+const STEEPEST: f64 = 0.9;
+
 /// The left colour camera of a frame.
 pub struct Camera {
     /// From the LiDAR's frame to the rectified camera's.
@@ -39,10 +44,34 @@ impl Camera {
             let shift = if columns == 4 { column(3) } else { DVec3::ZERO };
             Ok(DMat4::from_translation(shift) * DMat4::from_mat3(rotation))
         };
-        Ok(Self {
-            rect_from_lidar: matrix("R0_rect", 3)? * matrix("Tr_velo_to_cam", 4)?,
-            image_from_rect: matrix("P2", 4)?,
-        })
+        let rotation = |key: &str, columns: usize| {
+            let found = matrix(key, columns)?;
+            let axes = DMat3::from_mat4(found);
+            let off = (axes * axes.transpose() - DMat3::IDENTITY).to_cols_array();
+            let off = off.into_iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+            if off > NOT_A_ROTATION || axes.determinant() < 0.0 {
+                let cause = "expected a rotation: rows of length 1 at right angles, right-handed";
+                return Err(FormatError::malformed(file, key, cause));
+            }
+            Ok(found)
+        };
+        let rect_from_lidar = rotation("R0_rect", 3)? * rotation("Tr_velo_to_cam", 4)?;
+        let image_from_rect = matrix("P2", 4)?;
+        // The camera looks along its z axis.
+        let upwards = rect_from_lidar.z_axis.z;
+        let flaw = |key: &str, cause: &str| Err(FormatError::malformed(file, key, cause).into());
+        if upwards.abs() > STEEPEST {
+            let cause = "expected a camera that looks ahead, found one that looks along the LiDAR's \
+                         z: x of the camera points to the right, y down, z ahead";
+            return flaw("Tr_velo_to_cam", cause);
+        }
+        let [x, y, z] = [0, 1, 2].map(|row| image_from_rect.row(row).truncate());
+        if x.x <= 0.0 || y.y <= 0.0 || z != DVec3::Z {
+            let cause =
+                "expected a projection: focal lengths above 0, a last row of 0 0 1 and an offset";
+            return flaw("P2", cause);
+        }
+        Ok(Self { rect_from_lidar, image_from_rect })
     }
 
     /// The left, top, right and bottom of the box with these corners in the picture, pixels; `None`
@@ -124,8 +153,19 @@ mod tests {
             "garden_chair -1 -1 1.57 -1.00 -1.00 -1.00 -1.00 1.00 2.00 4.00 0.00 0.50 -10.00 -1.57 \
              0.8750\n"
         );
-        std::fs::write(&file, CALIBRATION.replace("180", "x")).unwrap();
-        let error = Camera::read(&file).err().unwrap().to_string();
-        assert!(error.ends_with("P2: expected a line of 12 finite numbers, found 6"), "{error}");
+        for (valid, other, expected) in [
+            ("180", "x", "P2: expected a line of 12 finite numbers, found 6"),
+            ("P2: 700", "P2: 0", "P2: expected a projection: focal lengths above 0, a last row of"),
+            ("0 0 1 0\nR0", "0 0 0 0\nR0", "P2: expected a projection"),
+            ("1 0 0 0 1 0 0 0 1", "0 0 0 0 0 0 0 0 0", "R0_rect: expected a rotation: rows of"),
+            ("0 -1 0 0 0 0 -1 0 1", "0 1 0 0 0 0 -1 0 1", "Tr_velo_to_cam: expected a rotation"),
+            ("0 -1 0 0 0 0 -1 0 1 0 0 0", "1 0 0 0 0 1 0 0 0 0 1 0", "looks along the LiDAR's z"),
+        ] {
+            let changed = CALIBRATION.replace(valid, other);
+            assert_ne!(changed, CALIBRATION);
+            std::fs::write(&file, changed).unwrap();
+            let error = Camera::read(&file).err().unwrap().to_string();
+            assert!(error.contains(expected), "{error}");
+        }
     }
 }

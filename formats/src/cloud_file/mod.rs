@@ -47,7 +47,9 @@ use crate::records;
 pub use format::CloudFormat;
 #[cfg(feature = "las")]
 pub use las_write::{LasPoint, write_las};
-pub use plausible::{Unlike, check_sweep, judge_object, judge_sweep};
+#[cfg(feature = "npz")]
+pub(crate) use npz::read_pose as read_npz_pose;
+pub use plausible::{Unlike, check_sweep, coarse_coordinates, judge_object, judge_sweep};
 use precision::Precision;
 
 /// Reads the cloud at `path` in the format of its extension.
@@ -138,8 +140,8 @@ pub fn read_intensities(
     }
 }
 
-/// Reads the sensor's pose in a PCD file, its VIEWPOINT, a matrix of 4 by 4 row by row; `None` in
-/// other formats, and if it is the identity.
+/// Reads the sensor's pose in a file, a matrix of 4 by 4 row by row: `pose` of an NPZ or PLY file, or
+/// the VIEWPOINT of a PCD file; `None` in other formats, and if it is the identity.
 ///
 /// # Errors
 /// As [`read_cloud`].
@@ -150,6 +152,12 @@ pub fn read_viewpoint(
     match open(path, format)? {
         #[cfg(feature = "pcd")]
         (file, CloudFormat::Pcd) => pcd::read_pose(&mut BufReader::new(file), path),
+        #[cfg(feature = "npz")]
+        (file, CloudFormat::Npz) => {
+            npz::read_pose(&mut crate::archive::NpzReader::new(BufReader::new(file), path)?)
+        }
+        #[cfg(feature = "ply")]
+        (file, CloudFormat::Ply) => ply::read_pose(&mut BufReader::new(file), path),
         _ => Ok(None),
     }
 }

@@ -7,10 +7,12 @@ use super::npy;
 use super::precision::Precision;
 use crate::archive::{NpzReader, NpzWriter};
 use crate::error::FormatError;
+use crate::scan::{POSE, pose_of};
 
 /// The key of the points of scans, to which `origin` is added, and of written clouds.
 const POSITIONS: &str = "positions";
 const ORIGIN: &str = "origin";
+const POSE_KEY: &str = "pose";
 /// The key of the points in most other archives.
 const POINTS: &str = "points";
 
@@ -34,6 +36,18 @@ pub(super) fn read(reader: impl Read + Seek, name: &Path) -> Result<Vec<[f64; 3]
         points.iter_mut().for_each(|p| *p = [p[0] + x, p[1] + y, p[2] + z]);
     }
     Ok(points)
+}
+
+/// The pose of a scan's sensor, row by row.
+pub(crate) fn read_pose<R: Read + Seek>(
+    npz: &mut NpzReader<R>,
+) -> Result<Option<[f64; 16]>, FormatError> {
+    if !npz.has(POSE_KEY) {
+        return Ok(None);
+    }
+    let pose = npz.array::<f64>(POSE_KEY)?;
+    let found = pose_of(&pose.elements).filter(|_| pose.shape == [4, 4]);
+    found.map(Some).ok_or_else(|| npz.error(POSE_KEY, POSE))
 }
 
 fn only_array_of_points<R: Read + Seek>(npz: &mut NpzReader<R>) -> Result<String, FormatError> {

@@ -13,6 +13,21 @@ const EXPECTED_M: std::ops::RangeInclusive<f64> = 0.5..=2e3;
 /// Farther than the nearest thing that a sensor on a vehicle, a tripod or a roof sees, metres.
 const NEAREST_M: f64 = 50.0;
 
+/// The largest step between coordinates, metres: LiDARs measure ranges to millimetres.
+const COARSEST_M: f32 = 0.005;
+
+/// The largest distance from a line, as a share of its length, of points that are on it.
+const ON_A_LINE: f64 = 1e-9;
+
+/// The fewest points of a sweep that is told by its rings: a turn of a VLP-16 has 28,800 beams.
+const FEWEST_OF_RINGS: usize = 4_000;
+/// The fewest rings, of the 16 of the smallest sensors.
+const FEWEST_RINGS: usize = 8;
+/// The fewest sectors of 10 degrees that a sweep covers.
+const FEWEST_SECTORS: u32 = 9;
+/// Rings are 0.2 degrees or more apart, and wider by the noise of sensors than a bin.
+const BINS_A_DEGREE: usize = 20;
+
 /// Judges the points of a sweep in a file, as [`judge_sweep`] does.
 ///
 /// # Errors
@@ -61,6 +76,25 @@ pub fn judge_sweep(
     Ok(Some(format!("the {what} point is {found:.3} m from the sensor: expected {expected}")))
 }
 
+/// Why the coordinates of `points`, metres, have probably lost digits: all are numbers of 32 bits,
+/// which are too far apart at such coordinates.
+pub fn coarse_coordinates(points: impl IntoIterator<Item = [f64; 3]>) -> Option<String> {
+    let mut most = 0.0f32;
+    for x in points.into_iter().flatten().filter(|x| x.is_finite()) {
+        if f64::from(x as f32) != x {
+            return None;
+        }
+        most = most.max((x as f32).abs());
+    }
+    let step_m = most.next_up() - most;
+    (step_m > COARSEST_M).then(|| {
+        format!(
+            "the coordinates are numbers of 32 bits, which are {step_m} m apart at {most} m: write \
+             numbers of 64 bits, or subtract the sensor's position before you write them"
+        )
+    })
+}
+
 /// What a cloud probably is instead of a whole object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Unlike {
@@ -75,13 +109,16 @@ pub enum Unlike {
     Sweep,
 }
 
-/// Judges whether `points` can be those of one object, in any unit, and returns what they probably
-/// are instead. Points that are not finite do not count.
+/// Judges whether `points` can be those of one object, seen from `sensor` in any unit, and returns what
+/// they probably are instead. Points that are not finite do not count.
 ///
 /// # Errors
-/// Points that are all in one place.
-pub fn judge_object(points: &[[f64; 3]]) -> Result<Option<Unlike>, String> {
-    let points = || points.iter().filter(|point| point.iter().all(|x| x.is_finite()));
+/// Points that are all in one place or on one line.
+pub fn judge_object(points: &[[f64; 3]], sensor: [f64; 3]) -> Result<Option<Unlike>, String> {
+    let points = || {
+        let finite = points.iter().filter(|point| point.iter().all(|x| x.is_finite()));
+        finite.map(|point| [0, 1, 2].map(|i| point[i] - sensor[i]))
+    };
     let (mut n, mut low, mut high) = (0, [f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     for point in points() {
         n += 1;
@@ -89,9 +126,12 @@ pub fn judge_object(points: &[[f64; 3]]) -> Result<Option<Unlike>, String> {
             ([0, 1, 2].map(|i| low[i].min(point[i])), [0, 1, 2].map(|i| high[i].max(point[i])));
     }
     if n > 0 && low == high {
-        return Err(format!("expected points of an object, found {n} in one place, {low:?}"));
+        let place = [0, 1, 2].map(|i| low[i] + sensor[i]);
+        return Err(format!("expected points of an object, found {n} in one place, {place:?}"));
     }
-    let length = |point: [f64; 3]| point.iter().map(|x| x * x).sum::<f64>().sqrt();
+    if n > 0 && are_on_a_line(points()) {
+        return Err(format!("expected points of an object, found {n} on one line"));
+    }
     let size = length([0, 1, 2].map(|i| high[i] - low[i]));
     let place = length([0, 1, 2].map(|i| (high[i] + low[i]) / 2.0));
     // Objects of streets in metres from the sensor; meshes are mostly nearer to their origin.
@@ -99,15 +139,54 @@ pub fn judge_object(points: &[[f64; 3]]) -> Result<Option<Unlike>, String> {
         return Ok(Some(Unlike::OneSide));
     }
     // A sensor has most points near it; in objects, few are near the middle.
-    let farthest = points().map(|point| length(*point)).fold(0.0, f64::max);
-    let near = points().filter(|point| length(**point) < 0.3 * farthest).count();
+    let farthest = points().map(length).fold(0.0, f64::max);
+    let near = points().filter(|point| length(*point) < 0.3 * farthest).count();
     let is_sweep = n >= 10_000 && 2 * near > n && (20.0..2e3).contains(&farthest);
-    Ok(is_sweep.then_some(Unlike::Sweep))
+    Ok((is_sweep || n >= FEWEST_OF_RINGS && are_in_rings(points())).then_some(Unlike::Sweep))
+}
+
+fn length(point: [f64; 3]) -> f64 {
+    point.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// Whether no point is off the line through the two that are farthest apart of the first and another.
+fn are_on_a_line(mut points: impl Iterator<Item = [f64; 3]> + Clone) -> bool {
+    let Some(first) = points.next() else { return true };
+    let from_first = points.map(|point| [0, 1, 2].map(|i| point[i] - first[i]));
+    let longer = |a: [f64; 3], b: [f64; 3]| if length(b) > length(a) { b } else { a };
+    let along = from_first.clone().fold([0.0; 3], longer);
+    let most = ON_A_LINE * length(along).powi(2);
+    from_first.fold(0.0, |off: f64, [x, y, z]| {
+        let [u, v, w] = along;
+        off.max(length([y * w - z * v, z * u - x * w, x * v - y * u]))
+    }) <= most
+}
+
+/// Whether most points lie in rings about the origin, as the beams of a turning sensor do: their
+/// elevations crowd in narrow peaks, and they are on several sides. The surfaces of objects have
+/// elevations of all values.
+fn are_in_rings(points: impl Iterator<Item = [f64; 3]>) -> bool {
+    let (mut counts, mut sectors, mut n) = (vec![0u32; 180 * BINS_A_DEGREE], 0u64, 0u32);
+    for [x, y, z] in points.filter(|point| length(*point) > 0.0) {
+        let elevation_deg = z.atan2(x.hypot(y)).to_degrees() + 90.0;
+        let bin = (elevation_deg * BINS_A_DEGREE as f64) as usize;
+        counts[bin.min(180 * BINS_A_DEGREE - 1)] += 1;
+        sectors |= 1 << ((y.atan2(x).to_degrees() + 180.0) / 10.0) as u32;
+        n += 1;
+    }
+    let is_peak = |bin: &usize| {
+        let around = &counts[bin.saturating_sub(10)..(bin + 11).min(counts.len())];
+        let mean = around.iter().sum::<u32>() / around.len() as u32;
+        counts[*bin] >= 8 && counts[*bin] > 3 * mean
+    };
+    let peaks: Vec<usize> = (0..counts.len()).filter(is_peak).collect();
+    let in_peaks: u32 = peaks.iter().map(|bin| counts[*bin]).sum();
+    sectors.count_ones() >= FEWEST_SECTORS && peaks.len() >= FEWEST_RINGS && 2 * in_peaks > n
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Unlike, judge_object, judge_sweep};
+    use super::{Unlike, coarse_coordinates, judge_object, judge_sweep};
 
     #[test]
     fn sweeps_of_another_unit_or_origin_or_without_points_are_told() {
@@ -127,6 +206,42 @@ mod tests {
         }
     }
 
+    /// An f32 has 24 bits: at 5,400,000 m, between 2^22 and 2^23, the last is worth half a metre.
+    #[test]
+    fn coordinates_that_have_lost_digits_are_told() {
+        let utm = [456_789.123, 5_400_000.456, 210.5];
+        let rounded = utm.map(|x| f64::from(x as f32));
+        let told = coarse_coordinates([[0.0; 3], rounded, [f64::NAN; 3]]).unwrap();
+        assert!(told.contains("which are 0.5 m apart at 5400000.5 m"), "{told}");
+        assert_eq!(coarse_coordinates([rounded, utm]), None);
+        assert_eq!(coarse_coordinates([[1234.5, 0.0, -60_000.0]]), None);
+    }
+
+    /// A room of 6 by 4 by 3 m, as 16 rings from -15 to 15 degrees find it from its middle, and the
+    /// same walls with points that are evenly spread.
+    #[test]
+    fn a_sweep_of_a_room_is_told_by_its_rings() {
+        let directions = (0..16).flat_map(|ring| (0..1800).map(move |turn| (ring, turn)));
+        let room = directions.map(|(ring, turn)| {
+            let (elevation, azimuth) = (f64::from(2 * ring - 15), f64::from(turn) * 0.2);
+            let (elevation, azimuth) = (elevation.to_radians(), azimuth.to_radians());
+            let (up, level) = elevation.sin_cos();
+            let towards = [level * azimuth.cos(), level * azimuth.sin(), up];
+            let to_wall = |axis: usize| [3.0, 2.0, 1.5][axis] / towards[axis].abs();
+            let range = to_wall(0).min(to_wall(1)).min(to_wall(2));
+            [0, 1, 2].map(|i| range * towards[i] + [5.0, 5.0, 1.5][i])
+        });
+        let room: Vec<_> = room.collect();
+        assert_eq!(judge_object(&room, [5.0, 5.0, 1.5]), Ok(Some(Unlike::Sweep)));
+        let walls =
+            (0..120).flat_map(|step| (0..60).map(move |up| (f64::from(step), f64::from(up))));
+        let walls = walls.flat_map(|(along, up)| {
+            let (x, y, z) = (along / 20.0 - 3.0, along / 30.0 - 2.0, up / 20.0 - 1.5);
+            [[x, 2.0, z], [x, -2.0, z], [3.0, y, z], [-3.0, y, z]]
+        });
+        assert_eq!(judge_object(&walls.collect::<Vec<_>>(), [0.0; 3]), Ok(None));
+    }
+
     #[test]
     fn what_is_not_a_whole_object_is_told() {
         let grid =
@@ -138,12 +253,17 @@ mod tests {
             (vec![[1.0, 2.0, 3.0]], Err("found 1 in one place, [1.0, 2.0, 3.0]")),
             (vec![[0.0; 3], [0.0; 3], [f64::NAN; 3]], Err("found 2 in one place")),
             (vec![], Ok(None)),
-            (vec![[8.5, -2.4, -1.6], [9.0, -1.3, 0.2]], Ok(Some(Unlike::OneSide))),
-            (vec![[-0.5; 3], [0.5; 3]], Ok(None)),
+            (vec![[-0.5; 3], [0.5; 3]], Err("found 2 on one line")),
+            (vec![[0.1, 0.2, 0.3], [0.7, 0.9, -0.4], [1.3, 1.6, -1.1]], Err("found 3 on one line")),
+            (
+                vec![[8.5, -2.4, -1.6], [9.0, -1.3, 0.2], [8.7, -2.0, 1.0]],
+                Ok(Some(Unlike::OneSide)),
+            ),
+            (vec![[-0.5; 3], [0.5; 3], [0.5, -0.5, 0.5]], Ok(None)),
             (floor.collect(), Ok(Some(Unlike::Sweep))),
             (grid(60).map(|[x, y]| [x, y, 0.0]).collect(), Ok(None)),
         ] {
-            match (judge_object(&points), expected) {
+            match (judge_object(&points, [0.0; 3]), expected) {
                 (Err(found), Err(expected)) => assert!(found.contains(expected), "{found}"),
                 (found, expected) => assert_eq!(found, expected.map_err(str::to_owned)),
             }

@@ -25,6 +25,15 @@ pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3
     Ok(points)
 }
 
+/// The pose of a scan's sensor, row by row.
+pub(super) fn read_pose(
+    reader: &mut impl BufRead,
+    name: &Path,
+) -> Result<Option<[f64; 16]>, FormatError> {
+    let frame = read_elements(reader, name, &["vertex"], |_, _| Ok(Vec::new()), |_, _| {})?;
+    Ok(frame.pose)
+}
+
 /// Writes `points` as binary PLY, little-endian.
 pub(super) fn write(
     writer: &mut impl Write,

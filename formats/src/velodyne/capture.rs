@@ -1,5 +1,6 @@
 //! Reads the first turn of a capture as a scan, and counts returns.
 
+use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -12,6 +13,11 @@ use crate::returns::Kind;
 use crate::scan::Scan;
 use crate::vlp32c::packet::PAYLOAD_SIZE;
 use crate::vlp32c::{AZIMUTH_UNIT_DEG, Returns, WHITE};
+
+/// The period of the time stamps, microseconds.
+const HOUR_US: f64 = 3.6e9;
+/// Longer steps are gaps, even if the head stands still, microseconds.
+const LONGEST_STEP_US: f64 = 1e6;
 
 /// Counts the beams with a return in the capture of a VLP-32C at `path`. Two returns of a beam count
 /// as one.
@@ -66,35 +72,51 @@ pub fn read_turn(path: &Path, senders: &mut Senders) -> Result<(Scan, Counts), F
 #[derive(Default)]
 struct Turn {
     decoder: Option<Decoder>,
-    before: Option<Header>,
-    /// Azimuth units from the start of the first packet to that of the last.
-    start: f64,
-    /// Microseconds since the first packet.
-    time_us: f64,
+    /// The last packet by its time, its start in azimuth units after that of the first packet, and
+    /// microseconds after it.
+    last: Option<(Header, f64, f64)>,
+    /// The times of the packets.
+    stamps: BTreeSet<u32>,
     points: Points,
 }
 
 impl Turn {
-    /// Adds a packet, or breaks if the turn was complete before it.
+    /// Adds a packet, or breaks if the turn was complete before it. A network may deliver packets
+    /// twice and in another order. After a gap, a turn begins.
     fn take(&mut self, payload: &[u8]) -> Result<ControlFlow<()>, PacketError> {
         if payload.len() != PAYLOAD_SIZE {
             return Ok(ControlFlow::Continue(()));
         }
         let header = Header::parse(payload)?;
-        if let Some(before) = self.before {
-            self.start += f64::from(advance(before.azimuth, header.azimuth));
-            if self.start >= f64::from(TURN) {
+        let (mut start, mut time_us) = (0.0, 0.0);
+        if let Some((last, last_start, last_us)) = self.last {
+            let step_us = step_us(&last, &header);
+            let turned = if step_us < 0.0 {
+                -f64::from(advance(header.azimuth, last.azimuth))
+            } else {
+                f64::from(advance(last.azimuth, header.azimuth))
+            };
+            (start, time_us) = (last_start + turned, last_us + step_us);
+            if is_gap(&last, step_us) {
+                *self = Self::default();
+                (start, time_us) = (0.0, 0.0);
+            } else if start >= f64::from(TURN) {
                 return Ok(ControlFlow::Break(()));
+            } else if start < 0.0 || time_us < 0.0 {
+                return Ok(ControlFlow::Continue(()));
             }
-            // Times restart every hour.
-            self.time_us += f64::from(header.time_us.saturating_sub(before.time_us));
         }
-        self.before = Some(header);
-        let Self { decoder, start, time_us, points, .. } = self;
+        if !self.stamps.insert(header.time_us) {
+            return Ok(ControlFlow::Continue(()));
+        }
+        if self.last.is_none_or(|(_, _, last_us)| time_us >= last_us) {
+            self.last = Some((header, start, time_us));
+        }
+        let Self { decoder, points, .. } = self;
         let decoder = decoder.get_or_insert_with(|| Decoder::new(header.model));
         decoder.decode(payload, |found| {
-            if *start + header.units_per_us * found.after_us < f64::from(TURN) {
-                points.push(found, *time_us, f32::from(WHITE));
+            if start + header.units_per_us * found.after_us < f64::from(TURN) {
+                points.push(found, time_us, f32::from(WHITE));
             }
         })?;
         Ok(ControlFlow::Continue(()))
@@ -102,7 +124,17 @@ impl Turn {
 
     /// Azimuth units from the start of the first packet to the end of the last.
     fn end(&self) -> f64 {
-        let span = |last: Header| last.units_per_us * last.duration_us();
-        self.start + self.before.map_or(0.0, span)
+        self.last.map_or(0.0, |(last, start, _)| start + last.units_per_us * last.duration_us())
     }
+}
+
+/// Microseconds from one packet to another, by the shorter way around the hour.
+fn step_us(from: &Header, to: &Header) -> f64 {
+    let step_us = f64::from(to.time_us) - f64::from(from.time_us);
+    (step_us + HOUR_US / 2.0).rem_euclid(HOUR_US) - HOUR_US / 2.0
+}
+
+/// Whether azimuths no longer tell how far the head turned in a step after `last`.
+fn is_gap(last: &Header, step_us: f64) -> bool {
+    step_us.abs() > LONGEST_STEP_US || last.units_per_us * step_us.abs() > f64::from(TURN) / 4.0
 }

@@ -11,7 +11,7 @@ use crate::sampler::{SamplerKind, SamplerSpec};
 use crate::{Classifier, Options, Precision, UpAxis};
 use anyhow::Context;
 use formats::FormatError;
-use formats::cloud_file::{CloudFormat, Unlike, judge_object, read_cloud_as};
+use formats::cloud_file::{CloudFormat, Unlike, judge_object, read_cloud_as, read_viewpoint};
 use formats::model_card::{ModelCard, Normalization};
 use formats::outcome::{joined_causes, say};
 
@@ -195,7 +195,10 @@ impl Session<'_> {
     ) -> anyhow::Result<()> {
         let judged = read.map_err(anyhow::Error::from).and_then(|points| {
             let named = || name.display().to_string();
-            let unlike = judge_object(&points).map_err(anyhow::Error::msg).with_context(named)?;
+            let pose = read_viewpoint(name, self.args.format).ok().flatten();
+            let sensor = pose.map_or([0.0; 3], |pose| [pose[3], pose[7], pose[11]]);
+            let unlike = judge_object(&points, sensor).map_err(anyhow::Error::msg);
+            let unlike = unlike.with_context(named)?;
             Ok((points, unlike))
         });
         let (points, unlike) = match judged {

@@ -163,6 +163,7 @@ fn a_wrong_command_line_gives_2_and_a_failure_1() {
         ("train --recipe small.toml --data nowhere --out m.safetensors", 1),
         ("explain --model m.safetensors --cloud c.xyz --points 0", 2),
         ("explain --model m.safetensors --cloud nowhere.xyz", 1),
+        ("explain --model edge-64 --cloud mine.xyz", 1),
         ("compare-points nowhere.xyz nowhere.xyz", 1),
         ("train --data . --out m.pth", 2),
         ("train --data . --out folder.safetensors", 2),

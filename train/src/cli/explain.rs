@@ -3,7 +3,10 @@ use std::path::PathBuf;
 use crate::explanation_drawing;
 use crate::lime::{Explanation, Lime, explain};
 use crate::random_baseline::RandomBaseline;
+use anyhow::{Context, Error};
 use formats::atomic;
+use formats::cloud_file::{Unlike, judge_object};
+use formats::outcome::say;
 use formats::outputs::Overwrite;
 use infer_cpu::sampler::{Resize, SamplerKind, SamplerSpec};
 use infer_cpu::{Classifier, Normalization, Options};
@@ -47,6 +50,11 @@ pub fn run(args: &ExplainArgs) -> anyhow::Result<()> {
     check(args)?;
     args.overwrite.check(args.svg.iter().map(PathBuf::as_path))?;
     let cloud = read_finite(&args.cloud)?;
+    let file = || args.cloud.display().to_string();
+    let unlike = judge_object(&cloud, [0.0; 3]).map_err(Error::msg).with_context(file)?;
+    if unlike == Some(Unlike::Sweep) {
+        say(format!("warning: {} {}", file(), Unlike::Sweep));
+    }
     let spec = SamplerSpec {
         kind: SamplerKind::Cpl,
         points: args.points,
