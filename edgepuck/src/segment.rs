@@ -31,7 +31,7 @@ pub struct SegmentArgs {
 }
 
 pub fn run(args: &SegmentArgs) -> anyhow::Result<Outcome> {
-    args.overwrite.check([&*args.out])?;
+    args.overwrite.check_folder(&args.out)?;
     let (scan, settings) = match args.radius {
         Some(radius_m) => (args.input.read()?, Settings::of_components(radius_m)),
         None => (args.input.read_upright()?, Settings::default()),

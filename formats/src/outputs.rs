@@ -12,40 +12,55 @@ pub struct Overwrite {
 }
 
 impl Overwrite {
-    /// Checks that none of the files or folders `outputs` exists, unless they may be replaced, and
-    /// that [they can be made](check_place).
+    /// Checks that none of `files` exists, unless they may be replaced, and that [they can be
+    /// made](check_place).
     ///
     /// # Errors
-    /// Names the first for which this does not hold.
-    pub fn check<'a>(&self, outputs: impl IntoIterator<Item = &'a Path>) -> Result<(), Usage> {
-        outputs.into_iter().try_for_each(|path| {
-            // Devices and pipes hold nothing to lose.
-            if !self.overwrite && (path.is_file() || path.is_dir()) {
-                let cause = "it exists already: --overwrite replaces it";
-                return Err(Usage(format!("{}: {cause}", path.display())));
-            }
-            check_place(path)
+    /// Names the first for which this does not hold, or that is a folder.
+    pub fn check<'a>(&self, files: impl IntoIterator<Item = &'a Path>) -> Result<(), Usage> {
+        files.into_iter().try_for_each(|file| match file.is_dir() {
+            true => Err(refused(file, "expected a file to write, found a folder: name another")),
+            false => self.check_path(file),
         })
     }
 
-    /// As [`Overwrite::check`]; removes the folders that are there, if all files in them are those
-    /// of an earlier run, `is_ours`.
+    /// As [`Overwrite::check`], for a folder.
     ///
     /// # Errors
-    /// As [`Overwrite::check`], a folder has another file, or it cannot be removed.
+    /// As [`Overwrite::check`], or it is a file.
+    pub fn check_folder(&self, folder: &Path) -> Result<(), Usage> {
+        match folder.is_file() {
+            true => Err(refused(folder, "expected a folder to write, found a file: name another")),
+            false => self.check_path(folder),
+        }
+    }
+
+    fn check_path(&self, path: &Path) -> Result<(), Usage> {
+        // Devices and pipes hold nothing to lose.
+        if !self.overwrite && (path.is_file() || path.is_dir()) {
+            return Err(refused(path, "it exists already: --overwrite replaces it"));
+        }
+        check_place(path)
+    }
+
+    /// As [`Overwrite::check_folder`]; removes the folders that are there, if all files in them are
+    /// those of an earlier run, `is_ours`.
+    ///
+    /// # Errors
+    /// As [`Overwrite::check_folder`], a folder has another file, or it cannot be removed.
     pub fn clear<'a>(
         &self,
         folders: impl IntoIterator<Item = &'a Path>,
         is_ours: impl Fn(&Path) -> bool,
     ) -> anyhow::Result<()> {
         let folders: Vec<&Path> = folders.into_iter().collect();
-        self.check(folders.iter().copied())?;
-        for folder in folders.iter().filter(|folder| folder.exists()) {
+        for folder in &folders {
             if let Some(other) = other_file(folder, &is_ours)? {
                 let cause = "another file than this command writes is in a folder to replace: \
                              move it, or choose another --out";
-                return Err(Usage(format!("{}: {cause}", other.display())).into());
+                return Err(refused(&other, cause).into());
             }
+            self.check_folder(folder)?;
         }
         for folder in folders.into_iter().filter(|folder| folder.exists()) {
             std::fs::remove_dir_all(folder)?;
@@ -54,8 +69,15 @@ impl Overwrite {
     }
 }
 
-/// A file in `folder` or below that is not `is_ours`.
+fn refused(path: &Path, cause: &str) -> Usage {
+    Usage(format!("{}: {cause}", path.display()))
+}
+
+/// A file in `folder` or below, if it is one, that is not `is_ours`.
 fn other_file(folder: &Path, is_ours: &impl Fn(&Path) -> bool) -> std::io::Result<Option<PathBuf>> {
+    if !folder.is_dir() {
+        return Ok(None);
+    }
     for entry in std::fs::read_dir(folder)? {
         let path = entry?.path();
         let other = match path.is_dir() && !path.is_symlink() {

@@ -96,4 +96,19 @@ fn a_folder_in_use_is_refused_unless_told_otherwise() {
     folder.write("out/mine.txt", "mine");
     folder.succeeds(&format!("{words} --overwrite --seed 9"));
     assert!(folder.at("out/mine.txt").exists(), "what is not ours stays");
+    // Advice that would not help is not given.
+    for (file, what) in [
+        ("a/manifest.json", "another file"),
+        ("b/packed/c", "another folder"),
+        ("d/journal/e", "another folder"),
+    ] {
+        folder.write(file, "mine");
+        for flag in ["", "--resume", "--overwrite"] {
+            let cause = format!("{what}, where a dataset's would go: move it, or choose");
+            let words = format!("gen-dataset meshes --out {} --adapter cpu {flag}", &file[..1]);
+            let said = folder.exits(1, &words);
+            assert!(said.contains(&cause) && !said.contains("--overwrite"), "{words}: {said}");
+            assert_eq!(folder.text(file), "mine", "{words}");
+        }
+    }
 }

@@ -116,4 +116,17 @@ fn an_output_that_exists_is_replaced_only_if_asked() {
     folder.write("s/sweeps/000009.npz", "of another set");
     folder.succeeds(&format!("{scenes} --overwrite"));
     assert!(!folder.at("s/sweeps/000009.npz").exists());
+    // A file is no folder to replace, nor a folder a file.
+    folder.write("folder.npz/a", "mine");
+    let folder_found = "folder.npz: expected a file to write, found a folder: name another";
+    let file_found = "a.obj: expected a folder to write, found a file: name another";
+    for flag in ["", "--overwrite"] {
+        folder.refuses(
+            2,
+            &[
+                (&format!("scan a.obj --out folder.npz {flag}"), folder_found),
+                (&format!("segment a.npz --out a.obj {flag}"), file_found),
+            ],
+        );
+    }
 }

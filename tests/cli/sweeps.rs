@@ -48,8 +48,10 @@ fn a_sweep_is_cut_and_its_clusters_are_named() {
     assert!(said.contains("warning: no cluster is in the test part"), "{said}");
     // Files of others stay, whatever is replaced.
     std::fs::write(folder.at("scenes/sweeps/mine.bin"), "mine").unwrap();
-    let said = folder.exits(2, "gen-scenes --adapter cpu --sweeps 1 --out scenes --overwrite");
-    assert!(said.contains("mine.bin: another file than this command writes"), "{said}");
+    for flag in ["", "--overwrite"] {
+        let words = format!("gen-scenes --adapter cpu --sweeps 1 --out scenes {flag}");
+        folder.refuses(2, &[(&words, "mine.bin: another file than this command writes")]);
+    }
     assert!(folder.at("scenes/packed/train.npz").exists());
     let sweep = "scenes/sweeps/000000.npz";
     let said = folder.succeeds(&format!("segment {sweep} --out clusters"));

@@ -73,7 +73,7 @@ pub fn run(args: &CorruptArgs) -> anyhow::Result<Outcome> {
         std::io::stdout().write_all(listed(&plan).as_bytes())?;
         return Ok(Outcome::Success);
     }
-    args.overwrite.check([&*args.out])?;
+    args.overwrite.check_folder(&args.out)?;
     let sweep = args.sweep.clone().expect("invariant: required without --list");
     let input = SweepArgs { sweep, place: args.place.clone() };
     let sensor = Sensor::resolve(&args.profile)?;

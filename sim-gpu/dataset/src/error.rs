@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DatasetError {
-    /// The folder holds files already.
+    /// The folder holds a dataset already.
     #[error(
         "{}: holds {what} already; continue it with --resume, replace it with --overwrite, or \
          choose another folder with --out", path.display()
@@ -18,7 +18,17 @@ pub enum DatasetError {
     Occupied {
         /// The folder.
         path: PathBuf,
-        /// The files.
+        /// The dataset, finished or not, or tars.
+        what: &'static str,
+    },
+    /// A file or a folder that no run made stands where a dataset's would go.
+    #[error("{}: {what}, where a dataset's would go: move it, or choose another folder with --out",
+        path.display()
+    )]
+    InTheWay {
+        /// The file or the folder.
+        path: PathBuf,
+        /// What it is.
         what: &'static str,
     },
     /// The dataset is not finished.

@@ -101,6 +101,15 @@ impl Journal {
         layout::remove(&self.folder)
     }
 
+    /// Removes the folder that a run leaves without terms if it is killed at its very beginning.
+    /// One with other files stays.
+    pub fn remove_empty(&self) -> Result<(), DatasetError> {
+        atomic::sweep_leftovers(&self.folder)?;
+        // It may be absent, or hold files of the user.
+        let _ = std::fs::remove_dir(&self.folder);
+        Ok(())
+    }
+
     fn terms_file(&self) -> PathBuf {
         self.folder.join("terms.json")
     }

@@ -24,8 +24,8 @@ use std::sync::atomic::Ordering::SeqCst;
 /// interrupted. A mesh that cannot be scanned is no error, but a failure that the manifest lists.
 ///
 /// # Errors
-/// - [`DatasetError::Occupied`] or [`DatasetError::Different`] if the folder holds files that
-///   [`Plan::begin`] does not allow;
+/// - [`DatasetError::Occupied`], [`DatasetError::InTheWay`] or [`DatasetError::Different`] if the
+///   folder holds files that [`Plan::begin`] does not allow;
 /// - settings that the layouts cannot hold, or effects that do not fit a sensor;
 /// - [`DatasetError::Interrupted`] if [`Progress::stop`] was set before all meshes were scanned;
 /// - a file that cannot be written, or an adapter that fails.
@@ -56,53 +56,57 @@ pub(crate) fn begin(
     how: Begin,
 ) -> Result<Option<Manifest>, DatasetError> {
     let journal = Journal::at(out);
-    let finished = layout::manifest(out).exists();
+    let finished = Manifest::read(&layout::manifest(out));
     match how {
         Begin::Fresh => refuse_occupied(out, terms)?,
-        Begin::Overwrite if finished || journal.exists() => remove(out, terms)?,
+        Begin::Overwrite if finished.is_ok() || journal.exists() => remove(out, terms)?,
         Begin::Overwrite => refuse_occupied(out, terms)?,
         Begin::Resume if journal.exists() => {
             same_terms(out, &journal.terms()?, terms)?;
             return Ok(None);
         }
-        Begin::Resume if finished => {
-            let manifest = Manifest::read(&layout::manifest(out))?;
-            same_terms(out, &manifest.terms(), terms)?;
-            // A run that was killed at its very end leaves parts of its journal and of the files
-            // that it was writing.
-            journal.remove()?;
-            atomic::sweep_leftovers(out)?;
-            return Ok(Some(manifest));
-        }
-        Begin::Resume => {
-            // A run that was killed at its very beginning leaves a journal without terms.
-            journal.remove()?;
-            refuse_occupied(out, terms)?;
-        }
+        Begin::Resume => match finished {
+            Ok(manifest) => {
+                same_terms(out, &manifest.terms(), terms)?;
+                // A run that was killed at its very end leaves parts of its journal and of the
+                // files that it was writing.
+                journal.remove()?;
+                atomic::sweep_leftovers(out)?;
+                return Ok(Some(manifest));
+            }
+            Err(_) => {
+                journal.remove_empty()?;
+                refuse_occupied(out, terms)?;
+            }
+        },
     }
     journal.begin(terms)?;
     Ok(None)
 }
 
 fn refuse_occupied(out: &Path, terms: &Terms) -> Result<(), DatasetError> {
-    let what = if layout::journal(out).exists() {
-        "an unfinished dataset"
-    } else if layout::manifest(out).exists() {
-        "a dataset"
-    } else if layout::top_level(&terms.config).iter().any(|name| out.join(name).exists()) {
-        "files where a dataset's would go"
-    } else {
-        return Ok(());
-    };
-    Err(DatasetError::Occupied { path: out.into(), what })
+    let occupied = |what| Err(DatasetError::Occupied { path: out.into(), what });
+    if Journal::at(out).exists() {
+        return occupied("an unfinished dataset");
+    }
+    if Manifest::read(&layout::manifest(out)).is_ok() {
+        return occupied("a dataset");
+    }
+    let names = layout::top_level(&terms.config);
+    match names.iter().map(|name| out.join(name)).find(|path| path.exists()) {
+        Some(path) => {
+            let what = if path.is_dir() { "another folder" } else { "another file" };
+            Err(DatasetError::InTheWay { path, what })
+        }
+        None => Ok(()),
+    }
 }
 
 /// Removes the files of the dataset in `out`, and no other files beside them.
 fn remove(out: &Path, terms: &Terms) -> Result<(), DatasetError> {
     let mut names = layout::top_level(&terms.config);
-    let manifest = layout::manifest(out);
-    if manifest.exists() {
-        names.extend(layout::top_level(&Manifest::read(&manifest)?.config));
+    if let Ok(manifest) = Manifest::read(&layout::manifest(out)) {
+        names.extend(layout::top_level(&manifest.config));
     } else if let Ok(begun) = Journal::at(out).terms() {
         names.extend(layout::top_level(&begun.config));
     }

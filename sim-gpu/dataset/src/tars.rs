@@ -90,8 +90,8 @@ pub type HandOver<'a> = &'a (dyn Fn(&Path) -> Result<(), String> + Sync);
 /// plan.
 ///
 /// # Errors
-/// - [`DatasetError::Occupied`] or [`DatasetError::Different`] if the folder holds files that
-///   [`Plan::begin`] does not allow;
+/// - [`DatasetError::Occupied`], [`DatasetError::InTheWay`] or [`DatasetError::Different`] if the
+///   folder holds files that [`Plan::begin`] does not allow;
 /// - settings of several sets, or effects that do not fit the sensor;
 /// - [`DatasetError::Interrupted`] if [`Progress::stop`] was set before all tars were made;
 /// - [`DatasetError::NotHandedOver`] if tars are complete but could not be handed over;
@@ -153,8 +153,9 @@ pub fn make_tars(
 /// of other parts stay, and so do those of the user.
 fn begin(plan: &Plan, part: (u32, u32)) -> Result<(), DatasetError> {
     let occupied = |what| DatasetError::Occupied { path: plan.out.to_owned(), what };
-    if layout::manifest(plan.out).exists() || layout::journal(plan.out).exists() {
-        return Err(occupied("a dataset of another layout"));
+    let others = [layout::manifest(plan.out), layout::journal(plan.out)];
+    if let Some(path) = others.into_iter().find(|path| path.exists()) {
+        return Err(DatasetError::InTheWay { path, what: "a dataset of another layout" });
     }
     if plan.begin == Begin::Overwrite {
         retract(plan.out)?;
