@@ -52,12 +52,12 @@ fn each_command_has_the_same_names_of_models() {
 }
 
 #[test]
-fn a_mesh_of_zero_area_is_scanned_to_nothing() {
-    let folder = Folder::new();
-    folder.write("m/flat/a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n");
-    let said = folder.exits(3, "gen-dataset m --out out --adapter cpu");
-    assert!(said.contains("No scan of rotational holds a point: no beam met a mesh"), "{said}");
-    assert!(said.contains("warning: flat/a.off: no triangle has an area"), "{said}");
+fn a_mesh_without_area_is_a_bad_mesh() {
+    let folder = Folder::with_meshes();
+    folder.write("meshes/flat/a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n");
+    let said = folder.exits(3, "gen-dataset meshes --out out --adapter cpu --views 1");
+    assert!(said.contains("failed: flat/a.off: no triangle has an area, so that no"), "{said}");
+    assert!(said.contains(", 1 failed; "), "{said}");
 }
 
 #[test]

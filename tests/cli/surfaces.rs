@@ -72,7 +72,7 @@ fn a_bad_mesh_is_named_and_the_others_go_on() {
     folder.write("shapes/cup/test/torn.off", "OFF\n3 1 0\n0 0 0\n1 0");
     let said = folder.exits(3, "sample-surfaces shapes --out out --points 50");
     for part in
-        ["cup/test/flat.off: no triangle with an area", "cup/test/torn.off:4", "20 meshes: out"]
+        ["cup/test/flat.off: no triangle has an area", "cup/test/torn.off:4", "20 meshes: out"]
     {
         assert!(said.contains(part), "{part} in {said}");
     }

@@ -19,7 +19,7 @@ use sim_gpu::internals::material::{Material, MaterialChoice, MaterialError, Mate
 use sim_gpu::internals::mesh::frame::{Normalize, Unit, Up, to_world};
 use sim_gpu::internals::mesh::tree::MeshEntry;
 use sim_gpu::internals::mesh::validate::triangle_stats;
-use sim_gpu::internals::mesh::{LoadedMesh, TriangleMesh};
+use sim_gpu::internals::mesh::{LoadedMesh, NO_AREA, TriangleMesh};
 use sim_gpu::internals::ray::RayFrame;
 use sim_gpu::internals::scan::ObjectHits;
 use sim_gpu::internals::simplify::{Simplified, Viewpoint, resolved_m, simplified_surface};
@@ -157,6 +157,9 @@ pub(crate) fn read(
     let mesh = mesh.in_metres(unit);
     let world = to_world(&mesh, up, normalize);
     let stats = triangle_stats(&world.mesh);
+    if stats.kept.is_empty() {
+        return Err(MeshFailure::new(entry, NO_AREA));
+    }
     let (centre, views_around) = if normalize == Normalize::None {
         (DVec3::ZERO, world.centre)
     } else {

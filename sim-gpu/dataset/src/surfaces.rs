@@ -12,6 +12,7 @@ use formats::hash::Hashing;
 use formats::streams::Stream;
 use glam::DVec3;
 use sim_gpu::internals::bvh::Builder;
+use sim_gpu::internals::mesh::NO_AREA;
 use sim_gpu::internals::mesh::frame::{Normalize, Unit, Up};
 use sim_gpu::internals::mesh::tree::MeshEntry;
 use sim_gpu::internals::sensor::Views;
@@ -81,7 +82,7 @@ fn draw(
     let seed = config.seed;
     let points =
         area_uniform(&surface, n * (1 + CANDIDATES), Stream::Surface { mesh: &id }.key(seed));
-    let points = points.ok_or_else(|| MeshFailure::new(mesh, "no triangle with an area"))?;
+    let points = points.ok_or_else(|| MeshFailure::new(mesh, NO_AREA))?;
     let (own, candidates) = points.split_at(n);
     let rounded = |points: &[DVec3]| -> Vec<[f32; 3]> {
         points.iter().map(|point| point.as_vec3().to_array()).collect()

@@ -79,7 +79,10 @@ fn parse_as(bytes: &[u8], format: MeshFormat) -> Result<Parsed, ParseError> {
     parsed.and_then(|parsed| check(&parsed.mesh).map(|()| parsed))
 }
 
-/// A warning if no triangle of `mesh` has an area.
+/// The warning of meshes without area.
+pub const NO_AREA: &str = "no triangle has an area, so that no beam can hit the mesh";
+
+/// [`NO_AREA`] if no triangle of `mesh` has an area.
 pub fn flat(mesh: &TriangleMesh) -> Option<String> {
     let has_area = |corners: &[u32; 3]| {
         let [a, b, c] = corners.map(|corner| mesh.vertices[corner as usize]);
@@ -87,8 +90,7 @@ pub fn flat(mesh: &TriangleMesh) -> Option<String> {
         // Products of very short edges would be 0.
         longest > 0.0 && ((b - a) / longest).cross((c - a) / longest) != DVec3::ZERO
     };
-    (!mesh.triangles.iter().any(has_area))
-        .then(|| "no triangle has an area, so that no beam can hit the mesh".to_owned())
+    (!mesh.triangles.iter().any(has_area)).then(|| NO_AREA.to_owned())
 }
 
 pub(super) fn read(path: &Path) -> Result<Vec<u8>, MeshError> {

@@ -21,5 +21,5 @@ pub mod validate;
 pub(crate) use appearance::{Appearance, Colour, ColourMap, colours, file_name};
 pub use error::{Malformed, MeshError, ParseError};
 pub use format::{MeshFormat, mesh_extensions};
-pub use load::{LoadedMesh, check, flat, load, load_hashed, parse};
+pub use load::{LoadedMesh, NO_AREA, check, flat, load, load_hashed, parse};
 pub use triangle_mesh::{Parsed, TriangleMesh};
