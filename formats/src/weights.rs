@@ -18,6 +18,10 @@ const LENGTH_SIZE: u64 = 8;
 /// The longest header that the crate `safetensors` accepts.
 const LONGEST_HEADER: u64 = 100_000_000;
 
+/// Bytes that tell other kinds of files: the name of a zip archive's first entry is among them.
+const EXAMINED: u64 = 256;
+const CHECKPOINT: &str = "a PyTorch checkpoint: import its weights";
+
 /// A tensor of f32 and its shape.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tensor {
@@ -33,6 +37,30 @@ pub struct WeightsFile {
     file: Box<dyn Source>,
     data_offset: u64,
     header: Metadata,
+}
+
+/// What a file is that begins with `start`, if it is of a kind that is taken for a model.
+fn of_another_kind(start: &[u8]) -> Option<&'static str> {
+    const KINDS: [(&[u8], &str); 4] = [
+        // A pickle of protocol 2, from before PyTorch 1.6.
+        (b"\x80\x02", CHECKPOINT),
+        (b"\x93NUMPY", "an array of NumPy, such as a cloud: name a model"),
+        (b"ply", "a cloud or a mesh: name a model"),
+        (b"# .PCD", "a cloud: name a model"),
+    ];
+    let Some(entry) = start.strip_prefix(b"PK\x03\x04") else {
+        let known = KINDS.iter().find(|(sign, _)| start.starts_with(sign));
+        return known.map(|(_, what)| *what);
+    };
+    // The name of the first entry: 26 bytes into a zip archive is its length (APPNOTE.TXT, 4.3.7).
+    let length = entry.get(22..24).map_or(0, |size| u16::from_le_bytes([size[0], size[1]]));
+    let name = entry.get(26..).unwrap_or_default();
+    let name = name.get(..length.into()).unwrap_or(name);
+    Some(match name {
+        name if name.ends_with(b".npy") => "an NPZ file, such as a scan or a cloud: name a model",
+        name if name.contains(&b'/') => CHECKPOINT,
+        _ => "a zip archive",
+    })
 }
 
 /// A file, or its bytes in memory.
@@ -89,18 +117,16 @@ impl WeightsFile {
         let bad = |cause: String| FormatError::malformed(path, "header", cause);
         let mut length = [0; LENGTH_SIZE as usize];
         file.read_exact(&mut length).map_err(|_| bad("too short for safetensors".to_owned()))?;
-        let start = length;
+        let mut start = length.to_vec();
         let length = u64::from_le_bytes(length);
         if length > LONGEST_HEADER || length > file_size - LENGTH_SIZE {
-            // Zip archives, and pickles of protocol 2 from before PyTorch 1.6. A valid length is
-            // tested first, since a header of 640 bytes begins with 80 02 as well.
-            if start.starts_with(b"PK\x03\x04") || start.starts_with(b"\x80\x02") {
-                let cause = "expected safetensors, found a PyTorch checkpoint: import its weights";
-                return Err(bad(cause.to_owned()));
-            }
-            return Err(bad(format!(
-                "expected safetensors, found a header of {length} bytes in a file of {file_size}"
-            )));
+            // A valid length is tested first, since a header of 640 bytes begins as pickles do.
+            (&mut file).take(EXAMINED).read_to_end(&mut start).map_err(here)?;
+            let found = of_another_kind(&start).map_or_else(
+                || format!("a header of {length} bytes in a file of {file_size}"),
+                str::to_owned,
+            );
+            return Err(bad(format!("expected safetensors, found {found}")));
         }
         let mut json = Vec::new();
         (&mut file).take(length).read_to_end(&mut json).map_err(here)?;
@@ -303,14 +329,26 @@ mod tests {
     }
 
     #[test]
-    fn a_checkpoint_of_pytorch_s_is_named_as_such() {
+    fn files_of_other_kinds_are_named_as_such() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("best_model.pth");
-        for bytes in [&b"PK\x03\x04 and more that follows"[..], b"\x80\x02\x8a\x0a\x6c\xfc\x9c\x46"]
-        {
+        let zip_of = |name: &str| {
+            let size = [name.len() as u8, 0, 0, 0];
+            [b"PK\x03\x04", &[0; 22][..], &size, name.as_bytes(), b"\0more"].concat()
+        };
+        for (bytes, expected) in [
+            (zip_of("best_model/data.pkl"), "found a PyTorch checkpoint: import its weights"),
+            (b"\x80\x02\x8a\x0a\x6c\xfc\x9c\x46".to_vec(), "found a PyTorch checkpoint"),
+            (zip_of("positions.npy"), "found an NPZ file, such as a scan or a cloud"),
+            (zip_of("a.txt"), "found a zip archive"),
+            (b"PK\x03\x04 cut".to_vec(), "found a zip archive"),
+            (b"\x93NUMPY\x01\0v\0".to_vec(), "found an array of NumPy"),
+            (b"ply\nformat ascii 1.0".to_vec(), "found a cloud or a mesh"),
+            (vec![0xff; 16], "found a header of 18446744073709551615 bytes in a file of 16"),
+        ] {
             std::fs::write(&path, bytes).unwrap();
             let error = WeightsFile::open(&path).err().unwrap().to_string();
-            assert!(error.contains("a PyTorch checkpoint"), "{error}");
+            assert!(error.contains(expected), "{error}");
         }
         let error = WeightsFile::open(folder.path()).err().unwrap().to_string();
         assert!(error.contains("a folder"), "{error}");
