@@ -1,8 +1,12 @@
 //! The exit codes and error messages of programs.
 
+use std::error::Error;
 use std::ffi::OsString;
 use std::fmt::Display;
 use std::io::{self, ErrorKind, Write};
+use std::num::{IntErrorKind, ParseFloatError, ParseIntError};
+
+use clap::error::ContextKind;
 
 /// The exit status of a completed command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,8 +37,24 @@ pub fn parsed<T: clap::FromArgMatches>(
     words: impl IntoIterator<Item = impl Into<OsString> + Clone>,
 ) -> Result<T, clap::Error> {
     let mut command = with_negative_numbers(command);
-    let mut matches = command.try_get_matches_from_mut(words)?;
-    T::from_arg_matches_mut(&mut matches).map_err(|error| error.format(&mut command))
+    let matches = command.try_get_matches_from_mut(words);
+    let read = matches.and_then(|mut matches| T::from_arg_matches_mut(&mut matches));
+    read.map_err(|error| in_words(error).format(&mut command))
+}
+
+/// The error, which says what is expected in place of a word that is not a number.
+fn in_words(error: clap::Error) -> clap::Error {
+    let Some(source) = error.source() else { return error };
+    let expected = match source.downcast_ref().map(ParseIntError::kind) {
+        Some(IntErrorKind::PosOverflow) => "a smaller number",
+        Some(_) => "a whole number, 0 or more",
+        None if source.is::<ParseFloatError>() => "a number",
+        None => return error,
+    };
+    let part = |kind| error.get(kind).map(ToString::to_string).unwrap_or_default();
+    let [value, arg] = [ContextKind::InvalidValue, ContextKind::InvalidArg].map(part);
+    let message = format!("invalid value '{value}' for '{arg}': expected {expected}");
+    clap::Error::raw(error.kind(), message)
 }
 
 fn with_negative_numbers(command: clap::Command) -> clap::Command {
