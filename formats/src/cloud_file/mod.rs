@@ -115,7 +115,8 @@ fn read_file(path: &Path, format: Option<CloudFormat>) -> Result<Vec<[f64; 3]>, 
         CloudFormat::Kitti if format.is_none() => {
             kitti::check_columns(&mut file, path)?;
             let points = kitti::read(&mut BufReader::new(file), found, path)?;
-            check_sweep(points.iter().copied(), path, kitti::REMEDY)?;
+            let remedy = format!("are they in millimetres? Scale them, or {}", kitti::REMEDY);
+            check_sweep(points.iter().copied(), path, &remedy)?;
             Ok(points)
         }
         _ => read_as(&mut BufReader::new(file), found, path),

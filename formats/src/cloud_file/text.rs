@@ -2,8 +2,10 @@
 //!
 //! Semicolons, commas, tabs or blanks separate columns: the first of these that the
 //! first line has. A first line of names, which may be a comment, states the columns of x, y and z,
-//! and their unit if that is not the metre; without names they are the first three. Text after a `#`, and a line that begins with `//`, is a comment. A
-//! line with nothing but a count is that of the points after it, as in Leica's `.pts`.
+//! and their unit if that is not the metre; without names they are the first three, and where pandas
+//! numbers the columns, those after the nameless one. Text after a `#`, and a line that begins with
+//! `//`, is a comment. A line with nothing but a count is that of the points after it, as in Leica's
+//! `.pts`.
 
 use std::io::{self, BufRead, Write};
 use std::path::Path;
@@ -24,6 +26,8 @@ struct Layout {
     separator: Separator,
     columns: [usize; 3],
     unit_m: [f64; 3],
+    /// Whether nothing names the columns, and there are more than three.
+    is_guessed: bool,
 }
 
 pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
@@ -68,8 +72,23 @@ pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3
             let cause = format!("the file ends after {} of {n}", points.len());
             Err(FormatError::malformed(name, "points", cause))
         }
+        _ if layout.is_some_and(|layout| layout.is_guessed) && has_line_numbers(&points) => {
+            let cause = "expected x, y and z, found numbers of the lines in the first column: leave \
+                         it out, or name the columns in a first line, such as `n,x,y,z`";
+            Err(FormatError::malformed(name, "columns", cause))
+        }
         _ => Ok(points),
     }
+}
+
+/// Whether the x of `points` counts them, from 0 or 1, while y or z are not whole numbers. Fewer
+/// points could be so by chance.
+fn has_line_numbers(points: &[[f64; 3]]) -> bool {
+    const FEWEST: usize = 8;
+    let counts_from = |first: usize| (first..).zip(points).all(|(n, [x, ..])| *x == n as f64);
+    points.len() >= FEWEST
+        && (counts_from(0) || counts_from(1))
+        && points.iter().any(|[_, y, z]| y.fract() != 0.0 || z.fract() != 0.0)
 }
 
 fn without_comment(line: &str) -> &str {
@@ -91,7 +110,15 @@ impl Layout {
             let cause = format!("expected x, y and z, found {} column(s)", fields.len());
             return Err(line.error(cause));
         }
-        let (n, is_header) = (fields.len(), fields.iter().all(|field| is_name(field)));
+        let n = fields.len();
+        let is_numbered = fields[0].is_empty()
+            && n > AXES.len()
+            && (0..).zip(&fields[1..]).all(|(i, field)| field.parse() == Ok(i));
+        if is_numbered {
+            let (columns, unit_m) = ([1, 2, 3], [1.0; 3]);
+            return Ok((Self { separator, columns, unit_m, is_guessed: false }, true));
+        }
+        let is_header = fields.iter().all(|field| is_name(field));
         let names: Vec<_> = match is_header {
             true => fields,
             false => separator.fields(comment).collect(),
@@ -107,7 +134,8 @@ impl Layout {
         {
             let unit_m =
                 [x, y, z].map(|at| axis_named(names[at]).map_or(1.0, |(_, unit_m)| unit_m));
-            return Ok((Self { separator, columns: [x, y, z], unit_m }, is_header));
+            let layout = Self { separator, columns: [x, y, z], unit_m, is_guessed: false };
+            return Ok((layout, is_header));
         }
         if is_header {
             let missing = AXES.into_iter().zip(places).find(|(_, place)| place.is_none());
@@ -118,7 +146,8 @@ impl Layout {
                  `{found}`"
             )));
         }
-        Ok((Self { separator, columns: [0, 1, 2], unit_m: [1.0; 3] }, false))
+        let (columns, is_guessed) = ([0, 1, 2], n > AXES.len());
+        Ok((Self { separator, columns, unit_m: [1.0; 3], is_guessed }, false))
     }
 
     fn point(&self, line: &Line<'_>, content: &str) -> Result<[f64; 3], FormatError> {
@@ -126,6 +155,10 @@ impl Layout {
         let mut missing = AXES.len();
         for (i, field) in self.separator.fields(content).enumerate() {
             if let Some(axis) = self.columns.iter().position(|&column| column == i) {
+                if self.separator != Separator::Letter(',') && field.contains(',') {
+                    let cause = "expected a decimal point, or commas between all columns, found";
+                    return Err(line.error(format!("{cause} `{}`", excerpt(field))));
+                }
                 point[axis] = line.number(field)? * self.unit_m[axis];
                 missing -= 1;
                 if missing == 0 {

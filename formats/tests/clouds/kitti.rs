@@ -59,7 +59,10 @@ fn what_only_its_name_makes_kittis_must_make_sense() {
         ([1.0, f32::NAN, 3.0, 0.0], "[1.0, NaN, 3.0]"),
         ([0.0, 1e5, 0.0, 0.0], "[0.0, 100000.0, 0.0]"),
     ] {
-        let expected = format!("point 1: expected metres from the sensor, found {found}: {remedy}");
+        let expected = format!(
+            "point 1: expected metres from the sensor, found {found}: are they in millimetres? \
+             Scale them, or {remedy}"
+        );
         assert_eq!(read(None, &[&lost, &wrong]), Err(expected));
         assert_eq!(read(Some(CloudFormat::Kitti), &[&lost, &wrong]), Ok(2));
     }

@@ -26,6 +26,9 @@ fn a_line_of_names_says_which_columns_are_meant() {
         "x,y,z\n1,-2.5,3e-7\n4,5,6\n",
         "time,Z,intensity,Y,X\n9,3e-7,9,-2.5,1\n9,6,9,5,4\n",
         "\"x\";\"y\";\"z\"\n1;-2.5;3e-7\n4;5;6\n",
+        // pandas' `to_csv`, with and without names.
+        ",x,y,z\n0,1,-2.5,3e-7\n1,4,5,6\n",
+        ",0,1,2,3\n0,1,-2.5,3e-7,9\n1,4,5,6,9\n",
         "easting northing height\n1 -2.5 3e-7\n4 5 6\n",
         "time,x_m,y_m,z_m\n9,1,-2.5,3e-7\n9,4,5,6\n",
         "ring,pos_x,pos_y,pos_z\n9,1,-2.5,3e-7\n9,4,5,6\n",
@@ -45,6 +48,20 @@ fn a_line_of_names_says_which_columns_are_meant() {
 #[test]
 fn millimetres_are_told_by_names() {
     assert_eq!(read("a.csv", "t,X (mm),Y (mm),Z (mm)\n9,1000,-500,250\n"), [[1.0, -0.5, 0.25]]);
+}
+
+#[test]
+fn numbers_of_lines_are_no_coordinates() {
+    let rows = |first: usize, y: f64, last: &str| {
+        (first..first + 9).map(|n| format!("{n} {y} 2 3{last}\n")).collect::<String>()
+    };
+    let cause = "columns: expected x, y and z, found numbers of the lines in the first column: leave \
+                 it out, or name the columns in a first line, such as `n,x,y,z`";
+    assert_eq!(error("a.xyz", rows(0, 0.5, "")), cause);
+    assert_eq!(error("a.xyz", rows(1, 0.5, " 9")), cause);
+    for text in [rows(2, 0.5, ""), rows(0, 1.0, ""), "x y z i\n".to_owned() + &rows(0, 0.5, "")] {
+        assert_eq!(read("a.xyz", text).len(), 9);
+    }
 }
 
 #[test]
@@ -100,7 +117,10 @@ fn what_is_no_cloud_is_refused_with_its_line() {
         ("1 2 3\n4 five 6\n", "line 2: expected a number, found `five`"),
         ("1 2 3\n\n# c\n4 5\n", "line 4: expected 3 columns, found 2"),
         ("1 2 three\n", "line 1: expected a number, found `three`"),
-        ("1,5;2,5;3,5\n", "line 1: expected a number, found `1,5`"),
+        (
+            "1,5;2,5;3,5\n",
+            "line 1: expected a decimal point, or commas between all columns, found `1,5`",
+        ),
         ("1\t2\t\t3\n", "line 1: expected a number, found ``"),
         (
             "x,y,intensity\n1,2,3\n",

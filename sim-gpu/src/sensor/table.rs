@@ -135,7 +135,10 @@ fn read(file: &Path) -> Result<Vec<[f64; 2]>, ConfigError> {
     let heading = csv.headers().map_err(|error| failed(line_of(&error), error.to_string()))?;
     let column =
         |name: &str| heading.iter().position(|found| found.to_ascii_lowercase().starts_with(name));
-    let missing = |name: &str| failed(1, format!("expected a column {name}, found none"));
+    let missing = |name: &str| {
+        let found = heading.iter().collect::<Vec<_>>().join(",");
+        failed(1, format!("expected a column {name} between commas, found \"{found}\""))
+    };
     let azimuth = column("azimuth").ok_or_else(|| missing("azimuth_deg"))?;
     let (upright, is_zenith) = match (column("elevation"), column("zenith")) {
         (Some(column), _) => (column, false),

@@ -340,8 +340,18 @@ fn a_table_that_cannot_be_used_is_named_with_its_line() {
     let profile = folder.path().join("own.toml");
     std::fs::write(&profile, TABLE.to_owned() + "file = \"rows.csv\"\n").unwrap();
     for (rows, expected) in [
-        ("a,b\n1,2\n", "rows.csv: line 1: expected a column azimuth_deg, found none"),
-        ("azimuth_deg,b\n1,2\n", "expected a column elevation_deg, found none"),
+        (
+            "azimuth_deg;elevation_deg\n1;2\n",
+            "line 1: expected a column elevation_deg between commas, found \"azimuth_deg;elevation_deg\"",
+        ),
+        (
+            "a,b\n1,2\n",
+            "rows.csv: line 1: expected a column azimuth_deg between commas, found \"a,b\"",
+        ),
+        (
+            "azimuth_deg,b\n1,2\n",
+            "expected a column elevation_deg between commas, found \"azimuth_deg,b\"",
+        ),
         ("azimuth_deg,elevation_deg\n1,x\n", "rows.csv: line 2: expected a number, found \"x\""),
         ("azimuth_deg,elevation_deg\n1\n", "rows.csv: line 2"),
         ("azimuth_deg,elevation_deg\n1,nan\n", "expected a number, found \"nan\""),
