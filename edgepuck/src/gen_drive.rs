@@ -2,6 +2,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use anyhow::Context;
 use edgepuck_scenes::{Drive, Sighting, Sightings, Stage};
 use formats::atomic::Unfinished;
 use formats::vlp32c::{Capture, SEQUENCE_US, SEQUENCES_PER_PACKET, START_S};
@@ -71,7 +72,8 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     recipe.use_sensors(std::slice::from_ref(&args.sensor));
     let stage = Stage::new(recipe, &args.recipe, args.meshes.as_deref(), args.seed)?;
     stage.warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
-    let mut drive = Drive::new(&stage, args.speed)?;
+    let what = || format!("{} in the recipe {}", args.sensor, args.recipe.display());
+    let mut drive = Drive::new(&stage, args.speed).with_context(what)?;
     let started = Instant::now();
     let n_points = write(&mut drive, args.seconds, &args.out)?;
     eprintln!(

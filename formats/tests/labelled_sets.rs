@@ -120,7 +120,7 @@ fn names_and_classes_may_be_absent_and_labels_of_any_type() {
 fn what_is_no_labelled_set_is_refused_with_its_key() {
     let classes = ("classes", "|S1", "(1,)", &b"a"[..]);
     for (arrays, message) in [
-        (vec![LABELS], "points: missing"),
+        (vec![LABELS], "points: expected a packed set of labelled clouds, found the keys [labels]"),
         (vec![I16], "labels: missing"),
         (
             vec![("points", "<i2", "(2, 1, 3)", I16.3), LABELS],

@@ -379,7 +379,7 @@ fn metadata_that_make_no_sense_are_named() {
         assert!(found.starts_with("m.json: ") && found.contains(expected), "{found}");
     }
     let error = Metadata::parse("{", Path::new("m.json")).unwrap_err().to_string();
-    assert!(error.starts_with("m.json: metadata: EOF"), "{error}");
+    assert!(error.starts_with("m.json: metadata: expected JSON: EOF"), "{error}");
     let error = Metadata::parse(&" ".repeat(5 << 20), Path::new("m.json")).unwrap_err().to_string();
     assert_eq!(error, "m.json: metadata: expected at most 4194304 bytes, found more");
 }

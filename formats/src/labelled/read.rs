@@ -79,6 +79,11 @@ fn check_count<T>(npz: &NpzReader, key: &str, values: &[T], m: usize) -> Result<
 fn read_points(npz: &mut NpzReader) -> Result<(Vec<usize>, Vec<f32>), FormatError> {
     let (key, scale) =
         if npz.has("points_i16") { ("points_i16", I16_SCALE) } else { ("points", 1.0) };
+    if !npz.has(key) {
+        let keys = npz.keys().join(", ");
+        let cause = format!("expected a packed set of labelled clouds, found the keys [{keys}]");
+        return Err(npz.error(key, cause));
+    }
     let may_be_ragged = npz.has("offsets");
     npz.entry(key, |header, _, elements| {
         let is_ragged = may_be_ragged && matches!(header.shape[..], [_, 3]);

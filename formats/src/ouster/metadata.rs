@@ -94,8 +94,9 @@ impl Metadata {
             let cause = format!("expected at most {LONGEST} bytes, found more");
             return Err(FormatError::malformed(path, "metadata", cause));
         }
-        let root: Value = serde_json::from_str(text)
-            .map_err(|cause| FormatError::malformed(path, "metadata", cause))?;
+        let root: Value = serde_json::from_str(text).map_err(|cause| {
+            FormatError::malformed(path, "metadata", format!("expected JSON: {cause}"))
+        })?;
         let fields = Fields { path, root: &root, is_nested: root.get("beam_intrinsics").is_some() };
         let has_format = root
             .pointer(FORMAT[usize::from(fields.is_nested)])

@@ -13,9 +13,10 @@ const FARTHEST_M: f64 = 524.0;
 
 /// Reads the metadata in `file`. The sensor's frame is Ouster's lidar frame.
 pub(super) fn load(file: &Path) -> Result<SensorProfile, ConfigError> {
-    let metadata = Metadata::read_beams(file).map_err(|error| ConfigError::Content {
-        file: file.to_owned(),
-        message: error.to_string(),
+    let metadata = Metadata::read_beams(file).map_err(|error| {
+        let message = error.to_string();
+        let bare = message.strip_prefix(&format!("{}: ", file.display())).unwrap_or(&message);
+        ConfigError::Content { file: file.to_owned(), message: bare.to_owned() }
     })?;
     let [start_m, height_m] = metadata.origin_m();
     if height_m != 0.0 {

@@ -197,11 +197,12 @@ pub fn run(args: &LiveArgs) -> anyhow::Result<Outcome> {
     }
     read.error.take().map_or(Ok(()), Err)?;
     if !args.stats && read.capture.first_unread.is_some() {
-        eprintln!("warning: {} UDP packets{}", read.n_packets, read.capture);
+        eprintln!("warning: {}{} UDP packets{}", args.capture(), read.n_packets, read.capture);
     }
     if pipeline.counts().packets == 0 {
         let cause = format!(
-            "expected packets of {}, found none among {} UDP packets{}{}",
+            "{}expected packets of {}, found none among {} UDP packets{}{}",
+            args.capture(),
             if args.metadata.is_some() { "the Ouster" } else { "a VLP-16 or VLP-32C" },
             read.n_packets,
             read.senders,
@@ -276,6 +277,11 @@ impl LiveArgs {
         let covered = options.ego_motion.as_ref().map_or(Ok(()), |m| m.check_cover(sent_s));
         let file = self.poses.as_deref().unwrap_or(Path::new("poses"));
         covered.map_err(|cause| FormatError::malformed(file, "times", cause))
+    }
+
+    /// The name of the capture in messages, with a colon.
+    fn capture(&self) -> String {
+        self.pcap.as_ref().map(|file| format!("{}: ", file.display())).unwrap_or_default()
     }
 
     /// What may keep packets from coming.
