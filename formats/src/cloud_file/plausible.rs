@@ -10,7 +10,8 @@ const FARTHEST_M: f64 = 1e4;
 /// Distances of the farthest point of a sweep, metres: beyond them, the unit is probably another.
 const EXPECTED_M: std::ops::RangeInclusive<f64> = 0.5..=2e3;
 
-/// Farther than the nearest thing that a sensor on a vehicle, a tripod or a roof sees, metres.
+/// Farther than the nearest thing that a sensor on a vehicle, a tripod or a roof sees, metres. A drone
+/// is as far from all, and above them.
 const NEAREST_M: f64 = 50.0;
 
 /// The largest step between coordinates, metres: LiDARs measure ranges to millimetres.
@@ -51,6 +52,7 @@ pub fn judge_sweep(
     remedy: &str,
 ) -> Result<Option<String>, (String, String)> {
     let (mut nearest, mut farthest) = (f64::INFINITY, 0.0);
+    let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
     for (i, point) in points.into_iter().enumerate() {
         let finite = point.iter().filter(|x| x.is_finite()).count();
         if !matches!(finite, 0 | 3) || point.iter().any(|x| x.is_finite() && x.abs() > FARTHEST_M) {
@@ -60,6 +62,8 @@ pub fn judge_sweep(
         let range = point.iter().map(|x| x * x).sum::<f64>().sqrt();
         if range > 0.0 {
             (nearest, farthest) = (range.min(nearest), range.max(farthest));
+            (low, high) =
+                ([0, 1].map(|i| low[i].min(point[i])), [0, 1].map(|i| high[i].max(point[i])));
         }
     }
     if farthest == 0.0 {
@@ -68,7 +72,7 @@ pub fn judge_sweep(
     }
     let (what, found, expected) = if !EXPECTED_M.contains(&farthest) {
         ("farthest", farthest, "0.5 m to 2 km; are the points in metres?")
-    } else if nearest > NEAREST_M {
+    } else if nearest > NEAREST_M && (0..2).any(|i| low[i] > 0.0 || high[i] < 0.0) {
         ("nearest", nearest, "at most 50 m; is the origin the position of the sensor?")
     } else {
         return Ok(None);
@@ -204,6 +208,8 @@ mod tests {
             let found = format!("{:?}", judge_sweep([[0.0; 3], middle, lost], "scale them"));
             assert!(found.contains(expected), "{found}");
         }
+        let below_a_drone = [[-60.0, -40.0, -79.0], [55.0, 62.0, -80.0], [1.0, 2.0, -79.5]];
+        assert_eq!(judge_sweep(below_a_drone, ""), Ok(None));
     }
 
     /// An f32 has 24 bits: at 5,400,000 m, between 2^22 and 2^23, the last is worth half a metre.

@@ -11,6 +11,10 @@ const LEAST_GROUND: f64 = 0.2;
 /// z, to dispel the doubt: rooms and roofs have a ceiling, too.
 const CLEARLY: [f64; 2] = [3.0, 0.5];
 
+/// Where all but a hundredth of the points are nearer than this, metres, a plane above the sensor is
+/// the ceiling of a room, which a sensor that looks upwards sees more of than of the floor.
+const INDOORS_M: f32 = 30.0;
+
 /// The fewest sectors of 10 degrees in which ground lies: a post or a wall from its edge is less wide
 /// than the view of a sensor.
 const FEWEST_SECTORS: u32 = 7;
@@ -31,7 +35,8 @@ pub fn doubtful_axes(points: &[[f32; 3]]) -> Option<String> {
     }
     let up = (0..3).rev().min_by(|&a, &b| squares[a].total_cmp(&squares[b]))?;
     let sign = if below[up] < 0 { -1.0 } else { 1.0 };
-    if up == 2 && sign > 0.0 {
+    let is_far = |point: &&[f32; 3]| point[0].hypot(point[1]) > INDOORS_M;
+    if up == 2 && (sign > 0.0 || 100 * points.iter().filter(is_far).count() < points.len()) {
         return None;
     }
     let turned = |&point: &[f32; 3]| {

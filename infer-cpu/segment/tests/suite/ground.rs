@@ -208,4 +208,10 @@ fn axes_are_doubted_if_another_one_points_up() {
             assert!(said.unwrap_or_default().contains(expected.unwrap_or_default()));
         }
     }
+    // A sensor that looks upwards, as a Livox Mid-360 does, sees the ceiling more than the floor.
+    let upwards: Vec<f64> = (-7..=52).map(f64::from).collect();
+    let wall = |x: f64, y: f64| block([x, y], [6.1 - x.abs() * 2.0, 6.1 - y.abs() * 2.0], 0.0, 2.6);
+    let walls = [[3.0, 0.0], [-3.0, 0.0], [0.0, 3.0], [0.0, -3.0]].map(|[x, y]| wall(x, y));
+    let room: Vec<_> = [flat(), ceiling()].into_iter().chain(walls).collect();
+    assert_eq!(doubtful_axes(&scan(&upwards, &room).points), None);
 }
