@@ -103,9 +103,6 @@ fn described(sensor: &SensorProfile, pattern: &BeamPattern) -> String {
 /// Warnings about values of a valid profile that are probably mistakes.
 fn oddities(sensor: &SensorProfile, pattern: &BeamPattern) -> Vec<String> {
     let mut found = Vec::new();
-    if sensor.sources.is_empty() {
-        found.push("sources: expected the sources of the numbers, found none".to_owned());
-    }
     let [lowest, highest] = ends(pattern.directions.iter().map(elevation_deg));
     // No elevation in radians exceeds a quarter turn.
     let largest = std::f64::consts::FRAC_PI_2;

@@ -204,7 +204,7 @@ fn scene(args: &Args) -> anyhow::Result<(Scene, String)> {
 
 /// The meshes where their files have them, and a sensor that looks at their middle.
 fn scene_of_meshes(args: &Args) -> anyhow::Result<Scene> {
-    let MeshArgs { units, up, .. } = args.meshes;
+    let (up, unit) = (args.meshes.up, args.meshes.units.unwrap_or_default());
     let normalize = args.meshes.normalize.unwrap_or(Normalize::None);
     ensure!(args.simplify.is_none(), Usage("--simplify applies to scenes only".to_owned()));
     let mut scene = Scene::new();
@@ -217,10 +217,10 @@ fn scene_of_meshes(args: &Args) -> anyhow::Result<Scene> {
     scene.effects = args.effects.effects(0.0, with_intensity)?;
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for file in &args.inputs {
-        let mesh = Mesh::read_in(file, up, units.unwrap_or_default())?.normalized(normalize);
+        let mesh = Mesh::read_in(file, up, unit)?.normalized(normalize);
         let [least, most] = mesh.bounds_m().map(DVec3::from_array);
         (low, high) = (low.min(least), high.max(most));
-        if let Some(doubt) = mesh.doubtful_size().filter(|_| units.is_none()) {
+        if let Some(doubt) = mesh.doubtful_size(unit) {
             eprintln!("warning: {}: {doubt}; --units names another unit", file.display());
         }
         let id = scene.add(mesh, Pose::IDENTITY);

@@ -75,10 +75,10 @@ class Mesh(Remade):
         self._warn("mesh")
 
     def _warn(self, what: str) -> None:
-        """Warn if the unit of the source is probably not the metre."""
+        """Warn if the unit of the source is probably another."""
         settings = self._made_of[1]
-        doubt = self._mesh.doubtful_size()
-        if settings["normalize"] == "none" and settings["units"] is None and doubt:
+        doubt = self._mesh.doubtful_size(settings["units"] or "m")
+        if settings["normalize"] == "none" and doubt:
             warnings.warn(f"{what}: {doubt}; `units` names another unit", stacklevel=3)
 
     def __len__(self) -> int:

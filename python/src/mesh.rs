@@ -79,9 +79,9 @@ impl Mesh {
         self.mesh.scale()
     }
 
-    /// Why its unit is probably not the metre, if its size says so.
-    fn doubtful_size(&self) -> Option<String> {
-        self.mesh.doubtful_size()
+    /// Why its source's unit is probably not `units`, if its size says so.
+    fn doubtful_size(&self, units: &str) -> PyResult<Option<String>> {
+        Ok(self.mesh.doubtful_size(units.parse().map_err(raised)?))
     }
 
     /// What became the origin, in the source's units.

@@ -48,6 +48,9 @@ fn a_mesh_in_millimetres_is_read_by_its_unit_or_warned_of() {
     ] {
         assert!(said.contains(part), "{said}");
     }
+    folder.write("km.obj", box_at(0.0, [9e5, 9e5, 9e5]));
+    let said = folder.exits(3, "scan km.obj --units mm --out km.npz --adapter cpu");
+    assert!(said.contains("found 900 x 900 x 900 m if its unit is millimetres; --units"), "{said}");
     let sensor = "[[sensor]]\nprofile = \"vlp32c\"\nposition_m = [-2, 0, 0.5]\nyaw_deg = 0\n";
     for (units, is_doubted) in [("", true), ("units = \"mm\"\n", false)] {
         let object = format!("[[object]]\nmesh = \"mm.obj\"\nup = \"z\"\n{units}");

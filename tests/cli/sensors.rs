@@ -38,7 +38,6 @@ fn a_profile_is_checked_and_what_looks_odd_of_it_is_said() {
     );
     let said = folder.succeeds("profile odd.toml");
     for part in [
-        "sources: expected the sources of the numbers, found none",
         "are they in radians?",
         "even a white surface is lost beyond 50.0 m",
         "rotating.beam[2] points as rotating.beam[0] does",

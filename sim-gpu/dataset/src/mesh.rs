@@ -13,6 +13,7 @@ use formats::hash::Hashing;
 use formats::scan_file::{ScanFormat, write_scan};
 use formats::vlp32c;
 use glam::{DAffine3, DVec3};
+use sim_gpu::Scene;
 use sim_gpu::internals::bvh::Builder;
 use sim_gpu::internals::job::{Cast, CastJob};
 use sim_gpu::internals::material::{Material, MaterialChoice, MaterialError, Materials};
@@ -24,7 +25,6 @@ use sim_gpu::internals::ray::RayFrame;
 use sim_gpu::internals::scan::ObjectHits;
 use sim_gpu::internals::simplify::{Simplified, Viewpoint, resolved_m, simplified_surface};
 use sim_gpu::internals::target::{Surface, Target};
-use sim_gpu::{Mesh, Scene};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 /// What all meshes of a run share.
@@ -99,8 +99,8 @@ pub(crate) fn doubts(
     let mesh = scene.instances().first().map(|instance| &instance.mesh);
     let is_scaled = config.normalize != Normalize::None;
     let size = mesh
-        .filter(|_| !is_scaled && config.units == Unit::Metre)
-        .and_then(Mesh::doubtful_size)
+        .filter(|_| !is_scaled)
+        .and_then(|mesh| mesh.doubtful_size(config.units))
         .map(|doubt| format!("{doubt}; --units names another unit"));
     let inside = mesh.is_some_and(|mesh| mesh.surrounds(sensors_m)).then(|| {
         let units = if is_scaled { "" } else { ", or another of --units" };

@@ -8,32 +8,39 @@ use glam::DVec3;
 const EXPECTED_M: std::ops::RangeInclusive<f64> = 0.01..=100.0;
 
 impl Mesh {
-    /// Why the unit of its source is probably not the metre, if its size says so.
+    /// Why the unit of its source is probably not `unit`, if its size says so.
     #[doc(hidden)]
     #[must_use]
-    pub fn doubtful_size(&self) -> Option<String> {
+    pub fn doubtful_size(&self, unit: Unit) -> Option<String> {
         let [low, high] = self.bounds_m().map(DVec3::from_array);
         let size = high - low;
         let is_expected = size == DVec3::ZERO || EXPECTED_M.contains(&size.max_element());
         (!is_expected).then(|| {
-            let likely = if size.max_element() > 1.0 { Unit::Millimetre } else { Unit::Inch };
-            format!(
-                "expected a size of 1 cm to 100 m, found {} if its unit is the metre ({} if it is {})",
-                shown(size),
-                shown(size * likely.metres()),
-                likely.plural()
-            )
+            let likely = match unit {
+                _ if size.max_element() > 1.0 => Unit::Millimetre,
+                Unit::Metre => Unit::Inch,
+                _ => Unit::Metre,
+            };
+            let found = shown(size);
+            let named = if unit == Unit::Metre { "the metre" } else { unit.plural() };
+            let doubt =
+                format!("expected a size of 1 cm to 100 m, found {found} if its unit is {named}");
+            if likely == unit {
+                return doubt;
+            }
+            let other = shown(size * (likely.metres() / unit.metres()));
+            format!("{doubt} ({other} if it is {})", likely.plural())
         })
     }
 
     /// As [`Mesh::doubtful_size`], of a mesh of a scene, which may be a terrain: only a solid of more
     /// than 200 m, or of less than 1 cm, is doubted.
-    pub(crate) fn doubtful_unit(&self) -> Option<String> {
+    pub(crate) fn doubtful_unit(&self, unit: Unit) -> Option<String> {
         let [low, high] = self.bounds_m().map(DVec3::from_array);
         let size = high - low;
         let (least, most) = (size.min_element(), size.max_element());
         let is_doubtful = most > 200.0 && least > most / 10.0 || most < 0.01;
-        self.doubtful_size().filter(|_| is_doubtful)
+        self.doubtful_size(unit).filter(|_| is_doubtful)
     }
 
     /// Whether one of `sensors_m` stands inside its bounding box: it then sees the mesh from inside.
@@ -64,19 +71,27 @@ mod tests {
 
     #[test]
     fn sizes_of_another_unit_are_doubted_with_both_sizes() {
-        for (size, expected) in [
+        for (size, unit, expected) in [
             (
                 950.0,
+                Unit::Metre,
                 Some(
                     "950 x 950 x 950 m if its unit is the metre (0.95 x 0.95 x 0.95 m if it is millimetres)",
                 ),
             ),
-            (0.002, Some("0.002 x 0.002 x 0.002 m")),
-            (0.0, None),
-            (0.01, None),
-            (100.0, None),
+            (0.002, Unit::Metre, Some("0.002 x 0.002 x 0.002 m")),
+            (
+                0.002,
+                Unit::Millimetre,
+                Some("if its unit is millimetres (2 x 2 x 2 m if it is metres)"),
+            ),
+            (900.0, Unit::Millimetre, Some("found 900 x 900 x 900 m if its unit is millimetres")),
+            (304.8, Unit::Foot, Some("is feet (1 x 1 x 1 m if it is millimetres)")),
+            (0.0, Unit::Metre, None),
+            (0.01, Unit::Metre, None),
+            (100.0, Unit::Inch, None),
         ] {
-            let found = tetrahedron(size).doubtful_size();
+            let found = tetrahedron(size).doubtful_size(unit);
             assert_eq!(found.is_some(), expected.is_some(), "{size}: {found:?}");
             let (found, part) = (found.unwrap_or_default(), expected.unwrap_or_default());
             assert!(found.contains(part), "{found}");
@@ -85,11 +100,11 @@ mod tests {
 
     #[test]
     fn of_a_scene_s_meshes_terrains_are_not_doubted() {
-        let solid = |size| tetrahedron(size).doubtful_unit().is_some();
+        let solid = |size| tetrahedron(size).doubtful_unit(Unit::Metre).is_some();
         assert_eq!([0.001, 1.0, 150.0, 4300.0].map(solid), [true, false, false, true]);
         let corners = [[0.0; 3], [900.0, 0.0, 0.0], [0.0, 900.0, 30.0]];
         let terrain = Mesh::from_triangles(corners.to_vec(), vec![[0, 1, 2]]).unwrap();
-        assert_eq!(terrain.doubtful_unit(), None);
+        assert_eq!(terrain.doubtful_unit(Unit::Metre), None);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::{Error, Instance, Mesh, MountedSensor, Scene, Sensor};
 use crate::bvh::Builder;
 use crate::material::{Material, Materials};
-use crate::mesh::frame::{Normalize, Unit, to_world};
+use crate::mesh::frame::{Normalize, to_world};
 use crate::mesh::validate::triangle_stats;
 use crate::mesh::{LoadedMesh, TriangleMesh, load};
 use crate::pose::Pose;
@@ -75,8 +75,8 @@ fn mesh(file: &SceneFile, object: &SceneObject) -> Result<(Mesh, Option<Simplifi
             (Mesh::from_target(target, centre), Some(simplified))
         }
     };
-    if object.units == Unit::Metre && normalize == Normalize::None {
-        let doubt = mesh.doubtful_unit();
+    if normalize == Normalize::None {
+        let doubt = mesh.doubtful_unit(object.units);
         warnings.extend(doubt.map(|doubt| doubt + "; `units` of the object names another unit"));
     }
     Ok((mesh.with_warnings(&object.mesh, &warnings), simplified))
