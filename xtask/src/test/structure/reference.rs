@@ -1,30 +1,64 @@
 //! The pages of `docs` about the keys of TOML files, made from the code that reads them: its types,
 //! its field docs and the bounds that it checks.
 
-use anyhow::Context;
-use std::collections::{HashMap, HashSet, VecDeque};
+mod code;
+
+use code::{Code, Kind, words};
+use std::collections::{HashSet, VecDeque};
 use std::fs;
 use std::path::{Path, PathBuf};
-use syn::visit::Visit;
-use syn::{Attribute, Expr, Item, Lit, Meta, Type};
+use syn::{Attribute, Expr, Lit, Meta, Type};
 use xtask::workspace::root;
 
 /// A table: its heading, and the file and the name of the type that reads it.
 type Table = (&'static str, &'static str, &'static str);
 
-/// Each page: its beginning, and its tables.
-const PAGES: [(&str, &str, &[Table]); 2] = [
+/// A page: its name, its beginning, the folders and files of its types, and its tables.
+type Page = (&'static str, &'static str, &'static [&'static str], &'static [Table]);
+
+const SIM: &[&str] = &["sim-gpu/src"];
+const SCENES: &[&str] = &["sim-gpu/scenes/src", "sim-gpu/shapes/src/objects/mod.rs"];
+const TRAIN: &[&str] = &["train/src", "formats/src/model_card.rs"];
+
+const PAGES: [Page; 4] = [
     (
         "scene-reference.md",
         "# Keys of scenes\n\nA scene is a TOML file: [First scan](first-scan.md) has an example, and \
          `sim-gpu/EFFECTS.md` in the repository the models of the effects.",
-        &[("", "scene/table.rs", "SceneTable"), ("trajectory", "scene/table.rs", "TimedPose")],
+        SIM,
+        &[
+            ("", "sim-gpu/src/scene/table.rs", "SceneTable"),
+            ("trajectory", "sim-gpu/src/scene/table.rs", "TimedPose"),
+        ],
     ),
     (
         "sensor-reference.md",
         "# Keys of sensors\n\nA sensor is a TOML file: [Your sensor](sensor.md) has an example, and \
          `sim-gpu/SENSORS.md` in the repository the models.",
-        &[("", "sensor/profile.rs", "Profile")],
+        SIM,
+        &[("", "sim-gpu/src/sensor/profile.rs", "Profile")],
+    ),
+    (
+        "scene-recipe-reference.md",
+        "# Keys of recipes of scenes\n\nA recipe of `gen-scenes` and `gen-drive` is a TOML file: \
+         `street`, `room` and `yard` are built in, and `assets/scenes` in the repository has them. \
+         A list of 2 numbers is the least and the greatest.",
+        SCENES,
+        &[
+            ("", "sim-gpu/scenes/src/recipe.rs", "Recipe"),
+            ("kind", "sim-gpu/shapes/src/objects/mod.rs", "ObjectKind"),
+            ("place", "sim-gpu/scenes/src/recipe.rs", "Place"),
+        ],
+    ),
+    (
+        "train-recipe-reference.md",
+        "# Keys of recipes of trainings\n\nA recipe of `train` is a TOML file: [Train](train.md) has an \
+         example, and the folder of a run has its recipe with all keys. The built-in recipes are \
+         `edge-64`, `lidar-64` and `street-128`. Training expects clouds of every class in the training \
+         part, those of `unknown` included, which few sweeps lack: the bundled `street-128` learnt from \
+         2,000. Lengths of clouds in the unit sphere are in radii, those of clusters in metres.",
+        TRAIN,
+        &[("", "train/src/recipe.rs", "Recipe")],
     ),
 ];
 
@@ -44,9 +78,9 @@ const TWINS: [(&str, &str); 6] = [
 
 #[test]
 fn the_pages_about_keys_say_what_the_code_does() {
-    let code = Code::read(&root().join("sim-gpu/src")).unwrap();
     let mut faults = Vec::new();
-    for (name, heading, tables) in PAGES {
+    for (name, heading, sources, tables) in PAGES {
+        let code = Code::read(sources).unwrap();
         let made = code.page(heading, tables, &mut faults);
         let page = root().join("docs/src").join(name);
         if std::env::var_os("UPDATE_GOLDEN").is_some() {
@@ -58,174 +92,7 @@ fn the_pages_about_keys_say_what_the_code_does() {
     assert_eq!(faults, [""; 0]);
 }
 
-#[derive(Default)]
-struct Code {
-    /// Types by file and name.
-    types: Vec<(PathBuf, Kind)>,
-    /// What values must be, by file and key.
-    bounds: HashMap<(PathBuf, String), Vec<String>>,
-    constants: HashMap<String, String>,
-    /// The bodies of functions, which give defaults.
-    functions: HashMap<String, String>,
-}
-
-enum Kind {
-    Struct(syn::ItemStruct),
-    Enum(syn::ItemEnum),
-}
-
-impl Kind {
-    fn name(&self) -> String {
-        match self {
-            Self::Struct(it) => it.ident.to_string(),
-            Self::Enum(it) => it.ident.to_string(),
-        }
-    }
-
-    fn field(&self, name: &str) -> Option<&syn::Field> {
-        let Self::Struct(it) = self else { return None };
-        it.fields.iter().find(|field| field.ident.as_ref().is_some_and(|ident| ident == name))
-    }
-
-    fn attributes(&self) -> &[Attribute] {
-        match self {
-            Self::Struct(it) => &it.attrs,
-            Self::Enum(it) => &it.attrs,
-        }
-    }
-}
-
-/// Finds the checks of numbers.
-struct Checks<'a>(&'a Path, &'a mut Code);
-
-impl Visit<'_> for Checks<'_> {
-    fn visit_expr_call(&mut self, call: &syn::ExprCall) {
-        let name = words(&call.func);
-        let arguments: Vec<String> = call.args.iter().map(words).collect();
-        let bound = match (name.as_str(), &arguments[..]) {
-            ("within", [_, _, range]) => Some(self.1.within(range)),
-            ("at_least", [_, _, least]) => Some(format!("at least {}", self.1.number(least))),
-            ("positive", _) => Some("above 0".to_owned()),
-            _ => None,
-        };
-        // Keys are texts such as `rotating.rpm` and `{key}.min_m[{axis}]`.
-        let key = arguments.first().and_then(|key| key.split('"').rev().nth(1));
-        if let (Some(bound), Some(key)) = (bound, key) {
-            let key = key.rsplit('.').next().unwrap_or(key).split('[').next().unwrap_or(key);
-            let of = self.1.bounds.entry((self.0.to_owned(), key.to_owned())).or_default();
-            if !bound.is_empty() && !of.contains(&bound) {
-                of.push(bound);
-            }
-        }
-        syn::visit::visit_expr_call(self, call);
-    }
-}
-
 impl Code {
-    fn read(folder: &Path) -> anyhow::Result<Self> {
-        let mut code = Self::default();
-        let mut files = Vec::new();
-        let mut folders = vec![folder.to_owned()];
-        while let Some(folder) = folders.pop() {
-            for entry in fs::read_dir(&folder)? {
-                let path = entry?.path();
-                let of = if path.is_dir() { &mut folders } else { &mut files };
-                of.push(path);
-            }
-        }
-        files.sort();
-        let mut parsed = Vec::new();
-        for file in files.iter().filter(|file| file.extension().is_some_and(|it| it == "rs")) {
-            let text = fs::read_to_string(file)?;
-            let syntax = syn::parse_file(&text).with_context(|| file.display().to_string())?;
-            let file = file.strip_prefix(folder).unwrap_or(file).to_owned();
-            for item in &syntax.items {
-                code.note(&file, item.clone());
-            }
-            parsed.push((file, syntax));
-        }
-        for (file, syntax) in &parsed {
-            Checks(file, &mut code).visit_file(syntax);
-        }
-        Ok(code)
-    }
-
-    fn note(&mut self, file: &Path, item: Item) {
-        match item {
-            Item::Struct(it) => self.types.push((file.to_owned(), Kind::Struct(it))),
-            Item::Enum(it) => self.types.push((file.to_owned(), Kind::Enum(it))),
-            Item::Const(it) => {
-                self.constants.insert(it.ident.to_string(), words(&it.expr));
-            }
-            Item::Fn(it) => {
-                self.functions.insert(it.sig.ident.to_string(), words(&it.block));
-            }
-            Item::Impl(it) => {
-                for item in &it.items {
-                    if let syn::ImplItem::Const(it) = item {
-                        self.constants.insert(it.ident.to_string(), words(&it.expr));
-                    }
-                }
-            }
-            // `named!`: an enum with texts as values, after the name of its kind.
-            Item::Macro(it) => {
-                let text = it.mac.tokens.to_string();
-                let body = text.find('{').zip(text.find(" : \""));
-                if let Some((body, kind)) = body.filter(|(body, kind)| kind < body)
-                    && let Ok(it) = syn::parse_str(&format!("{}{}", &text[..kind], &text[body..]))
-                {
-                    self.types.push((file.to_owned(), Kind::Enum(it)));
-                }
-            }
-            _ => {}
-        }
-    }
-
-    /// The type that `name` means in `file`.
-    fn find(&self, file: &Path, name: &str) -> Option<&(PathBuf, Kind)> {
-        let (module, name) = name.rsplit_once("::").unwrap_or(("", name));
-        let folder = file.parent().unwrap_or(Path::new(""));
-        let rank = |path: &Path| match module {
-            "" if path == file => 0,
-            "" if path.parent() == Some(folder) => 1,
-            "" => 2,
-            _ => u8::from(path != file.with_extension("").join(module).with_extension("rs")),
-        };
-        let all = self.types.iter().filter(|(_, kind)| kind.name() == name);
-        all.min_by_key(|(path, _)| rank(path))
-    }
-
-    fn number(&self, text: &str) -> String {
-        let (sign, text) = text.strip_prefix('-').map_or(("", text), |text| ("-", text));
-        let text = text.trim_end_matches("asf64").trim_start_matches("self.");
-        let text = self.constants.get(text).map_or(text, String::as_str).trim_end_matches("asf64");
-        let text = text.replace("u16::MAX", "65535").replace("1<<", "2^");
-        format!("{sign}{}", text.strip_suffix(".0").unwrap_or(&text))
-    }
-
-    fn within(&self, range: &str) -> String {
-        let range = self.constants.get(range).map_or(range, String::as_str);
-        let (from, to) = range.split_once("..=").unwrap_or((range, range));
-        match (self.number(from), self.number(to)) {
-            (from, to) if to == "f64::MAX" => format!("at least {from}"),
-            (from, to) => format!("{from} to {to}"),
-        }
-    }
-
-    /// The bounds of a value, without those that name variables.
-    fn bounds(&self, file: &Path, key: &str) -> String {
-        let of = |file: &Path| self.bounds.get(&(file.to_owned(), key.to_owned()));
-        let all = of(file).or_else(|| of(&file.with_file_name("profile.rs")));
-        let is_known = |bound: &&String| {
-            let mut words = bound.split([' ', '-']).filter(|word| word.contains('_'));
-            words.all(|word| self.types.iter().any(|(_, kind)| kind.field(word).is_some()))
-        };
-        let all: Vec<&str> =
-            all.into_iter().flatten().filter(is_known).map(String::as_str).collect();
-        let all = all.iter().map(|bound| format!(", {bound}")).collect::<String>();
-        all.replace("above 0, 0 to", "above 0, up to")
-    }
-
     fn page(&self, heading: &str, tables: &[Table], faults: &mut Vec<String>) -> String {
         let mut page = format!(
             "{heading} {UNITS}\n\n<!-- Made from the code: UPDATE_GOLDEN=1 cargo test -p xtask -->\n"
@@ -240,7 +107,7 @@ impl Code {
                     continue;
                 }
                 // A type that serde makes of another one is written as the other one.
-                if let Some(other) = serde(kind.attributes(), "try_from").flatten() {
+                if let Some(other) = made_of(kind.attributes()) {
                     queue.push_front((path, file.clone(), other));
                     continue;
                 }
@@ -248,6 +115,28 @@ impl Code {
                     Kind::Struct(table) => {
                         let below = self.table(&path, file, table, &mut page, faults);
                         queue.extend(below);
+                    }
+                    Kind::Enum(choice) if !path.starts_with('[') => {
+                        page += &format!("\n## `{path}`\n\n| value | meaning |\n|---|---|\n");
+                        for variant in &choice.variants {
+                            page += &format!("| {} | {} |\n", named(variant), docs(&variant.attrs));
+                        }
+                    }
+                    Kind::Enum(choice) if serde(&choice.attrs, "tag").is_some() => {
+                        for variant in &choice.variants {
+                            let table = syn::ItemStruct {
+                                attrs: variant.attrs.clone(),
+                                fields: variant.fields.clone(),
+                                ..syn::parse_quote!(
+                                    struct Variant;
+                                )
+                            };
+                            let path = format!(
+                                "{path}` with `kind = {}",
+                                named(variant).trim_matches('`')
+                            );
+                            self.table(&path, file, &table, &mut page, faults);
+                        }
                     }
                     Kind::Enum(choice) => {
                         let fields = choice.variants.iter().flat_map(|variant| &variant.fields);
@@ -287,8 +176,8 @@ impl Code {
                 faults.push(format!("{}: {}.{key} has no doc", file.display(), table.ident));
             }
             let kind = self.value(file, &field.ty);
-            let value = kind.clone() + &self.bounds(file, &key);
-            let default = self.absent(file, field);
+            let value = kind.clone() + &self.bounds(file, path, &key);
+            let default = self.absent(file, table, field);
             *page += &format!("| `{key}` | {value} | {default} | {meaning} |\n");
             let key = if path.is_empty() { key } else { format!("{path}.{key}") };
             let key = match kind.split_once(": ") {
@@ -337,44 +226,82 @@ impl Code {
             return format!("list of {n}: {}", of(inner).unwrap_or_default());
         }
         let known = match name.as_str() {
-            "f64" => "number",
+            "f32" | "f64" => "number",
             "bool" => "true or false",
             "String" | "PathBuf" => "text",
-            "u16" | "u32" | "u64" => "whole number",
+            "u16" | "u32" | "u64" | "usize" => "whole number",
             "NonZeroU32" => "whole number, at least 1",
             "Motion" => "text or list: `trajectory`",
             _ => "",
         };
         match self.find(file, &name) {
             _ if !known.is_empty() => known.to_owned(),
-            Some((_, Kind::Struct(it))) if serde(&it.attrs, "try_from").is_none() => "table".into(),
-            Some((file, kind)) => match (serde(kind.attributes(), "try_from").flatten(), kind) {
+            Some((_, kind)) if serde(kind.attributes(), "tag").is_some() => "table".into(),
+            Some((_, Kind::Struct(it))) if made_of(&it.attrs).is_none() => "table".into(),
+            Some((file, kind)) => match (made_of(kind.attributes()), kind) {
                 (Some(other), _) => {
                     syn::parse_str(&other).map(|of| self.value(file, &of)).unwrap_or_default()
                 }
                 (None, Kind::Enum(it)) => choices(it),
                 _ => String::new(),
             },
+            None if name == "Effects" => {
+                "table, as [`effects`](scene-reference.md#effects) of scenes".to_owned()
+            }
             None => name,
         }
     }
 
-    fn absent(&self, file: &Path, field: &syn::Field) -> String {
+    /// The value of an expression in code, as TOML; `optional` if it is that of a table.
+    fn shown(&self, file: &Path, code: &str) -> String {
+        let code = code.trim_end_matches(".into()").trim_end_matches(".to_owned()");
+        if let Some(body) = code.strip_suffix("()").and_then(|name| self.functions.get(name)) {
+            return self.shown(file, body.trim_matches(['{', '}']));
+        }
+        let list = code.trim_start_matches("vec!").strip_prefix('[');
+        if let Some(items) = list.and_then(|items| items.strip_suffix(']')) {
+            let items: Vec<String> = items.split(',').map(|item| self.number(item)).collect();
+            return format!("[{}]", items.join(", "));
+        }
+        match code.split_once("::") {
+            Some(("Vec", "new()")) => "empty".to_owned(),
+            Some(("NonZeroU32", "MIN")) => "1".to_owned(),
+            Some((name, "default()")) => match self.find(file, name) {
+                Some((_, kind)) if made_of(kind.attributes()).is_some() => "[0, 0]".to_owned(),
+                _ => "optional".to_owned(),
+            },
+            Some((name, variant)) => match self.find(file, name) {
+                Some((_, Kind::Enum(it))) => {
+                    let found = it.variants.iter().find(|of| of.ident == variant);
+                    found.map(named).unwrap_or_default()
+                }
+                _ => self.number(variant),
+            },
+            None if code.starts_with('"') => format!("`{code}`"),
+            None => self.number(code),
+        }
+    }
+
+    fn absent(&self, file: &Path, table: &syn::ItemStruct, field: &syn::Field) -> String {
         let name = words(&field.ty);
-        match serde(&field.attrs, "default") {
+        let key = field.ident.as_ref().map(ToString::to_string).unwrap_or_default();
+        let of_table = serde(&table.attrs, "default");
+        let made = self.defaults.get(&(table.ident.to_string(), key));
+        match of_table.clone().or_else(|| serde(&field.attrs, "default")) {
             _ if name.starts_with("Option<") => "optional".to_owned(),
             // Its check wants one: an empty list has a better message than serde's.
             _ if docs(&field.attrs).contains("at least one") => "required".to_owned(),
             None => "required".to_owned(),
-            Some(Some(function)) => {
-                let body = self.functions.get(&function).map_or("", String::as_str);
-                let value = self.number(body.trim_matches(['{', '}']));
-                let value = value.replace("NonZeroU32::MIN", "1");
-                value.rsplit_once("::").map_or(value.clone(), |(_, name)| self.number(name))
-            }
+            Some(Some(function)) => self.shown(file, &format!("{function}()")),
             Some(None) => match self.find(file, &inner(&field.ty)) {
+                _ if of_table.is_some() && made.is_some() => {
+                    made.map(|made| self.shown(file, made)).unwrap_or_default()
+                }
                 _ if name.starts_with('[') || name == "f64" || name.starts_with('u') => "0".into(),
                 _ if name == "bool" => "false".to_owned(),
+                Some((_, kind)) if made_of(kind.attributes()).as_deref() == Some("[f64; 2]") => {
+                    "[0, 0]".to_owned()
+                }
                 Some((_, Kind::Enum(it))) if it.ident == name => {
                     let is_default = |it: &&syn::Variant| {
                         it.attrs.iter().any(|attribute| attribute.path().is_ident("default"))
@@ -403,16 +330,16 @@ fn named(variant: &syn::Variant) -> String {
     }
 }
 
+/// The type of which serde makes the one with these attributes.
+fn made_of(attributes: &[Attribute]) -> Option<String> {
+    serde(attributes, "try_from").or(serde(attributes, "from")).flatten()
+}
+
 /// The innermost type: `Beam` of `Option<Vec<Beam>>`.
 fn inner(of: &Type) -> String {
     let name = words(of);
     let name = name.rsplit(['<', ',']).next().unwrap_or_default();
     name.trim_end_matches('>').to_owned()
-}
-
-/// The code without spaces.
-fn words(of: &impl quote::ToTokens) -> String {
-    of.to_token_stream().to_string().replace(' ', "")
 }
 
 fn docs(attributes: &[Attribute]) -> String {
