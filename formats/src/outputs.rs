@@ -60,8 +60,8 @@ impl Overwrite {
                              move it, or choose another --out";
                 return Err(refused(&other, cause).into());
             }
-            self.check_folder(folder)?;
         }
+        folders.iter().try_for_each(|folder| self.check_folder(folder))?;
         for folder in folders.into_iter().filter(|folder| folder.exists()) {
             std::fs::remove_dir_all(folder)?;
         }

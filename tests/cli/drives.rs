@@ -90,11 +90,13 @@ fn a_drive_that_cannot_be_made_is_refused_and_leaves_nothing() {
     refused("walls.toml --seconds nan --out a.pcap", 2, "expected a number above 0");
     refused("walls.toml --speed -1 --out a.pcap", 2, "expected a number from 0 to 100");
     refused("walls.toml --out a.npz", 2, "expected a name with .pcap, found a.npz");
-    refused("walls.toml --sensor vlp16 --out a.pcap", 1, "VLP-32C");
+    refused("walls.toml --sensor vlp16 --out a.pcap", 1, "vlp16 in the recipe walls.toml: rot");
     refused("absent.toml --out a.pcap", 1, "absent.toml");
     folder.write("taken.pcap/file", "");
-    refused("walls.toml --seconds 0.1 --out taken.pcap", 2, "taken.pcap: it exists already");
-    refused("walls.toml --seconds 0.1 --overwrite --out taken.pcap", 1, "taken.pcap");
+    for flag in ["", "--overwrite"] {
+        let words = format!("walls.toml --seconds 0.1 --out taken.pcap {flag}");
+        refused(&words, 2, "taken.pcap: expected a file to write, found a folder: name another");
+    }
     for name in ["a.pcap", "a.tum", "a.truth.jsonl", "taken.tum"] {
         assert!(!folder.at(name).exists(), "{name}");
     }

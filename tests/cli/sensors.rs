@@ -53,7 +53,10 @@ fn a_profile_is_checked_and_what_looks_odd_of_it_is_said() {
         1,
         &[
             ("profile wrong.toml", "rotating.beam[2].firing_us: expected a number"),
-            ("profile cut.json", "beam_altitude_angles: expected 2 values, found 1"),
+            (
+                "profile cut.json",
+                "error: cut.json: beam_altitude_angles: expected 2 values, found 1",
+            ),
             ("profile nowhere.toml", "nowhere.toml: No such file"),
             ("profile os5", "one of the sensors vlp32c"),
         ],

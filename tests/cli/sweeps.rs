@@ -314,7 +314,7 @@ fn what_cannot_be_used_is_named_and_nothing_is_written() {
             ("segment no_capture.PCAP --metadata missing.json --out out", "missing.json"),
             (
                 "segment no_capture.PCAP --metadata recipe.toml --out out",
-                "recipe.toml: metadata: expected value at line 1",
+                "recipe.toml: metadata: expected JSON: expected value at",
             ),
             ("detect missing.npz --model nothing.safetensors --out out.json", "missing.npz"),
             (

@@ -331,7 +331,7 @@ fn what_cannot_be_listened_to_is_named() {
     refused(
         "--pcap drive.pcap --from 10.0.0.1",
         2,
-        "error: expected packets of a VLP-16 or VLP-32C, found none among 754 UDP packets, 754 of \
+        "error: drive.pcap: expected packets of a VLP-16 or VLP-32C, found none among 754 UDP packets, 754 of \
          them from other addresses than 10.0.0.1: 192.168.1.201",
     );
     refused(
