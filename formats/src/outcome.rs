@@ -39,7 +39,7 @@ pub fn parsed<T: clap::FromArgMatches>(
     let mut command = with_negative_numbers(command);
     let matches = command.try_get_matches_from_mut(words);
     let read = matches.and_then(|mut matches| T::from_arg_matches_mut(&mut matches));
-    read.map_err(|error| in_words(error).format(&mut command))
+    read.map_err(|error| in_words(error.format(&mut command)))
 }
 
 /// The error, which says what is expected in place of a word that is not a number.
@@ -53,7 +53,9 @@ fn in_words(error: clap::Error) -> clap::Error {
     };
     let part = |kind| error.get(kind).map(ToString::to_string).unwrap_or_default();
     let [value, arg] = [ContextKind::InvalidValue, ContextKind::InvalidArg].map(part);
-    let message = format!("invalid value '{value}' for '{arg}': expected {expected}");
+    let message = format!(
+        "invalid value '{value}' for '{arg}': expected {expected}\n\nFor more information, try '--help'.\n"
+    );
     clap::Error::raw(error.kind(), message)
 }
 

@@ -209,6 +209,8 @@ def test_a_mesh_in_millimetres_has_its_size_in_metres(cube: tuple) -> None:
     np.testing.assert_allclose(mesh.vertices, vertices, rtol=1e-15)
     with pytest.warns(UserWarning, match=r"1000 x 1000 x 1000 m .* `units` names another"):
         ep.Mesh(1000 * vertices, faces, normalize="none")
+    with pytest.warns(UserWarning, match=r"0.001 x 0.001 x 0.001 m if its unit is millimetres \(1 x 1"):
+        ep.Mesh(vertices, faces, normalize="none", units="mm")
 
 
 def test_a_scan_is_saved_as_its_extension_says(cube: tuple, tmp_path: Path) -> None:

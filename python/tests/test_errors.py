@@ -95,7 +95,7 @@ def test_a_mesh_without_area_is_told() -> None:
 
 def test_what_is_no_whole_object_is_told() -> None:
     scan = ep.Sensor("vlp32c").scan(ep.Mesh(*ep.box((1, 1, 1))))
-    for cloud in [scan, FLOOR[:50] * 0.1 + [20, 0, 0]]:
+    for cloud in [scan, FLOOR[:500] * 0.1 + [20, 0, 0]]:
         with pytest.warns(UserWarning, match="the cloud is a scan of one side, and edge-64 learnt"):
             ep.Classifier("edge-64")(cloud)
     sweep = np.repeat(FLOOR * np.abs(FLOOR) ** 3 / 81, 2, axis=0)
