@@ -48,6 +48,7 @@ fn a_profile_is_checked_and_what_looks_odd_of_it_is_said() {
         "wrong.toml",
         folder.text("odd.toml").replace("sequence_us = 50", "sequence_us = 1"),
     );
+    folder.write("rows.csv", "azimuth_deg;elevation_deg\n1;2\n");
     folder.write("cut.json", METADATA.replace("10.0, -10.0", "10.0"));
     folder.refuses(
         1,
@@ -57,6 +58,7 @@ fn a_profile_is_checked_and_what_looks_odd_of_it_is_said() {
                 "profile cut.json",
                 "error: cut.json: beam_altitude_angles: expected 2 values, found 1",
             ),
+            ("profile rows.csv", "rows.csv: table.file: expected a profile in TOML, which names a"),
             ("profile nowhere.toml", "nowhere.toml: No such file"),
             ("profile os5", "one of the sensors vlp32c"),
         ],

@@ -151,10 +151,14 @@ impl SensorProfile {
 
     /// Reads a profile, or an Ouster sensor's metadata if the name of `file` ends with `.json`.
     pub fn load(file: &Path) -> Result<Self, ConfigError> {
-        if file.extension().is_some_and(|extension| extension == "json") {
-            return ouster::load(file);
+        match file.extension().and_then(|extension| extension.to_str()) {
+            Some("json") => ouster::load(file),
+            Some("csv") => {
+                let cause = "expected a profile in TOML, which names a table in CSV by this key";
+                Err(InvalidValue::new("table.file", cause).in_file(file))
+            }
+            _ => profile::load(file),
         }
-        profile::load(file)
     }
 
     /// A built-in sensor by name, or else a profile by path.
