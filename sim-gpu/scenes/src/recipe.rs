@@ -29,7 +29,7 @@ pub struct Recipe {
     pub ground: Ground,
     /// The mount of the sensor.
     pub mount: Mount,
-    /// The sensors, at least one; each scene has one of them.
+    /// The sensors; each scene has one of them.
     #[serde(default)]
     pub sensor: Vec<SensorChoice>,
     /// The fraction of the beams that return from glass; drawn for each scene.
@@ -39,7 +39,7 @@ pub struct Recipe {
     /// because robots differ. Small values leave strips of ground under objects, large ones cut
     /// off the feet of objects. By default segmentation uses its own value.
     pub ground_clearance_m: Option<Span>,
-    /// The objects, at least one, placed in this order.
+    /// The objects, placed in this order.
     #[serde(default)]
     pub object: Vec<Objects>,
 }
@@ -108,7 +108,7 @@ pub struct Objects {
     pub kind: String,
     /// The class that a network learns for the objects.
     pub class: String,
-    /// The least and the greatest number of these objects in a scene, up to 10,000.
+    /// The least and the greatest number of these objects in a scene.
     pub count: [u32; 2],
     /// Where they stand.
     pub place: Place,

@@ -286,11 +286,13 @@ impl Code {
         let name = words(&field.ty);
         let key = field.ident.as_ref().map(ToString::to_string).unwrap_or_default();
         let of_table = serde(&table.attrs, "default");
+        let wants_one = |text: String| text.contains("at least one");
+        let is_wanted = wants_one(docs(&field.attrs)) || wants_one(self.bounds(file, "", &key));
         let made = self.defaults.get(&(table.ident.to_string(), key));
         match of_table.clone().or_else(|| serde(&field.attrs, "default")) {
             _ if name.starts_with("Option<") => "optional".to_owned(),
             // Its check wants one: an empty list has a better message than serde's.
-            _ if docs(&field.attrs).contains("at least one") => "required".to_owned(),
+            _ if is_wanted => "required".to_owned(),
             None => "required".to_owned(),
             Some(Some(function)) => self.shown(file, &format!("{function}()")),
             Some(None) => match self.find(file, &inner(&field.ty)) {

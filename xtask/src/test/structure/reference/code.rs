@@ -62,6 +62,7 @@ impl Visit<'_> for Checks<'_> {
         let bound = match (name.as_str(), &arguments[..]) {
             ("within", [_, _, range]) => Some(self.1.within(range)),
             ("at_least", [_, _, least]) => Some(format!("at least {}", self.1.number(least))),
+            ("several", _) => Some("at least one".to_owned()),
             ("layers", [_, _, n]) => Some(format!("{n} or more layers")),
             (name, _) if self.1.expectations.contains_key(name) => {
                 self.1.expectations.get(name).cloned()
