@@ -47,7 +47,7 @@ use crate::records;
 pub use format::CloudFormat;
 #[cfg(feature = "las")]
 pub use las_write::{LasPoint, write_las};
-#[cfg(feature = "npz")]
+#[cfg(feature = "dataset")]
 pub(crate) use npz::read_pose as read_npz_pose;
 pub use plausible::{Unlike, check_sweep, coarse_coordinates, judge_object, judge_sweep};
 use precision::Precision;

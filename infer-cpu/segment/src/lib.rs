@@ -25,6 +25,7 @@ mod axes;
 mod components;
 mod ground;
 mod height_grid;
+mod hierarchy;
 mod image;
 mod label;
 mod link;
@@ -39,6 +40,7 @@ mod stream;
 mod sweep;
 
 pub use axes::doubtful_axes;
+pub use hierarchy::{Hierarchy, Node};
 pub use label::Label;
 pub use oriented_box::OrientedBox;
 pub use segmentation::{Cluster, Segmentation};

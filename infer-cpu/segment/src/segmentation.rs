@@ -51,6 +51,27 @@ impl Segmentation {
         self.ground.z_m(x, y)
     }
 
+    /// Begins a cut: obstacles are in no cluster until one is [pushed](Self::push).
+    pub(crate) fn begin_cut(&mut self) {
+        self.ends.clear();
+        self.members.clear();
+        for label in &mut self.labels {
+            if matches!(label, Label::Cluster(_)) {
+                *label = Label::Small;
+            }
+        }
+    }
+
+    /// Adds a cluster of these points, above ground of this height.
+    pub(crate) fn push(&mut self, points: &[u32], ground_z_m: Option<f32>) {
+        let number = self.ends.len() as u32;
+        let start = self.members.len();
+        self.members.extend_from_slice(points);
+        self.members[start..].sort_unstable();
+        points.iter().for_each(|&point| self.labels[point as usize] = Label::Cluster(number));
+        self.ends.push((self.members.len() as u32, ground_z_m));
+    }
+
     /// Turns the sets of obstacles that are neither too small nor too large into clusters.
     pub(crate) fn collect(&mut self, points: &[[f32; 3]], sets: &mut Sets, settings: &Settings) {
         self.measure(points, sets);
@@ -106,7 +127,7 @@ impl Segmentation {
 }
 
 /// The number of points of a set and their bounding rectangle.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Extent {
     pub count: usize,
     low: [f32; 2],
@@ -132,7 +153,7 @@ impl Extent {
             && self.diagonal_m() <= settings.max_size_m
     }
 
-    fn diagonal_m(&self) -> f32 {
+    pub fn diagonal_m(&self) -> f32 {
         (self.high[0] - self.low[0]).hypot(self.high[1] - self.low[1])
     }
 

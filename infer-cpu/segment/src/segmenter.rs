@@ -1,5 +1,6 @@
 use crate::components::Components;
 use crate::ground::{GroundFinder, sector};
+use crate::hierarchy::Hierarchy;
 use crate::image::{Columns, RangeImage};
 use crate::label::Label;
 use crate::link::link_column;
@@ -17,6 +18,9 @@ pub struct Segmenter {
     components: Components,
     sets: Sets,
     segmentation: Segmentation,
+    hierarchy: Hierarchy,
+    /// The nodes of the last cut.
+    kept: Vec<usize>,
 }
 
 impl Segmenter {
@@ -33,6 +37,8 @@ impl Segmenter {
             components: Components::default(),
             sets: Sets::default(),
             segmentation: Segmentation::default(),
+            hierarchy: Hierarchy::default(),
+            kept: Vec::new(),
         })
     }
 
@@ -41,16 +47,8 @@ impl Segmenter {
     /// # Errors
     /// A wrong number of rings, or more than four billion points.
     pub fn segment(&mut self, sweep: &Sweep<'_>) -> Result<&Segmentation, SegmentError> {
-        let n = sweep.points.len();
-        if n >= u32::MAX as usize {
-            return Err(SegmentError::TooManyPoints(n));
-        }
-        if let Some(found) = sweep.rings.map(<[u16]>::len).filter(|&found| found != n) {
-            return Err(SegmentError::RingCount { expected: n, found });
-        }
-        self.sets.reset(n);
-        self.segmentation.labels.clear();
-        self.segmentation.labels.resize(n, Label::Invalid);
+        self.begin(sweep)?;
+        self.sets.reset(sweep.points.len());
         match self.settings.radius_m {
             None => self.link_image(sweep)?,
             Some(radius_m) => {
@@ -63,7 +61,71 @@ impl Segmenter {
         Ok(&self.segmentation)
     }
 
+    /// Finds the ground of `sweep`, and the clusters of its other points at several widths. Each has
+    /// [`Settings::min_points`] or more. The same sweep gives the same result.
+    ///
+    /// # Errors
+    /// As [`Segmenter::segment`].
+    pub fn hierarchy(&mut self, sweep: &Sweep<'_>) -> Result<&Hierarchy, SegmentError> {
+        self.begin(sweep)?;
+        self.remove_ground(sweep)?;
+        let Self { settings, image, hierarchy, segmentation, .. } = self;
+        let Hierarchy { tree, steps, .. } = hierarchy;
+        steps.reset(sweep.points.len());
+        for column in 0..image.n_columns() {
+            steps.find(image, column, settings.column_width_deg.to_radians());
+        }
+        tree.reset(sweep.points);
+        steps.levels().for_each(|pairs| tree.join_level(pairs, settings.min_points));
+        hierarchy.finish(&segmentation.ground);
+        Ok(&self.hierarchy)
+    }
+
+    /// The best cut of the last hierarchy, by the worth of each of its nodes: a node is kept if its
+    /// worth is at least `1 + margin` times that of the best cut of those of which it is made. Returns
+    /// the number of the node of each cluster, too.
+    ///
+    /// # Panics
+    /// If there is not one worth for each node.
+    pub fn cut(&mut self, worths: &[f64], margin: f64) -> (&[usize], &Segmentation) {
+        let Self { hierarchy, segmentation, .. } = self;
+        assert_eq!(worths.len(), hierarchy.len(), "worths");
+        segmentation.begin_cut();
+        let mut kept = std::mem::take(&mut self.kept);
+        kept.clear();
+        hierarchy.cut(worths, margin, |node| kept.push(node));
+        kept.sort_unstable_by_key(|&node| hierarchy.tree.points(node).iter().min().copied());
+        for &node in &kept {
+            let ground_z_m = hierarchy.ground_z_m(node);
+            segmentation.push(hierarchy.tree.points(node), ground_z_m);
+        }
+        self.kept = kept;
+        (&self.kept, &self.segmentation)
+    }
+
+    fn begin(&mut self, sweep: &Sweep<'_>) -> Result<(), SegmentError> {
+        let n = sweep.points.len();
+        if n >= u32::MAX as usize {
+            return Err(SegmentError::TooManyPoints(n));
+        }
+        if let Some(found) = sweep.rings.map(<[u16]>::len).filter(|&found| found != n) {
+            return Err(SegmentError::RingCount { expected: n, found });
+        }
+        self.segmentation.labels.clear();
+        self.segmentation.labels.resize(n, Label::Invalid);
+        Ok(())
+    }
+
     fn link_image(&mut self, sweep: &Sweep<'_>) -> Result<(), SegmentError> {
+        self.remove_ground(sweep)?;
+        for column in 0..self.image.n_columns() {
+            link_column(&self.image, column, &self.settings, &mut self.sets);
+        }
+        Ok(())
+    }
+
+    /// Fills the image with all returns but those of the ground.
+    fn remove_ground(&mut self, sweep: &Sweep<'_>) -> Result<(), SegmentError> {
         let Segmentation { labels, ground, .. } = &mut self.segmentation;
         self.image.fill(sweep, &self.settings, labels)?;
         self.finder.find(&self.image, &self.settings, ground);
@@ -77,9 +139,6 @@ impl Segmenter {
             }
             !is_ground
         });
-        for column in 0..n_columns {
-            link_column(&self.image, column, &self.settings, &mut self.sets);
-        }
         Ok(())
     }
 }

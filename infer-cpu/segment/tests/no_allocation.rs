@@ -16,6 +16,9 @@ use test_support::allocations::{self, Counting};
 #[global_allocator]
 static COUNTING: Counting = Counting;
 
+/// Worths for as many nodes as there may be.
+static WORTHS: [f64; 1000] = [1.0; 1000];
+
 fn main() {
     let large = scan(&VLP32C, &[flat(), block([10.0, 3.0], [2.0, 4.0], 0.0, 1.5)]);
     let small = scan(&VLP32C[5..], &[flat(), block([6.0, -3.0], [2.0, 2.0], 0.0, 1.5)]);
@@ -27,7 +30,9 @@ fn main() {
             let mut segment = |scan: &scanner::Scan| {
                 let rings = with_rings.then_some(&scan.rings[..]);
                 let sweep = Sweep { points: &scan.points, rings };
-                segmenter.segment(&sweep).unwrap().clusters().len()
+                let n_clusters = segmenter.segment(&sweep).unwrap().clusters().len();
+                let n_nodes = segmenter.hierarchy(&sweep).unwrap().len();
+                n_clusters + segmenter.cut(&WORTHS[..n_nodes], 0.1).0.len()
             };
             segment(&large);
             let before = allocations::count();

@@ -7,6 +7,7 @@ mod clusters;
 mod components;
 mod frames;
 mod ground;
+mod hierarchy;
 mod inputs;
 mod real_frames;
 mod scanner;

@@ -1,0 +1,107 @@
+//! The cuts of a sweep at several widths at once.
+
+mod steps;
+mod tree;
+
+pub(crate) use steps::Steps;
+pub(crate) use tree::Tree;
+
+use crate::height_grid::HeightGrid;
+use crate::segmentation::Extent;
+
+/// The clusters of a sweep at seven widths, from the narrowest to the widest: a tree, in which each
+/// cluster holds those of which it is made. Made by
+/// [`Segmenter::hierarchy`](crate::Segmenter::hierarchy).
+///
+/// No single width is right: some part two persons who walk together, and others part a car at its
+/// windows. What the clusters show decides (Hu, Held and Ramanan, "Learning to Optimally Segment
+/// Point Clouds", RA-L 2020).
+#[derive(Default)]
+pub struct Hierarchy {
+    pub(crate) tree: Tree,
+    pub(crate) steps: Steps,
+    /// For each node, the height of the ground under it.
+    ground_z_m: Vec<Option<f32>>,
+    /// For each node, the worth of the best cut of its points, and whether that is the node itself.
+    best: Vec<(f64, bool)>,
+    /// Nodes to be looked at.
+    open: Vec<usize>,
+}
+
+/// A cluster of a hierarchy.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Node<'a> {
+    /// Indices of the points in the sweep.
+    pub points: &'a [u32],
+    /// Height of the ground under the middle of the points' bounding box, in metres in the sensor's
+    /// frame; `None` where it is unknown.
+    pub ground_z_m: Option<f32>,
+    /// The horizontal diagonal of that box, metres.
+    pub diagonal_m: f32,
+}
+
+impl Hierarchy {
+    /// The number of nodes.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.tree.len()
+    }
+
+    /// Whether there is no node.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The nodes. A node comes after those of which it is made.
+    pub fn nodes(&self) -> impl ExactSizeIterator<Item = Node<'_>> {
+        (0..self.len()).map(|node| Node {
+            points: self.tree.points(node),
+            ground_z_m: self.ground_z_m[node],
+            diagonal_m: self.tree.extent(node).diagonal_m(),
+        })
+    }
+
+    /// The nodes of which a node is made; points that are in none of them are in sets that are too
+    /// small.
+    pub fn children(&self, node: usize) -> impl Iterator<Item = usize> {
+        self.tree.children(node)
+    }
+
+    pub(crate) fn ground_z_m(&self, node: usize) -> Option<f32> {
+        self.ground_z_m[node]
+    }
+
+    pub(crate) fn finish(&mut self, ground: &HeightGrid) {
+        self.tree.finish();
+        self.ground_z_m.clear();
+        let z_m = |extent: &Extent| {
+            let [x, y] = extent.middle();
+            ground.z_m(x, y)
+        };
+        self.ground_z_m.extend((0..self.tree.len()).map(|node| z_m(self.tree.extent(node))));
+    }
+
+    /// The nodes of the best cut, of which none holds another: a node is kept if its worth is at
+    /// least `1 + margin` times that of the best cut of those of which it is made.
+    pub(crate) fn cut(&mut self, worths: &[f64], margin: f64, mut each: impl FnMut(usize)) {
+        let Self { tree, best, open, .. } = self;
+        best.clear();
+        for (node, &own) in worths.iter().enumerate() {
+            let mut parts = tree.children(node).peekable();
+            let is_whole = parts.peek().is_none();
+            let of_parts: f64 = parts.map(|part| best[part].0).sum();
+            let is_kept = is_whole || own >= (1.0 + margin) * of_parts;
+            best.push((if is_kept { own } else { of_parts }, is_kept));
+        }
+        open.clear();
+        open.extend(tree.roots());
+        while let Some(node) = open.pop() {
+            if best[node].1 {
+                each(node);
+            } else {
+                open.extend(tree.children(node));
+            }
+        }
+    }
+}

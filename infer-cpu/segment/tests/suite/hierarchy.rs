@@ -1,0 +1,93 @@
+//! The clusters of a sweep at several widths, and the choice among them.
+
+use edgepuck_segment::{Label, Segmenter, Settings, Sweep};
+
+use crate::scanner::{Scan, VLP32C, block, flat, scan};
+
+/// Two cars 0.5 m apart, and two persons 0.3 m apart.
+fn street() -> Scan {
+    scan(
+        &VLP32C,
+        &[
+            flat(),
+            block([5.0, 4.0], [4.2, 1.8], 0.2, 1.7),
+            block([5.0, 6.3], [4.2, 1.8], 0.2, 1.7),
+            block([-8.0, 0.0], [0.3, 0.5], 0.0, 1.8),
+            block([-8.0, 0.8], [0.3, 0.5], 0.0, 1.8),
+        ],
+    )
+}
+
+/// The surfaces of each node that are at least half of it, and whether it is all of them.
+fn surfaces(scan: &Scan, points: &[u32]) -> Vec<usize> {
+    let mut found: Vec<_> = points.iter().map(|&point| scan.surfaces[point as usize]).collect();
+    found.sort_unstable();
+    found.dedup();
+    found
+}
+
+#[test]
+fn each_object_and_each_group_is_a_node() {
+    let scan = street();
+    for rings in [Some(&scan.rings[..]), None] {
+        let mut segmenter = Segmenter::new(Settings::default()).unwrap();
+        let sweep = Sweep { points: &scan.points, rings };
+        let hierarchy = segmenter.hierarchy(&sweep).unwrap();
+        let nodes: Vec<_> = hierarchy.nodes().map(|node| surfaces(&scan, node.points)).collect();
+        for expected in [&[1][..], &[2], &[1, 2], &[3], &[4], &[3, 4]] {
+            assert!(nodes.iter().any(|node| node == expected), "{expected:?}: {nodes:?}");
+        }
+        // The ground is flat: 1.8 m below the sensor.
+        for node in hierarchy.nodes() {
+            let ground_z_m = node.ground_z_m.unwrap();
+            assert!((ground_z_m + 1.8).abs() < 0.05, "{ground_z_m}");
+        }
+    }
+}
+
+/// A point of one object is worth 1, and 0.9 in a group. A whole that may be worth 5 % less than its
+/// parts holds an object's pieces together; at 15 % less, it holds groups together, too.
+#[test]
+fn the_best_cut_is_that_of_the_largest_worth() {
+    let scan = street();
+    let mut segmenter = Segmenter::new(Settings::default()).unwrap();
+    let sweep = Sweep { points: &scan.points, rings: Some(&scan.rings) };
+    let hierarchy = segmenter.hierarchy(&sweep).unwrap();
+    let worth = |points: &[u32]| match surfaces(&scan, points)[..] {
+        [_] => points.len() as f64,
+        _ => 0.9 * points.len() as f64,
+    };
+    let worths: Vec<f64> = hierarchy.nodes().map(|node| worth(node.points)).collect();
+    let points: Vec<_> = hierarchy.nodes().map(|node| node.points.to_vec()).collect();
+    for (margin, n_expected) in [(-0.05, 4), (-0.15, 2)] {
+        let (nodes, cut) = segmenter.cut(&worths, margin);
+        let large: Vec<_> = cut.clusters().filter(|c| c.points.len() >= 40).collect();
+        let mut found: Vec<_> = large.iter().map(|c| surfaces(&scan, c.points)).collect();
+        found.sort();
+        assert_eq!(found.len(), n_expected, "{margin}: {found:?}");
+        assert_eq!(nodes.len(), cut.clusters().len());
+        for ((cluster, &node), number) in cut.clusters().zip(nodes).zip(0..) {
+            let mut expected = points[node].clone();
+            expected.sort_unstable();
+            assert_eq!(cluster.points, expected);
+            let mut labels = cluster.points.iter().map(|&point| cut.labels()[point as usize]);
+            assert!(labels.all(|label| label == Label::Cluster(number)));
+        }
+        let firsts: Vec<_> = cut.clusters().map(|cluster| cluster.points[0]).collect();
+        assert!(firsts.is_sorted());
+    }
+}
+
+#[test]
+fn few_points_or_none_have_no_nodes() {
+    let mut segmenter = Segmenter::new(Settings::default()).unwrap();
+    for points in [&[][..], &[[5.0, 0.0, 0.0]], &[[f32::NAN; 3]; 30]] {
+        let hierarchy = segmenter.hierarchy(&Sweep { points, rings: None }).unwrap();
+        assert!(hierarchy.is_empty());
+        let (nodes, cut) = segmenter.cut(&[], 0.0);
+        assert!(nodes.is_empty());
+        assert_eq!(cut.labels().len(), points.len());
+    }
+    let wrong = Sweep { points: &[[1.0; 3]; 3], rings: Some(&[0, 1]) };
+    assert!(segmenter.hierarchy(&wrong).is_err());
+}
