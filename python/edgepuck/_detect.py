@@ -41,7 +41,7 @@ def detect(
     rings: ArrayLike | None = None,
     precision: str = "f32",
     min_points: int = 20,
-    min_confidence: float = 0.0,
+    min_confidence: float = 0.7,
 ) -> list[Detection]:
     """Find the objects of known classes in a sweep, like `edgepuck detect`.
 
@@ -52,7 +52,7 @@ def detect(
         rings: The ring of each point, from below, [n]. A scan has its own.
         precision: The precision of the network: f32, f32-fc16, f16 or i8.
         min_points: The smallest number of points of an object.
-        min_confidence: The smallest confidence of an object.
+        min_confidence: The smallest confidence of an object; 0 returns all that resemble a known class.
 
     Raises:
         Error: The model cannot be read, or the points have a wrong shape.

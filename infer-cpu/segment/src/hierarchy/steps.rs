@@ -18,13 +18,14 @@ fn base_m(distance_m: f32) -> f32 {
 }
 
 fn distance_m(this: &Return) -> f32 {
-    this.range_m.hypot(this.position[2])
+    let [.., z] = this.position;
+    (this.range_m * this.range_m + z * z).sqrt()
 }
 
-/// Pairs of points that a step links, each with its level.
+/// Pairs of points that a step links, by level.
 #[derive(Default)]
 pub struct Steps {
-    pairs: Vec<(usize, [u32; 2])>,
+    levels: [Vec<[u32; 2]>; LEVELS.len()],
 }
 
 /// The nearest return so far.
@@ -36,14 +37,15 @@ struct Nearest {
 impl Steps {
     /// Removes all, and makes room for those of `n_points`, unless many share cells.
     pub fn reset(&mut self, n_points: usize) {
-        self.pairs.clear();
-        self.pairs.reserve(3 * n_points);
+        for pairs in &mut self.levels {
+            pairs.clear();
+            pairs.reserve(3 * n_points);
+        }
     }
 
     /// The steps of each level, from the narrowest one.
-    pub fn levels(&self) -> impl Iterator<Item = impl Iterator<Item = [u32; 2]>> {
-        let of = |level| self.pairs.iter().filter(move |pair| pair.0 == level).map(|pair| pair.1);
-        (0..LEVELS.len()).map(of)
+    pub fn levels(&self) -> impl Iterator<Item = &[[u32; 2]]> {
+        self.levels.iter().map(Vec::as_slice)
     }
 
     /// Adds the steps from each return of `column` to the nearest return beside it, in columns of
@@ -71,7 +73,7 @@ impl Steps {
         let base_m = base_m(distance_m(a).min(distance_m(b)));
         let level = LEVELS.iter().position(|level| square <= (level * base_m).powi(2));
         if let Some(level) = level {
-            self.pairs.push((level, [a.point, b.point]));
+            self.levels[level].push([a.point, b.point]);
         }
     }
 }
@@ -223,7 +225,7 @@ mod tests {
             let mut steps = Steps::default();
             let [a, b] = [at(range_m, 0.0, 0), at(range_m, step_m, 1)];
             steps.add(&a, &b, square(&a, &b));
-            let level = steps.levels().position(|mut pairs| pairs.next() == Some([0, 1]));
+            let level = steps.levels().position(|pairs| pairs == [[0, 1]]);
             assert_eq!(level, expected, "{range_m} {step_m}");
         }
     }

@@ -64,9 +64,9 @@ impl Tree {
 
     /// Joins the sets of each pair. Sets that have changed and have `min_points` or more are nodes,
     /// with those before them as children.
-    pub fn join_level(&mut self, pairs: impl Iterator<Item = [u32; 2]>, min_points: usize) {
+    pub fn join_level(&mut self, pairs: &[[u32; 2]], min_points: usize) {
         self.joined.clear();
-        for [a, b] in pairs {
+        for &[a, b] in pairs {
             self.join(a, b);
         }
         for i in 0..self.joined.len() {
@@ -214,7 +214,7 @@ mod tests {
             tree.reset(&[[0.0; 3]; 40]);
             let (mut pairs, mut expected) = (Vec::new(), BTreeSet::new());
             for level in &levels {
-                tree.join_level(level.iter().copied(), least);
+                tree.join_level(level, least);
                 pairs.extend(level);
                 // A point that no pair names is in no set.
                 let joined = sets(&pairs).into_iter().filter(|set| set.len() >= least.max(2));

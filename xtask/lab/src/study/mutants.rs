@@ -165,7 +165,7 @@ impl Group {
                 continue;
             }
             let mut run = mutants(excluded);
-            run.args(["--baseline", "skip", "--timeout", "600", "--no-shuffle", "--output"]);
+            run.args(["--baseline", "skip", "--timeout", "200", "--no-shuffle", "--output"]);
             run.arg(folder.join(pass));
             run.args(packages.iter().flat_map(|package| ["--test-package", package]));
             // cargo-mutants 27.1 tries fields that are left out whatever the `--re`.

@@ -6,7 +6,7 @@ mod mounting;
 use crate::table::{Table, percent, publish};
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use edgepuck_program::detect::{Detections, Detector, Object};
+use edgepuck_program::detect::{Detections, Detector, LEAST_CONFIDENCE, Object};
 use edgepuck_segment::Label;
 use formats::Scan;
 use formats::interval::wilson;
@@ -47,6 +47,9 @@ const MARGIN_M: f64 = 0.3;
 const SHARE: f64 = 0.5;
 /// Borders of the bins of range, metres.
 const RANGES_M: [f64; 5] = [0.0, 10.0, 20.0, 30.0, MAX_RANGE_M];
+
+/// Least confidences of the curve.
+const CONFIDENCES: [f64; 9] = [0.0, 0.3, 0.4, 0.5, 0.6, LEAST_CONFIDENCE, 0.8, 0.9, 0.95];
 
 /// Labels of datasets, and the classes of a network for streets.
 const CLASSES: [(&str, &str); 16] = [
@@ -109,15 +112,57 @@ struct Judged {
 
 pub fn run(args: &FramesArgs) -> Result<()> {
     let mut detector = Detector::open(&args.model, &Options::default(), MIN_CLUSTER)?;
-    let (mut asked, mut alarms, mut sources) = (Vec::new(), Vec::new(), Vec::new());
-    for file in &args.frames {
-        let judged = Judged::of(file, &mut detector)?;
-        asked.extend(judged.asked());
-        alarms.extend(judged.false_alarms());
-        sources.push(judged.source);
+    detector.min_confidence = 0.0;
+    let judged = args.frames.iter().map(|file| Judged::of(file, &mut detector));
+    let mut judged = judged.collect::<Result<Vec<_>>>()?;
+    let sources: Vec<_> = judged.iter().map(|frame| frame.source).collect();
+    let mut curve = Table::new(
+        "By least confidence",
+        &["least confidence", "found and named", "false cars and persons", "other false alarms"],
+    );
+    let mut tables = Vec::new();
+    for confidence in CONFIDENCES {
+        for frame in &mut judged {
+            frame.found.objects.retain(|object| object.confidence >= confidence);
+        }
+        let asked: Vec<_> = judged.iter().flat_map(Judged::asked).collect();
+        let alarms: Vec<_> = judged.iter().flat_map(Judged::false_alarms).collect();
+        curve.push(point_of_curve(confidence, &asked, &alarms, &sources));
+        if confidence == LEAST_CONFIDENCE {
+            tables = vec![summary(&asked, &alarms, &sources), misses(&asked), alarm_table(&alarms)];
+        }
     }
-    let tables = [summary(&asked, &alarms, &sources), misses(&asked), alarm_table(&alarms)];
+    tables.insert(1.min(tables.len()), curve);
     publish(&tables, args.report.as_deref())
+}
+
+/// A row of the curve: what is found, and the false alarms a frame of each source.
+fn point_of_curve(
+    confidence: f64,
+    asked: &[Asked],
+    alarms: &[FalseAlarm],
+    sources: &[&'static str],
+) -> Vec<String> {
+    let named = asked.iter().filter(|one| one.outcome == NAMED).count();
+    let mut names = sources.to_vec();
+    names.sort_unstable();
+    names.dedup();
+    let a_frame = |is_wanted: &dyn Fn(&str) -> bool| {
+        let of = |name: &&str| {
+            let of = alarms.iter().filter(|alarm| alarm.source == *name);
+            let n = of.filter(|alarm| is_wanted(&alarm.class)).count();
+            let n_frames = sources.iter().filter(|source| *source == name).count();
+            format!("{:.2} ({name})", n as f64 / n_frames as f64)
+        };
+        names.iter().map(of).collect::<Vec<_>>().join(", ")
+    };
+    let is_asked = |class: &str| ["car", "person"].contains(&class);
+    vec![
+        format!("{confidence}"),
+        format!("{named} of {}", asked.len()),
+        a_frame(&is_asked),
+        a_frame(&|class| !is_asked(class)),
+    ]
 }
 
 impl Judged {
