@@ -287,6 +287,7 @@ fn the_oldest_metadata_are_completed_as_by_ouster_sdk() {
     let object = old.as_object_mut().unwrap();
     object.remove("data_format");
     assert_eq!(parse(&old), parse(&stated));
+    assert_eq!(parse(&stated).unwrap().origin_m(), [ORIGIN_M, 0.0]);
     let object = old.as_object_mut().unwrap();
     object.remove("lidar_to_sensor_transform");
     object.remove("lidar_origin_to_beam_origin_mm");

@@ -195,3 +195,36 @@ impl<T: Copy + Default> Links for OpenSets<T> {
         self.sets[root as usize].add(&other);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Seven points in a row, one in each column; the first three are cut off.
+    #[test]
+    fn what_is_cut_keeps_the_later_points_and_is_known_as_cut() {
+        let mut points = OpenSets::<()>::new(10);
+        for place in 0..7u16 {
+            let point = points.insert([f32::from(place), 0.0, 0.0], 0, (), place.into()).unwrap();
+            points.wait_until(point, 9);
+            points.join(0, point);
+        }
+        let root = points.root(0).unwrap();
+        let Set { extent, first_place, last_place, is_cut } = *points.set(root);
+        assert_eq!((extent.count, first_place, last_place, is_cut), (7, 0, 9, false));
+        points.cut(root, 3);
+        for removed in 0..3 {
+            assert_eq!(points.root(removed), None);
+        }
+        let root = points.root(6).unwrap();
+        let mut left: Vec<_> = points.members(root).collect();
+        left.sort_unstable();
+        assert_eq!(left, [3, 4, 5, 6]);
+        let Set { extent, first_place, last_place, is_cut } = *points.set(root);
+        assert_eq!((extent.count, first_place, last_place, is_cut), (4, 3, 9, true));
+        assert_eq!(extent.middle(), [4.5, 0.0]);
+        // Their room is free again.
+        assert!((0..6).all(|_| points.insert([0.0; 3], 0, (), 8).is_some()));
+        assert_eq!(points.insert([0.0; 3], 0, (), 8), None);
+    }
+}

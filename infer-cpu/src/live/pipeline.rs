@@ -572,3 +572,18 @@ impl Place {
         place
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Arrival;
+
+    /// Times before 1970 and beyond the year 5000 are those of damaged captures.
+    #[test]
+    fn a_time_that_cannot_be_is_not_taken() {
+        for (time_s, expected) in
+            [(1.7e9, 1.7e9), (0.0, 0.0), (-1.0, 0.0), (1.1e11, 0.0), (f64::NAN, 0.0)]
+        {
+            assert_eq!(Arrival { time_s, moment: None }.likely().time_s, expected);
+        }
+    }
+}

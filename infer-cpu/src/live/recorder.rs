@@ -305,6 +305,14 @@ mod tests {
     use super::*;
     use crate::live::SCHEMA_VERSION;
 
+    /// The quaternion of no rotation is 0, 0, 0, 1 (REP 103); 0, 0, 0, 0 is none.
+    #[test]
+    fn what_stands_still_is_not_turned() {
+        let ros::Transform { translation, rotation } = still();
+        assert_eq!([translation.x, translation.y, translation.z], [0.0; 3]);
+        assert_eq!([rotation.x, rotation.y, rotation.z, rotation.w], [0.0, 0.0, 0.0, 1.0]);
+    }
+
     /// Other programs read version 1 of the line to create messages.
     #[test]
     fn messages_of_an_object_are_those_of_its_line() {

@@ -54,6 +54,18 @@ fn too_many_rings_are_refused() {
 }
 
 #[test]
+fn a_ring_without_an_elevation_is_refused() {
+    let mut settings = Settings::default();
+    settings.ring_elevations_deg = Some(vec![-1.0, 0.0, 1.0]);
+    let mut segmenter = Segmenter::new(settings).unwrap();
+    let points = [[10.0, 0.0, 0.0]; 2];
+    let rings = |ring| [0, ring];
+    assert!(segmenter.segment(&Sweep { points: &points, rings: Some(&rings(2)) }).is_ok());
+    let error = segmenter.segment(&Sweep { points: &points, rings: Some(&rings(3)) }).err();
+    assert_eq!(error, Some(SegmentError::UnknownRing { expected: 3, found: 3 }));
+}
+
+#[test]
 fn any_numbers_of_the_lasers_give_the_same_clusters() {
     let scan = scan(&VLP32C, &[flat(), block([10.0, 3.0], [2.0, 4.0], 0.0, 1.5)]);
     let laser: Vec<_> = scan.rings.iter().map(|ring| (ring * 7 + 3) % 32 + 1000).collect();

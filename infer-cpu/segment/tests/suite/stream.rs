@@ -222,6 +222,8 @@ fn a_head_that_stands_still_fills_the_room_and_no_more() {
     stream.end(|cluster| sizes.push(cluster.points.len()));
     // A column holds as many as its cells compare: 16 of each ring.
     assert_eq!(sizes, [16 * 32]);
+    let not_opened = 10_000 - 16 * 32;
+    assert_eq!(stream.dropped(), Dropped { late: 0, overflow: 90_000 + not_opened });
     stream.advance(0.0, |_| ());
     (0..20).for_each(|ring| stream.push([10.0, -1.0, 1.0], ring, ()));
     stream.end(|cluster| sizes.push(cluster.points.len()));
