@@ -191,3 +191,18 @@ fn a_sweep_may_be_one_cluster() {
     assert!(cluster.points.len() >= cage.iter().filter(is_high).count());
     assert!(f64::from(bottom) > -HEIGHT);
 }
+
+/// A cable that rises by a ring at each step of azimuth, to the left or to the right: no row and no
+/// column has two of its returns.
+#[test]
+fn what_rises_aslant_is_linked_to_either_side() {
+    let elevations: Vec<f64> = (-36..12).map(|thirds| f64::from(thirds) / 3.0).collect();
+    for aside in [1, -1] {
+        let cable = move |[x, y, z]: [f64; 3]| {
+            let step = (y.atan2(x).to_degrees() / 0.2).floor() as i32;
+            let ring = (z.asin().to_degrees() * 3.0).round() as i32;
+            (ring > -8 && step == 300 + aside * ring).then_some(12.0)
+        };
+        assert_clusters(&scan(&elevations, &[flat(), Box::new(cable)]), &[&[1]]);
+    }
+}
