@@ -220,7 +220,7 @@ fn positions(points: &[[f32; 3]], of: &[u32]) -> Vec<[f32; 3]> {
 
 /// A cluster of a known class.
 pub struct Object {
-    /// Its number among the clusters.
+    /// Its number among the clusters, as in [`Detections::labels`].
     pub cluster: u32,
     /// Its class.
     pub class: String,

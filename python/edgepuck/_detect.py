@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 
-from numpy.typing import ArrayLike
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from . import _edgepuck
 from ._arguments import place, whole
@@ -24,8 +25,8 @@ class Detection:
     """The probability of the class."""
     points: int
     """The number of its points."""
-    cluster: int
-    """The number of its cluster, as of `segment` with the same `min_points`."""
+    indices: NDArray[np.uint32]
+    """The rows of its points in the sweep, ascending, [points]."""
     centre: list[float]
     """The centre of the box around its points, in the frame of the sensor, metres, [3]."""
     size: list[float]

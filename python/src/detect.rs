@@ -1,10 +1,10 @@
 use crate::arrays::sweep;
 use crate::error::{raised, raised_with_causes};
-use edgepuck_program::detect::{Detector, Object};
-use edgepuck_segment::OrientedBox;
+use edgepuck_program::detect::{Detections, Detector, Object};
+use edgepuck_segment::{Label, OrientedBox};
 use formats::Scan;
 use infer_cpu::Options;
-use numpy::{PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{IntoPyArray, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::Path;
@@ -28,17 +28,24 @@ pub fn detect<'py>(
         detector.min_confidence = min_confidence;
         detector.detect(&scan)
     });
-    let objects = found.map_err(raised_with_causes)?.objects;
-    objects.iter().map(|object| told(py, object)).collect()
+    let Detections { labels, objects, .. } = found.map_err(raised_with_causes)?;
+    let mut indices = vec![Vec::new(); objects.len()];
+    for (label, point) in labels.iter().zip(0u32..) {
+        let Label::Cluster(number) = *label else { continue };
+        if let Ok(object) = objects.binary_search_by_key(&number, |object| object.cluster) {
+            indices[object].push(point);
+        }
+    }
+    objects.iter().zip(indices).map(|(object, indices)| told(py, object, indices)).collect()
 }
 
-fn told<'py>(py: Python<'py>, object: &Object) -> PyResult<Bound<'py, PyDict>> {
+fn told<'py>(py: Python<'py>, object: &Object, indices: Vec<u32>) -> PyResult<Bound<'py, PyDict>> {
     let OrientedBox { centre_m, size_m, yaw_rad } = object.place;
     let told = PyDict::new(py);
     told.set_item("label", &object.class)?;
     told.set_item("confidence", object.confidence)?;
     told.set_item("points", object.n_points)?;
-    told.set_item("cluster", object.cluster)?;
+    told.set_item("indices", indices.into_pyarray(py))?;
     told.set_item("centre", centre_m)?;
     told.set_item("size", size_m)?;
     told.set_item("yaw_deg", yaw_rad.to_degrees())?;
