@@ -23,8 +23,8 @@ use formats::outputs::{Overwrite, need_extension};
 use kitti::{Camera, label};
 use rule::{MARGIN_OF_WHOLES, Rule, WIDEST_M};
 
-/// The least confidence of an object: on labelled sweeps of KITTI, one car or person in 12 sweeps is
-/// then a false alarm (assets/reports/reality/frames.md).
+/// The least confidence of an object, chosen by the false alarms on labelled sweeps
+/// (assets/reports/reality/frames.md).
 pub const LEAST_CONFIDENCE: f64 = 0.7;
 
 #[derive(clap::Args)]
@@ -148,7 +148,7 @@ pub struct Detections {
     pub labels: Vec<Label>,
     /// The clusters of known classes with enough confidence, in the order of their numbers.
     pub objects: Vec<Object>,
-    /// The number of the other clusters: of unknown class, or with too little confidence.
+    /// The number of the other clusters: of unknown class, with too little confidence, or too wide.
     pub n_other: usize,
 }
 

@@ -298,6 +298,22 @@ fn a_turn_is_that_of_the_packets_times() {
         frame[at..at + 4].copy_from_slice(&(moved as u32).to_le_bytes());
     }
     assert_eq!(of_frames(&at_the_hour).unwrap(), expected);
+    // A packet that comes again after more than a quarter of a turn.
+    let echoed = [&frames[..60], &frames[3..4], &frames[60..]].concat();
+    assert_eq!(of_frames(&echoed).unwrap(), expected);
+    // The next turn, a tenth of a second later, shows that this one is complete.
+    let mut next = frames.clone();
+    for frame in &mut next {
+        let (moved, at) = (stamp(frame) + 100_000, frame.len() - 6);
+        frame[at..at + 4].copy_from_slice(&(moved as u32).to_le_bytes());
+    }
+    let last = frames.len() - 1;
+    let without_the_last = [&frames[..last], &next].concat();
+    let found = of_frames(&without_the_last).unwrap();
+    assert!(found.len() < expected.len() && found.len() > expected.len() - 400);
+    let mut swapped_at_the_seam = [&frames[..], &next].concat();
+    swapped_at_the_seam.swap(last, last + 1);
+    assert!(of_frames(&swapped_at_the_seam).unwrap().len() >= found.len());
     // What is left after a gap of a third is no turn.
     let gap = [&frames[..40], &frames[100..]].concat();
     let error = of_frames(&gap).unwrap_err().to_string();

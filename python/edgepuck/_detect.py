@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,7 +25,7 @@ class Detection:
     """The probability of the class."""
     points: int
     """The number of its points."""
-    indices: NDArray[np.uint32]
+    indices: NDArray[np.uint32] = field(compare=False)
     """The rows of its points in the sweep, ascending, [points]."""
     centre: list[float]
     """The centre of the box around its points, in the frame of the sensor, metres, [3]."""

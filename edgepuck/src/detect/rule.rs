@@ -5,10 +5,8 @@ use infer_cpu::{Classifier, Prediction};
 /// How much an unknown object counts beside a known one of the same probability.
 const WEIGHT_OF_UNKNOWN: f64 = 0.8;
 
-/// By which share a cluster must be worth more than its parts not to be divided.
-///
-/// Both were chosen on 14 labelled sweeps of KITTI and Argoverse 2, on which neighbouring values
-/// (0.7 to 0.9, 0.05 to 0.15) find 54 to 59 of 72 cars and persons.
+/// A cluster is kept whole if it is worth this share more than its parts. This and the weight were
+/// chosen on labelled sweeps of KITTI and Argoverse 2 (assets/reports/reality/frames.md).
 pub const MARGIN_OF_WHOLES: f64 = 0.1;
 
 /// Clusters with a larger diagonal are no object, metres: an articulated bus is 18 m long and 2.55 m
@@ -31,7 +29,9 @@ impl Rule {
     /// The worth of a cluster of `n` points: how many of them the answer explains. Without an answer,
     /// it is unknown for sure.
     pub fn worth(&self, n: usize, answer: Option<&Prediction>) -> f64 {
-        let share = answer.map_or(WEIGHT_OF_UNKNOWN, |answer| {
+        // An answer that is unknown by its energy says nothing about the classes.
+        let certain = |answer: &&Prediction| !(answer.is_unknown && self.is_known[answer.class]);
+        let share = answer.filter(certain).map_or(WEIGHT_OF_UNKNOWN, |answer| {
             let known = (0..self.is_known.len()).filter(|&class| self.is_known[class]);
             let known: f64 = known.map(|class| answer.log_probability(class).exp()).sum();
             let own = if answer.is_unknown { 0.0 } else { answer.confidence() };

@@ -42,7 +42,8 @@ pub(super) fn read(reader: impl Read + Seek, name: &Path) -> Result<Vec<[f64; 3]
 pub(crate) fn read_pose<R: Read + Seek>(
     npz: &mut NpzReader<R>,
 ) -> Result<Option<[f64; 16]>, FormatError> {
-    if !npz.has(POSE_KEY) {
+    // In other archives, `pose` may be anything.
+    if !npz.has(POSE_KEY) || !npz.has(POSITIONS) {
         return Ok(None);
     }
     let pose = npz.array::<f64>(POSE_KEY)?;

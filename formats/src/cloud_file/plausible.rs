@@ -17,8 +17,9 @@ const NEAREST_M: f64 = 50.0;
 /// The largest step between coordinates, metres: LiDARs measure ranges to millimetres.
 const COARSEST_M: f32 = 0.005;
 
-/// The largest distance from a line, as a share of its length, of points that are on it.
-const ON_A_LINE: f64 = 1e-9;
+/// The largest distance from a line, as a share of its length, of points that are on it: f32 rounds
+/// to 6e-8.
+const ON_A_LINE: f64 = 1e-6;
 
 /// The fewest points of a sweep that is told by its rings: a turn of a VLP-16 has 28,800 beams.
 const FEWEST_OF_RINGS: usize = 4_000;
@@ -153,7 +154,7 @@ fn length(point: [f64; 3]) -> f64 {
     point.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// Whether no point is off the line through the two that are farthest apart of the first and another.
+/// Whether all points lie on the line through the first point and the one farthest from it.
 fn are_on_a_line(mut points: impl Iterator<Item = [f64; 3]> + Clone) -> bool {
     let Some(first) = points.next() else { return true };
     let from_first = points.map(|point| [0, 1, 2].map(|i| point[i] - first[i]));
@@ -260,6 +261,12 @@ mod tests {
             (vec![[0.0; 3], [0.0; 3], [f64::NAN; 3]], Err("found 2 in one place")),
             (vec![], Ok(None)),
             (vec![[-0.5; 3], [0.5; 3]], Err("found 2 on one line")),
+            (
+                (1..9)
+                    .map(|i| [0.1, 0.2, 0.3].map(|x| f64::from((x * f64::from(i)) as f32)))
+                    .collect(),
+                Err("found 8 on one line"),
+            ),
             (vec![[0.1, 0.2, 0.3], [0.7, 0.9, -0.4], [1.3, 1.6, -1.1]], Err("found 3 on one line")),
             (
                 vec![[8.5, -2.4, -1.6], [9.0, -1.3, 0.2], [8.7, -2.0, 1.0]],

@@ -54,7 +54,7 @@ pub fn read_turn(path: &Path, senders: &mut Senders) -> Result<(Scan, Counts), F
     let is_data = |payload: &[u8]| Header::parse(payload).is_ok();
     let counts = each_packet(path, senders, is_data, |payload| turn.take(payload))?;
     // Rounding may lose a unit.
-    if turn.end() < f64::from(TURN) - 1.0 {
+    if !turn.is_complete && turn.end() < f64::from(TURN) - 1.0 {
         let found = match turn.decoder {
             None => "none".to_owned(),
             Some(_) => format!("{:.1} degrees of one", turn.end() * AZIMUTH_UNIT_DEG),
@@ -75,8 +75,10 @@ struct Turn {
     /// The last packet by its time, its start in azimuth units after that of the first packet, and
     /// microseconds after it.
     last: Option<(Header, f64, f64)>,
-    /// The times of the packets.
-    stamps: BTreeSet<u32>,
+    /// The times and azimuths of the packets.
+    stamps: BTreeSet<(u32, u16)>,
+    /// Whether a packet of the next turn has come.
+    is_complete: bool,
     points: Points,
 }
 
@@ -88,6 +90,10 @@ impl Turn {
             return Ok(ControlFlow::Continue(()));
         }
         let header = Header::parse(payload)?;
+        let stamp = (header.time_us, header.azimuth);
+        if self.stamps.contains(&stamp) {
+            return Ok(ControlFlow::Continue(()));
+        }
         let (mut start, mut time_us) = (0.0, 0.0);
         if let Some((last, last_start, last_us)) = self.last {
             let step_us = step_us(&last, &header);
@@ -101,14 +107,13 @@ impl Turn {
                 *self = Self::default();
                 (start, time_us) = (0.0, 0.0);
             } else if start >= f64::from(TURN) {
+                self.is_complete = true;
                 return Ok(ControlFlow::Break(()));
             } else if start < 0.0 || time_us < 0.0 {
                 return Ok(ControlFlow::Continue(()));
             }
         }
-        if !self.stamps.insert(header.time_us) {
-            return Ok(ControlFlow::Continue(()));
-        }
+        self.stamps.insert(stamp);
         if self.last.is_none_or(|(_, _, last_us)| time_us >= last_us) {
             self.last = Some((header, start, time_us));
         }
@@ -136,5 +141,5 @@ fn step_us(from: &Header, to: &Header) -> f64 {
 
 /// Whether azimuths no longer tell how far the head turned in a step after `last`.
 fn is_gap(last: &Header, step_us: f64) -> bool {
-    step_us.abs() > LONGEST_STEP_US || last.units_per_us * step_us.abs() > f64::from(TURN) / 4.0
+    step_us.abs() > LONGEST_STEP_US || last.units_per_us * step_us > f64::from(TURN) / 4.0
 }

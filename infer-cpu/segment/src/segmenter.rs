@@ -62,7 +62,8 @@ impl Segmenter {
     }
 
     /// Finds the ground of `sweep`, and the clusters of its other points at several widths. Each has
-    /// [`Settings::min_points`] or more. The same sweep gives the same result.
+    /// [`Settings::min_points`] or more; there is no largest size, and no
+    /// [`Settings::radius_m`]. The same sweep gives the same result.
     ///
     /// # Errors
     /// As [`Segmenter::segment`].
@@ -81,7 +82,7 @@ impl Segmenter {
         Ok(&self.hierarchy)
     }
 
-    /// The best cut of the last hierarchy, by the worth of each of its nodes: a node is kept if its
+    /// The best cut of the hierarchy of the last sweep, by the worth of each of its nodes: a node is kept if its
     /// worth is at least `1 + margin` times that of the best cut of those of which it is made. Returns
     /// the number of the node of each cluster, too.
     ///
@@ -113,6 +114,7 @@ impl Segmenter {
         }
         self.segmentation.labels.clear();
         self.segmentation.labels.resize(n, Label::Invalid);
+        self.hierarchy.clear();
         Ok(())
     }
 

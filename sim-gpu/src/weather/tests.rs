@@ -129,6 +129,39 @@ fn beams_along_a_face_of_a_box_are_inside_and_what_is_behind_it_is_weaker() {
     assert!(behind > 100, "{behind}");
 }
 
+/// Koschmieder: 5 % of the light is left after the visibility, and a return passes twice. The dust
+/// behind a return adds to it, up to the box's end.
+#[test]
+fn rain_is_seen_through_dust_and_dust_to_the_end_of_its_box() {
+    let dust = Volume { min_m: [3.0, -5.0, -5.0], max_m: [6.0, 5.0, 5.0], visibility_m: 20.0 };
+    let (clear, dusty) = (lisa(&rain(300.0)), Weather { volumes: vec![dust], ..rain(300.0) });
+    let dusty = lisa(&dusty);
+    let left = |range_m: f64| 0.05f64.powf(2.0 * (range_m.clamp(3.0, 6.0) - 3.0) / 20.0);
+    let (mut n_rain, mut n_dust) = (0, 0);
+    for number in 0..4000 {
+        let beam = beam(40.0, number);
+        let (dust, behind): (Vec<_>, Vec<_>) =
+            scattered(&dusty, &beam).into_iter().partition(|one| one.medium == Medium::Dust);
+        let expected = scattered(&clear, &beam);
+        assert_eq!(behind.len(), expected.len());
+        for (found, drop) in behind.iter().zip(&expected) {
+            let share = left(drop.range_m);
+            assert_eq!(found.range_m, drop.range_m);
+            assert!((found.power / drop.power - share).abs() < 1e-12);
+            assert!((found.brightness / drop.brightness - share).abs() < 1e-12);
+            n_rain += usize::from(share < 0.5);
+        }
+        for one in dust {
+            let rain_left = clear.transmission(DVec3::ZERO, DVec3::X, one.range_m);
+            let own = fog::of_one_pulse(20.0, 6.0 - one.range_m);
+            let expected = own * left(one.range_m) * rain_left;
+            assert!((one.brightness - expected).abs() < 1e-12 * expected);
+            n_dust += 1;
+        }
+    }
+    assert!(n_rain > 30 && n_dust > 1000, "{n_rain} {n_dust}");
+}
+
 #[test]
 fn dust_is_in_its_box_and_as_often_as_its_optical_depth_says() {
     let volume = Volume { min_m: [5.0, -1.0, -1.0], max_m: [8.0, 1.0, 1.0], visibility_m: 30.0 };

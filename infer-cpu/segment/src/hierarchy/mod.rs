@@ -62,14 +62,14 @@ impl Hierarchy {
         })
     }
 
-    /// The nodes of which a node is made; points that are in none of them are in sets that are too
-    /// small.
-    pub fn children(&self, node: usize) -> impl Iterator<Item = usize> {
-        self.tree.children(node)
-    }
-
     pub(crate) fn ground_z_m(&self, node: usize) -> Option<f32> {
         self.ground_z_m[node]
+    }
+
+    /// Removes all nodes.
+    pub(crate) fn clear(&mut self) {
+        self.tree.reset(&[]);
+        self.ground_z_m.clear();
     }
 
     pub(crate) fn finish(&mut self, ground: &HeightGrid) {

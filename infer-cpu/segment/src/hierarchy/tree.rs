@@ -55,6 +55,7 @@ impl Tree {
         };
         self.sets.extend(points.iter().zip(numbers).map(set));
         // Each node and each change joins two sets.
+        self.joined.clear();
         self.joined.reserve(points.len());
         self.members.clear();
         self.members.reserve(points.len());

@@ -18,7 +18,7 @@ fn street() -> Scan {
     )
 }
 
-/// The surfaces of each node that are at least half of it, and whether it is all of them.
+/// The surfaces that the points lie on.
 fn surfaces(scan: &Scan, points: &[u32]) -> Vec<usize> {
     let mut found: Vec<_> = points.iter().map(|&point| scan.surfaces[point as usize]).collect();
     found.sort_unstable();
@@ -59,12 +59,14 @@ fn the_best_cut_is_that_of_the_largest_worth() {
     };
     let worths: Vec<f64> = hierarchy.nodes().map(|node| worth(node.points)).collect();
     let points: Vec<_> = hierarchy.nodes().map(|node| node.points.to_vec()).collect();
-    for (margin, n_expected) in [(-0.05, 4), (-0.15, 2)] {
+    for (margin, expected) in
+        [(-0.05, &[&[1][..], &[2], &[3], &[4]][..]), (-0.15, &[&[1, 2], &[3, 4]])]
+    {
         let (nodes, cut) = segmenter.cut(&worths, margin);
         let large: Vec<_> = cut.clusters().filter(|c| c.points.len() >= 40).collect();
         let mut found: Vec<_> = large.iter().map(|c| surfaces(&scan, c.points)).collect();
         found.sort();
-        assert_eq!(found.len(), n_expected, "{margin}: {found:?}");
+        assert_eq!(found, expected, "{margin}");
         assert_eq!(nodes.len(), cut.clusters().len());
         for ((cluster, &node), number) in cut.clusters().zip(nodes).zip(0..) {
             let mut expected = points[node].clone();
@@ -88,6 +90,12 @@ fn few_points_or_none_have_no_nodes() {
         assert!(nodes.is_empty());
         assert_eq!(cut.labels().len(), points.len());
     }
+    // A hierarchy is that of its own sweep.
+    let scan = street();
+    let sweep = Sweep { points: &scan.points, rings: Some(&scan.rings) };
+    assert!(!segmenter.hierarchy(&sweep).unwrap().is_empty());
+    segmenter.segment(&Sweep { points: &[[5.0, 0.0, 0.0]], rings: None }).unwrap();
+    assert_eq!(segmenter.cut(&[], 0.1).0.len(), 0);
     let wrong = Sweep { points: &[[1.0; 3]; 3], rings: Some(&[0, 1]) };
     assert!(segmenter.hierarchy(&wrong).is_err());
 }
