@@ -75,7 +75,8 @@ pub(crate) fn run(args: &DetectArgs) -> anyhow::Result<Outcome> {
     let mut detector = Detector::open(&args.model, &options, args.min_points)?;
     detector.min_confidence = args.min_confidence;
     let started = Instant::now();
-    let Detections { labels, objects, n_other } = detector.detect(&scan)?;
+    let found = detector.detect(&scan)?;
+    let Detections { labels, objects, n_other } = &found;
     let elapsed_ms = 1e3 * started.elapsed().as_secs_f64();
 
     let written = if is_json {
@@ -95,11 +96,10 @@ pub(crate) fn run(args: &DetectArgs) -> anyhow::Result<Outcome> {
     };
     atomic::write_bytes(&args.out, written)?;
     // Greys: clusters without an object are darker than all around them.
-    let tints = labels.iter().map(|&label| match label {
-        Label::Cluster(number) => objects
-            .binary_search_by_key(&number, |object| object.cluster)
-            .map_or(tint(Label::Ground), |i| objects[i].tint()),
-        _ => tint(Label::Small),
+    let tints = labels.iter().map(|&label| match (found.object(label), label) {
+        (Some(object), _) => objects[object].tint(),
+        (None, Label::Cluster(_)) => tint(Label::Ground),
+        (None, _) => tint(Label::Small),
     });
     let tints: Vec<_> = tints.collect();
     let outlines: Vec<_> = objects
@@ -150,6 +150,15 @@ pub struct Detections {
     pub objects: Vec<Object>,
     /// The number of the other clusters: of unknown class, with too little confidence, or too wide.
     pub n_other: usize,
+}
+
+impl Detections {
+    /// The index of the object whose points have this label.
+    #[must_use]
+    pub fn object(&self, label: Label) -> Option<usize> {
+        let Label::Cluster(number) = label else { return None };
+        self.objects.binary_search_by_key(&number, |object| object.cluster).ok()
+    }
 }
 
 impl Detector {

@@ -1,7 +1,7 @@
 use crate::arrays::sweep;
 use crate::error::{raised, raised_with_causes};
-use edgepuck_program::detect::{Detections, Detector, Object};
-use edgepuck_segment::{Label, OrientedBox};
+use edgepuck_program::detect::{Detector, Object};
+use edgepuck_segment::OrientedBox;
 use formats::Scan;
 use infer_cpu::Options;
 use numpy::{IntoPyArray, PyReadonlyArray1, PyReadonlyArray2};
@@ -28,15 +28,14 @@ pub fn detect<'py>(
         detector.min_confidence = min_confidence;
         detector.detect(&scan)
     });
-    let Detections { labels, objects, .. } = found.map_err(raised_with_causes)?;
-    let mut indices = vec![Vec::new(); objects.len()];
-    for (label, point) in labels.iter().zip(0u32..) {
-        let Label::Cluster(number) = *label else { continue };
-        if let Ok(object) = objects.binary_search_by_key(&number, |object| object.cluster) {
+    let found = found.map_err(raised_with_causes)?;
+    let mut indices = vec![Vec::new(); found.objects.len()];
+    for (&label, point) in found.labels.iter().zip(0u32..) {
+        if let Some(object) = found.object(label) {
             indices[object].push(point);
         }
     }
-    objects.iter().zip(indices).map(|(object, indices)| told(py, object, indices)).collect()
+    found.objects.iter().zip(indices).map(|(object, indices)| told(py, object, indices)).collect()
 }
 
 fn told<'py>(py: Python<'py>, object: &Object, indices: Vec<u32>) -> PyResult<Bound<'py, PyDict>> {

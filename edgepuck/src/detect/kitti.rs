@@ -27,51 +27,30 @@ impl Camera {
     /// Reads a calibration file of the benchmark.
     pub fn read(file: &Path) -> anyhow::Result<Self> {
         let text = read_text(file, u64::MAX).with_context(|| file.display().to_string())?;
-        let matrix = |key: &str, columns: usize| {
-            let line = text
-                .lines()
-                .find_map(|line| line.trim_start().strip_prefix(key)?.strip_prefix(':'));
-            let words = line.unwrap_or_default().split_whitespace();
-            let numbers: Vec<f64> = words.map_while(|word| word.parse().ok()).collect();
-            if numbers.len() != 3 * columns || numbers.iter().any(|x| !x.is_finite()) {
-                let (expected, found) = (3 * columns, numbers.len());
-                let cause = format!("expected a line of {expected} finite numbers, found {found}");
-                return Err(FormatError::malformed(file, key, cause));
-            }
-            let rows = [0, 1, 2].map(|row| &numbers[row * columns..][..columns]);
-            let column = |i: usize| DVec3::from(rows.map(|row| row[i]));
-            let rotation = DMat3::from_cols(column(0), column(1), column(2));
-            let shift = if columns == 4 { column(3) } else { DVec3::ZERO };
-            Ok(DMat4::from_translation(shift) * DMat4::from_mat3(rotation))
-        };
-        let rotation = |key: &str, columns: usize| {
-            let found = matrix(key, columns)?;
-            let axes = DMat3::from_mat4(found);
-            let off = (axes * axes.transpose() - DMat3::IDENTITY).to_cols_array();
-            let off = off.into_iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-            if off > NOT_A_ROTATION || axes.determinant() < 0.0 {
-                let cause = "expected a rotation: rows of length 1 at right angles, right-handed";
-                return Err(FormatError::malformed(file, key, cause));
-            }
-            Ok(found)
-        };
-        let rect_from_lidar = rotation("R0_rect", 3)? * rotation("Tr_velo_to_cam", 4)?;
-        let image_from_rect = matrix("P2", 4)?;
-        // The camera looks along its z axis.
-        let upwards = rect_from_lidar.z_axis.z;
-        let flaw = |key: &str, cause: &str| Err(FormatError::malformed(file, key, cause).into());
-        if upwards.abs() > STEEPEST {
+        let flaw = |(key, cause): (&str, String)| FormatError::malformed(file, key, cause);
+        let of_lidar =
+            || Ok(rotation(&text, "R0_rect", 3)? * rotation(&text, "Tr_velo_to_cam", 4)?);
+        let rect_from_lidar = of_lidar().map_err(flaw)?;
+        let image_from_rect = matrix(&text, "P2", 4).map_err(flaw)?;
+        let camera = Self { rect_from_lidar, image_from_rect };
+        camera.check().map_err(flaw)?;
+        Ok(camera)
+    }
+
+    /// Whether the camera looks ahead, along its z axis, and projects.
+    fn check(&self) -> Result<(), Flaw> {
+        if self.rect_from_lidar.z_axis.z.abs() > STEEPEST {
             let cause = "expected a camera that looks ahead, found one that looks along the LiDAR's \
                          z: x of the camera points to the right, y down, z ahead";
-            return flaw("Tr_velo_to_cam", cause);
+            return Err(("Tr_velo_to_cam", cause.to_owned()));
         }
-        let [x, y, z] = [0, 1, 2].map(|row| image_from_rect.row(row).truncate());
+        let [x, y, z] = [0, 1, 2].map(|row| self.image_from_rect.row(row).truncate());
         if x.x <= 0.0 || y.y <= 0.0 || z != DVec3::Z {
             let cause =
                 "expected a projection: focal lengths above 0, a last row of 0 0 1 and an offset";
-            return flaw("P2", cause);
+            return Err(("P2", cause.to_owned()));
         }
-        Ok(Self { rect_from_lidar, image_from_rect })
+        Ok(())
     }
 
     /// The left, top, right and bottom of the box with these corners in the picture, pixels; `None`
@@ -86,6 +65,38 @@ impl Camera {
         }
         Some([low.x, low.y, high.x, high.y])
     }
+}
+
+/// The key of a line of a calibration, and what is wrong with it.
+type Flaw = (&'static str, String);
+
+/// The matrix of three rows in the line `key`.
+fn matrix(text: &str, key: &'static str, columns: usize) -> Result<DMat4, Flaw> {
+    let line = text.lines().find_map(|line| line.trim_start().strip_prefix(key)?.strip_prefix(':'));
+    let words = line.unwrap_or_default().split_whitespace();
+    let numbers: Vec<f64> = words.map_while(|word| word.parse().ok()).collect();
+    if numbers.len() != 3 * columns || numbers.iter().any(|x| !x.is_finite()) {
+        let (expected, found) = (3 * columns, numbers.len());
+        return Err((key, format!("expected a line of {expected} finite numbers, found {found}")));
+    }
+    let rows = [0, 1, 2].map(|row| &numbers[row * columns..][..columns]);
+    let column = |i: usize| DVec3::from(rows.map(|row| row[i]));
+    let rotation = DMat3::from_cols(column(0), column(1), column(2));
+    let shift = if columns == 4 { column(3) } else { DVec3::ZERO };
+    Ok(DMat4::from_translation(shift) * DMat4::from_mat3(rotation))
+}
+
+/// The matrix in the line `key`, which must be that of a rotation, but for a fourth column.
+fn rotation(text: &str, key: &'static str, columns: usize) -> Result<DMat4, Flaw> {
+    let found = matrix(text, key, columns)?;
+    let axes = DMat3::from_mat4(found);
+    let off = (axes * axes.transpose() - DMat3::IDENTITY).to_cols_array();
+    let off = off.into_iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    if off > NOT_A_ROTATION || axes.determinant() < 0.0 {
+        let cause = "expected a rotation: rows of length 1 at right angles, right-handed";
+        return Err((key, cause.to_owned()));
+    }
+    Ok(found)
 }
 
 /// The line of an object: type, truncation, occlusion, alpha, left, top, right, bottom, height,

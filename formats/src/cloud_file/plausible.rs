@@ -21,7 +21,7 @@ const COARSEST_M: f32 = 0.005;
 /// to 6e-8.
 const ON_A_LINE: f64 = 1e-6;
 
-/// The fewest points of a sweep that is told by its rings: a turn of a VLP-16 has 28,800 beams.
+/// Clouds of fewer points are not searched for rings: a turn of a VLP-16 has 28,800 beams.
 const FEWEST_OF_RINGS: usize = 4_000;
 /// The fewest rings, of the 16 of the smallest sensors.
 const FEWEST_RINGS: usize = 8;
@@ -60,7 +60,7 @@ pub fn judge_sweep(
             let cause = format!("expected metres from the sensor, found {point:?}: {remedy}");
             return Err((format!("point {i}"), cause));
         }
-        let range = point.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let range = length(point);
         if range > 0.0 {
             (nearest, farthest) = (range.min(nearest), range.max(farthest));
             (low, high) =

@@ -12,10 +12,8 @@ use crate::pcap::Counts;
 use crate::returns::Kind;
 use crate::scan::Scan;
 use crate::vlp32c::packet::PAYLOAD_SIZE;
-use crate::vlp32c::{AZIMUTH_UNIT_DEG, Returns, WHITE};
+use crate::vlp32c::{AZIMUTH_UNIT_DEG, HOUR_US, Returns, WHITE};
 
-/// The period of the time stamps, microseconds.
-const HOUR_US: f64 = 3.6e9;
 /// Longer steps are gaps, even if the head stands still, microseconds.
 const LONGEST_STEP_US: f64 = 1e6;
 
@@ -135,8 +133,8 @@ impl Turn {
 
 /// Microseconds from one packet to another, by the shorter way around the hour.
 fn step_us(from: &Header, to: &Header) -> f64 {
-    let step_us = f64::from(to.time_us) - f64::from(from.time_us);
-    (step_us + HOUR_US / 2.0).rem_euclid(HOUR_US) - HOUR_US / 2.0
+    let (step_us, hour_us) = (f64::from(to.time_us) - f64::from(from.time_us), HOUR_US as f64);
+    (step_us + hour_us / 2.0).rem_euclid(hour_us) - hour_us / 2.0
 }
 
 /// Whether azimuths no longer tell how far the head turned in a step after `last`.

@@ -67,7 +67,8 @@ pub const SEQUENCE_US: f64 = 55.296;
 /// Firing sequences of a packet that holds one return of each beam.
 pub const SEQUENCES_PER_PACKET: u32 = BLOCKS as u32;
 
-const HOUR_US: u64 = 3_600_000_000;
+/// The period of the time stamps, microseconds.
+pub(crate) const HOUR_US: u64 = 3_600_000_000;
 
 /// The unit of distances, metres.
 pub const DISTANCE_UNIT_M: f64 = 0.004;

@@ -1,6 +1,6 @@
 use crate::components::Components;
 use crate::ground::{GroundFinder, sector};
-use crate::hierarchy::Hierarchy;
+use crate::hierarchy::{Hierarchy, Node};
 use crate::image::{Columns, RangeImage};
 use crate::label::Label;
 use crate::link::link_column;
@@ -71,37 +71,28 @@ impl Segmenter {
         self.begin(sweep)?;
         self.remove_ground(sweep)?;
         let Self { settings, image, hierarchy, segmentation, .. } = self;
-        let Hierarchy { tree, steps, .. } = hierarchy;
-        steps.reset(sweep.points.len());
-        for column in 0..image.n_columns() {
-            steps.find(image, column, settings.column_width_deg.to_radians());
-        }
-        tree.reset(sweep.points);
-        steps.levels().for_each(|pairs| tree.join_level(pairs, settings.min_points));
-        hierarchy.finish(&segmentation.ground);
+        hierarchy.build(image, sweep.points, settings, &segmentation.ground);
         Ok(&self.hierarchy)
     }
 
-    /// The best cut of the hierarchy of the last sweep, by the worth of each of its nodes: a node is kept if its
-    /// worth is at least `1 + margin` times that of the best cut of those of which it is made. Returns
-    /// the number of the node of each cluster, too.
+    /// The best cut of the hierarchy of the last sweep, by the worth of each of its nodes: a node is
+    /// kept if its worth is at least `1 + margin` times that of the best cut of those of which it is
+    /// made. Returns the number of the node of each cluster, too.
     ///
     /// # Panics
     /// If there is not one worth for each node.
     pub fn cut(&mut self, worths: &[f64], margin: f64) -> (&[usize], &Segmentation) {
-        let Self { hierarchy, segmentation, .. } = self;
+        let Self { hierarchy, segmentation, kept, .. } = self;
         assert_eq!(worths.len(), hierarchy.len(), "worths");
         segmentation.begin_cut();
-        let mut kept = std::mem::take(&mut self.kept);
         kept.clear();
         hierarchy.cut(worths, margin, |node| kept.push(node));
-        kept.sort_unstable_by_key(|&node| hierarchy.tree.points(node).iter().min().copied());
-        for &node in &kept {
-            let ground_z_m = hierarchy.ground_z_m(node);
-            segmentation.push(hierarchy.tree.points(node), ground_z_m);
+        kept.sort_unstable_by_key(|&node| hierarchy.node(node).points.iter().min().copied());
+        for &node in &*kept {
+            let Node { points, ground_z_m, .. } = hierarchy.node(node);
+            segmentation.push(points, ground_z_m);
         }
-        self.kept = kept;
-        (&self.kept, &self.segmentation)
+        (kept, segmentation)
     }
 
     fn begin(&mut self, sweep: &Sweep<'_>) -> Result<(), SegmentError> {

@@ -14,17 +14,23 @@ impl Sets {
     }
 
     /// The first point of the set that holds `point`.
-    pub fn first(&mut self, mut point: u32) -> u32 {
-        loop {
-            let parent = self.parents[point as usize];
-            if parent == point {
-                return point;
-            }
-            // Halving the paths keeps them short.
-            let grandparent = self.parents[parent as usize];
-            self.parents[point as usize] = grandparent;
-            point = grandparent;
+    pub fn first(&mut self, point: u32) -> u32 {
+        root(&mut self.parents, point)
+    }
+}
+
+/// The root of the tree that holds `point`, of a forest in which each point has a parent; a root is
+/// its own.
+pub fn root(parents: &mut [u32], mut point: u32) -> u32 {
+    loop {
+        let parent = parents[point as usize];
+        if parent == point {
+            return point;
         }
+        // Halving the paths keeps them short.
+        let grandparent = parents[parent as usize];
+        parents[point as usize] = grandparent;
+        point = grandparent;
     }
 }
 

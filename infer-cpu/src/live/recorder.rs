@@ -305,7 +305,7 @@ mod tests {
     use super::*;
     use crate::live::SCHEMA_VERSION;
 
-    /// The quaternion of no rotation is 0, 0, 0, 1 (REP 103); 0, 0, 0, 0 is none.
+    /// REP 103: no rotation is the quaternion 0, 0, 0, 1. The quaternion 0, 0, 0, 0 is invalid.
     #[test]
     fn what_stands_still_is_not_turned() {
         let ros::Transform { translation, rotation } = still();

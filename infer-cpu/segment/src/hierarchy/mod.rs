@@ -3,11 +3,11 @@
 mod steps;
 mod tree;
 
-pub(crate) use steps::Steps;
-pub(crate) use tree::Tree;
-
 use crate::height_grid::HeightGrid;
-use crate::segmentation::Extent;
+use crate::image::{Columns, RangeImage};
+use crate::settings::Settings;
+use steps::Steps;
+use tree::Tree;
 
 /// The clusters of a sweep at seven widths, from the narrowest to the widest: a tree, in which each
 /// cluster holds those of which it is made. Made by
@@ -18,8 +18,8 @@ use crate::segmentation::Extent;
 /// Point Clouds", RA-L 2020).
 #[derive(Default)]
 pub struct Hierarchy {
-    pub(crate) tree: Tree,
-    pub(crate) steps: Steps,
+    tree: Tree,
+    steps: Steps,
     /// For each node, the height of the ground under it.
     ground_z_m: Vec<Option<f32>>,
     /// For each node, the worth of the best cut of its points, and whether that is the node itself.
@@ -55,15 +55,15 @@ impl Hierarchy {
 
     /// The nodes. A node comes after those of which it is made.
     pub fn nodes(&self) -> impl ExactSizeIterator<Item = Node<'_>> {
-        (0..self.len()).map(|node| Node {
+        (0..self.len()).map(|node| self.node(node))
+    }
+
+    pub(crate) fn node(&self, node: usize) -> Node<'_> {
+        Node {
             points: self.tree.points(node),
             ground_z_m: self.ground_z_m[node],
             diagonal_m: self.tree.extent(node).diagonal_m(),
-        })
-    }
-
-    pub(crate) fn ground_z_m(&self, node: usize) -> Option<f32> {
-        self.ground_z_m[node]
+        }
     }
 
     /// Removes all nodes.
@@ -72,14 +72,28 @@ impl Hierarchy {
         self.ground_z_m.clear();
     }
 
-    pub(crate) fn finish(&mut self, ground: &HeightGrid) {
-        self.tree.finish();
-        self.ground_z_m.clear();
-        let z_m = |extent: &Extent| {
-            let [x, y] = extent.middle();
+    /// Makes the nodes of the returns in `image`, those of `points` that are not ground.
+    pub(crate) fn build(
+        &mut self,
+        image: &RangeImage,
+        points: &[[f32; 3]],
+        settings: &Settings,
+        ground: &HeightGrid,
+    ) {
+        let Self { tree, steps, ground_z_m, .. } = self;
+        steps.reset(points.len());
+        for column in 0..Columns::n_columns(image) {
+            steps.find(image, column, settings.column_width_deg.to_radians());
+        }
+        tree.reset(points);
+        steps.levels().for_each(|pairs| tree.join_level(pairs, settings.min_points));
+        tree.finish();
+        let z_m = |node| {
+            let [x, y] = tree.extent(node).middle();
             ground.z_m(x, y)
         };
-        self.ground_z_m.extend((0..self.tree.len()).map(|node| z_m(self.tree.extent(node))));
+        ground_z_m.clear();
+        ground_z_m.extend((0..tree.len()).map(z_m));
     }
 
     /// The nodes of the best cut, of which none holds another: a node is kept if its worth is at

@@ -1,6 +1,7 @@
 //! The tree of the sets that steps of ascending width join.
 
 use crate::segmentation::Extent;
+use crate::sets::root;
 
 const NONE: u32 = u32::MAX;
 
@@ -91,22 +92,9 @@ impl Tree {
         }
     }
 
-    fn root(&mut self, mut point: u32) -> u32 {
-        loop {
-            let parent = self.parents[point as usize];
-            if parent == point {
-                return point;
-            }
-            // Halving the paths keeps them short.
-            let grandparent = self.parents[parent as usize];
-            self.parents[point as usize] = grandparent;
-            point = grandparent;
-        }
-    }
-
     /// Joins two sets. The points of each stay consecutive.
     fn join(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.root(a), self.root(b));
+        let [a, b] = [a, b].map(|point| root(&mut self.parents, point));
         if a == b {
             return;
         }
@@ -131,7 +119,6 @@ impl Tree {
 
     /// Ends the tree: lists the points of its nodes.
     pub fn finish(&mut self) {
-        self.members.clear();
         let Self { sets, next, nodes, members, parents, .. } = self;
         // `last` becomes the place of a point among the members: no set grows any more.
         for root in 0..parents.len() {

@@ -136,6 +136,14 @@ pub fn run(args: &FramesArgs) -> Result<()> {
     publish(&tables, args.report.as_deref())
 }
 
+/// The names among `sources`, sorted.
+fn distinct(sources: &[&'static str]) -> Vec<&'static str> {
+    let mut names = sources.to_vec();
+    names.sort_unstable();
+    names.dedup();
+    names
+}
+
 /// A row of the curve: what is found, and the false alarms a frame of each source.
 fn point_of_curve(
     confidence: f64,
@@ -144,9 +152,7 @@ fn point_of_curve(
     sources: &[&'static str],
 ) -> Vec<String> {
     let named = asked.iter().filter(|one| one.outcome == NAMED).count();
-    let mut names = sources.to_vec();
-    names.sort_unstable();
-    names.dedup();
+    let names = distinct(sources);
     let a_frame = |is_wanted: &dyn Fn(&str) -> bool| {
         let of = |name: &&str| {
             let of = alarms.iter().filter(|alarm| alarm.source == *name);
@@ -300,9 +306,7 @@ fn summary(asked: &[Asked], alarms: &[FalseAlarm], sources: &[&'static str]) -> 
         "Cars and persons of 30 points or more within 40 m",
         &["what", "found and named", "share", "95 % interval, %"],
     );
-    let mut names = sources.to_vec();
-    names.sort_unstable();
-    names.dedup();
+    let names = distinct(sources);
     let mut push = |name: String, of: &dyn Fn(&&Asked) -> bool| {
         let of: Vec<_> = asked.iter().filter(of).collect();
         let named = of.iter().filter(|one| one.outcome == NAMED).count();
