@@ -72,7 +72,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     recipe.use_sensors(std::slice::from_ref(&args.sensor));
     let stage = Stage::new(recipe, &args.recipe, args.meshes.as_deref(), args.seed)?;
     stage.warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
-    let what = || format!("{} in the recipe {}", args.sensor, args.recipe.display());
+    let what = || format!("{} with the recipe {}", args.sensor, args.recipe.display());
     let mut drive = Drive::new(&stage, args.speed).with_context(what)?;
     let started = Instant::now();
     let n_points = write(&mut drive, args.seconds, &args.out)?;

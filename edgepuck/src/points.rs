@@ -63,8 +63,9 @@ impl PointsArgs {
         }
         let cloud = read_cloud_as(file, self.format)?;
         let Scan { origin, positions, .. } = Scan::of_points(&cloud);
-        // A cloud that is not a scan has no attributes.
-        let scan = read_scan(file).ok().filter(|scan| scan.len() == cloud.len());
+        // A cloud that is not a scan has no attributes, and a pipe can be read once.
+        let again = || file.is_file().then(|| read_scan(file).ok()).flatten();
+        let scan = again().filter(|scan| scan.len() == cloud.len());
         Ok(match scan {
             Some(scan) if origin == [0.0; 3] || scan.origin != [0.0; 3] => scan,
             Some(scan) => Scan { origin, positions, ..scan },

@@ -56,8 +56,8 @@ impl Overwrite {
         let folders: Vec<&Path> = folders.into_iter().collect();
         for folder in &folders {
             if let Some(other) = other_file(folder, &is_ours)? {
-                let cause = "another file than this command writes is in a folder to replace: \
-                             move it, or choose another --out";
+                let cause = "expected only files that this command wrote in a folder to replace: \
+                             move this one, or choose another --out";
                 return Err(refused(&other, cause).into());
             }
         }
@@ -73,7 +73,7 @@ fn refused(path: &Path, cause: &str) -> Usage {
     Usage(format!("{}: {cause}", path.display()))
 }
 
-/// A file in `folder` or below, if it is one, that is not `is_ours`.
+/// A file in `folder` or below that is not `is_ours`.
 fn other_file(folder: &Path, is_ours: &impl Fn(&Path) -> bool) -> std::io::Result<Option<PathBuf>> {
     if !folder.is_dir() {
         return Ok(None);

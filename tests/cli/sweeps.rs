@@ -50,7 +50,7 @@ fn a_sweep_is_cut_and_its_clusters_are_named() {
     std::fs::write(folder.at("scenes/sweeps/mine.bin"), "mine").unwrap();
     for flag in ["", "--overwrite"] {
         let words = format!("gen-scenes --adapter cpu --sweeps 1 --out scenes {flag}");
-        folder.refuses(2, &[(&words, "mine.bin: another file than this command writes")]);
+        folder.refuses(2, &[(&words, "mine.bin: expected only files that this command wrote")]);
     }
     assert!(folder.at("scenes/packed/train.npz").exists());
     let sweep = "scenes/sweeps/000000.npz";

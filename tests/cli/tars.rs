@@ -95,7 +95,7 @@ fn what_is_missing_is_made_again_and_what_is_torn_is_found() {
     folder.write("out/part-0000-of-0001.json", "{");
     assert!(folder.exits(1, "gen-dataset --verify out").contains("part-0000-of-0001.json"));
     folder.succeeds("gen-dataset meshes --out ordinary --adapter cpu");
-    folder.refuses(1, &[(&format!("{WORDS} --out ordinary"), "a dataset of another layout")]);
+    folder.refuses(1, &[(&format!("{WORDS} --out ordinary"), "part of a dataset without tars")]);
 }
 
 #[test]

@@ -43,7 +43,7 @@ impl ClusterVariation {
             (
                 self.density.is_none_or(ordered),
                 "clusters.density",
-                "expected 1 or more points, ascending",
+                "expected two numbers, 1 or more, ascending",
             ),
             non_negative("clusters.cut", self.cut),
             share("clusters.stray_share", self.stray_share),

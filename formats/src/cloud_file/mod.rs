@@ -64,10 +64,13 @@ pub fn read_cloud(path: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
 }
 
 /// Whether the NPZ or PLY file at `path` holds a sensor's measurements beside the positions: ranges,
-/// or the numbers of beams or rings.
+/// or the numbers of beams or rings. A pipe, which can be read once, is none.
 #[must_use]
 pub fn is_scan(path: &Path) -> bool {
     const KEYS: [&str; 3] = ["range", "beam", "ring"];
+    if !path.is_file() {
+        return false;
+    }
     match CloudFormat::of_path(path) {
         #[cfg(feature = "npz")]
         Ok(CloudFormat::Npz) => crate::archive::NpzReader::open(path)
@@ -124,7 +127,7 @@ fn read_file(path: &Path, format: Option<CloudFormat>) -> Result<Vec<[f64; 3]>, 
 }
 
 /// Reads the intensities of the points at `path`, unscaled, or returns `None` if its format is not
-/// KITTI's or nuScenes' or has no intensities.
+/// KITTI's or nuScenes' or has no intensities. A pipe, which can be read once, has none.
 ///
 /// # Errors
 /// As [`read_cloud`].
@@ -132,6 +135,9 @@ pub fn read_intensities(
     path: &Path,
     format: Option<CloudFormat>,
 ) -> Result<Option<Vec<f32>>, FormatError> {
+    if path.exists() && !path.is_file() {
+        return Ok(None);
+    }
     let (file, format) = open(path, format)?;
     match format {
         CloudFormat::Kitti | CloudFormat::Nuscenes => {
@@ -142,7 +148,8 @@ pub fn read_intensities(
 }
 
 /// Reads the sensor's pose in a file, a matrix of 4 by 4 row by row: `pose` of an NPZ or PLY file, or
-/// the VIEWPOINT of a PCD file; `None` in other formats, and if it is the identity.
+/// the VIEWPOINT of a PCD file, unless it is the identity; `None` in other formats, and of a pipe,
+/// which can be read once.
 ///
 /// # Errors
 /// As [`read_cloud`].
@@ -150,6 +157,9 @@ pub fn read_viewpoint(
     path: &Path,
     format: Option<CloudFormat>,
 ) -> Result<Option<[f64; 16]>, FormatError> {
+    if path.exists() && !path.is_file() {
+        return Ok(None);
+    }
     match open(path, format)? {
         #[cfg(feature = "pcd")]
         (file, CloudFormat::Pcd) => pcd::read_pose(&mut BufReader::new(file), path),

@@ -27,6 +27,8 @@ const FEWEST_OF_RINGS: usize = 4_000;
 const FEWEST_RINGS: usize = 8;
 /// The fewest sectors of 10 degrees that a sweep covers.
 const FEWEST_SECTORS: u32 = 9;
+/// How many times as far the farthest point of a ring is as its nearest one, at least.
+const LEAST_SPREAD: f64 = 1.1;
 /// Rings are 0.2 degrees or more apart, and wider by the noise of sensors than a bin.
 const BINS_A_DEGREE: usize = 20;
 
@@ -53,7 +55,7 @@ pub fn judge_sweep(
     remedy: &str,
 ) -> Result<Option<String>, (String, String)> {
     let (mut nearest, mut farthest) = (f64::INFINITY, 0.0);
-    let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     for (i, point) in points.into_iter().enumerate() {
         let finite = point.iter().filter(|x| x.is_finite()).count();
         if !matches!(finite, 0 | 3) || point.iter().any(|x| x.is_finite() && x.abs() > FARTHEST_M) {
@@ -64,7 +66,7 @@ pub fn judge_sweep(
         if range > 0.0 {
             (nearest, farthest) = (range.min(nearest), range.max(farthest));
             (low, high) =
-                ([0, 1].map(|i| low[i].min(point[i])), [0, 1].map(|i| high[i].max(point[i])));
+                ([0, 1, 2].map(|i| low[i].min(point[i])), [0, 1, 2].map(|i| high[i].max(point[i])));
         }
     }
     if farthest == 0.0 {
@@ -75,10 +77,33 @@ pub fn judge_sweep(
         ("farthest", farthest, "0.5 m to 2 km; are the points in metres?")
     } else if nearest > NEAREST_M && (0..2).any(|i| low[i] > 0.0 || high[i] < 0.0) {
         ("nearest", nearest, "at most 50 m; is the origin the position of the sensor?")
+    } else if let Some(unit) = unit_of_angles(low, high) {
+        return Ok(Some(format!(
+            "the columns are within the bounds of a range, an azimuth and an elevation in {unit}: \
+             expected x, y and z in metres"
+        )));
     } else {
         return Ok(None);
     };
     Ok(Some(format!("the {what} point is {found:.3} m from the sensor: expected {expected}")))
+}
+
+/// The unit of angles, if the columns between `low` and `high` are probably a range and two angles: none
+/// is beyond its bounds, and one fills a turn.
+fn unit_of_angles(low: [f64; 3], high: [f64; 3]) -> Option<&'static str> {
+    let are_angles = |turn: f64, [range, azimuth, elevation]: [usize; 3]| {
+        let extent = high[azimuth] - low[azimuth];
+        low[range] >= 0.0
+            && (0.9 * turn..=turn).contains(&extent)
+            && (low[azimuth] >= 0.0 || low[azimuth] >= -turn / 2.0 && high[azimuth] <= turn / 2.0)
+            && low[elevation] >= -turn / 4.0
+            && high[elevation] <= turn / 4.0
+    };
+    let orders = [[0, 1, 2], [0, 2, 1], [2, 0, 1], [2, 1, 0]];
+    let units = [("radians", std::f64::consts::TAU), ("degrees", 360.0)];
+    let found =
+        units.into_iter().find(|(_, turn)| orders.iter().any(|order| are_angles(*turn, *order)));
+    found.map(|(unit, _)| unit)
 }
 
 /// Why the coordinates of `points`, metres, have probably lost digits: all are numbers of 32 bits,
@@ -168,21 +193,27 @@ fn are_on_a_line(mut points: impl Iterator<Item = [f64; 3]> + Clone) -> bool {
 }
 
 /// Whether most points lie in rings about the origin, as the beams of a turning sensor do: their
-/// elevations crowd in narrow peaks, and they are on several sides. The surfaces of objects have
-/// elevations of all values.
+/// elevations crowd in narrow peaks, in each of which ranges differ, and they are on several sides.
+/// The surfaces of objects have elevations of all values; the vertices of one that was turned on a
+/// lathe are in rings, each of which has one range.
 fn are_in_rings(points: impl Iterator<Item = [f64; 3]>) -> bool {
-    let (mut counts, mut sectors, mut n) = (vec![0u32; 180 * BINS_A_DEGREE], 0u64, 0u32);
+    let n_bins = 180 * BINS_A_DEGREE;
+    let (mut counts, mut sectors, mut n) = (vec![0u32; n_bins], 0u64, 0u32);
+    let mut ranges = vec![[f64::INFINITY, 0.0]; n_bins];
     for [x, y, z] in points.filter(|point| length(*point) > 0.0) {
         let elevation_deg = z.atan2(x.hypot(y)).to_degrees() + 90.0;
-        let bin = (elevation_deg * BINS_A_DEGREE as f64) as usize;
-        counts[bin.min(180 * BINS_A_DEGREE - 1)] += 1;
-        sectors |= 1 << ((y.atan2(x).to_degrees() + 180.0) / 10.0) as u32;
+        let bin = ((elevation_deg * BINS_A_DEGREE as f64) as usize).min(n_bins - 1);
+        let (range, [nearest, farthest]) = (length([x, y, z]), ranges[bin]);
+        ranges[bin] = [range.min(nearest), range.max(farthest)];
+        counts[bin] += 1;
+        sectors |= 1 << (((y.atan2(x).to_degrees() + 180.0) / 10.0) as u32 % 36);
         n += 1;
     }
     let is_peak = |bin: &usize| {
         let around = &counts[bin.saturating_sub(10)..(bin + 11).min(counts.len())];
         let mean = around.iter().sum::<u32>() / around.len() as u32;
-        counts[*bin] >= 8 && counts[*bin] > 3 * mean
+        let [nearest, farthest] = ranges[*bin];
+        counts[*bin] >= 8 && counts[*bin] > 3 * mean && farthest > LEAST_SPREAD * nearest
     };
     let peaks: Vec<usize> = (0..counts.len()).filter(is_peak).collect();
     let in_peaks: u32 = peaks.iter().map(|bin| counts[*bin]).sum();
@@ -208,6 +239,12 @@ mod tests {
             let lost = if farthest > 0.0 { [0.0, farthest, 0.0] } else { [f64::NAN; 3] };
             let found = format!("{:?}", judge_sweep([[0.0; 3], middle, lost], "scale them"));
             assert!(found.contains(expected), "{found}");
+        }
+        for (turn, unit) in [(360.0, "degrees"), (std::f64::consts::TAU, "radians")] {
+            let spun = (0..100).map(|n| turn * f64::from(n) / 100.0);
+            let spun: Vec<_> = spun.map(|azimuth| [4.0 + azimuth, azimuth, -turn / 24.0]).collect();
+            let told = judge_sweep(spun, "").unwrap().unwrap();
+            assert!(told.contains(&format!("elevation in {unit}: expected x, y")), "{told}");
         }
         let below_a_drone = [[-60.0, -40.0, -79.0], [55.0, 62.0, -80.0], [1.0, 2.0, -79.5]];
         assert_eq!(judge_sweep(below_a_drone, ""), Ok(None));
@@ -247,6 +284,13 @@ mod tests {
             [[x, 2.0, z], [x, -2.0, z], [3.0, y, z], [-3.0, y, z]]
         });
         assert_eq!(judge_object(&walls.collect::<Vec<_>>(), [0.0; 3]), Ok(None));
+        let sphere = (1..64).flat_map(|ring| (0..64).map(move |turn| (ring, turn)));
+        let sphere = sphere.map(|(ring, turn)| {
+            let (sin, cos) = (f64::from(ring) * std::f64::consts::PI / 64.0).sin_cos();
+            let azimuth = f64::from(turn) * std::f64::consts::TAU / 64.0;
+            [sin * azimuth.cos(), sin * azimuth.sin(), cos]
+        });
+        assert_eq!(judge_object(&sphere.collect::<Vec<_>>(), [0.0; 3]), Ok(None));
     }
 
     #[test]

@@ -37,6 +37,7 @@ pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3
     // The number of points that the counts so far promise.
     let mut promised = None;
     let mut comment = String::new();
+    let mut are_decimal_commas = true;
     while let Some(line) = lines.next()? {
         let content = without_comment(&line.text);
         if content.is_empty() {
@@ -56,6 +57,7 @@ pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3
         if is_complete {
             return Err(line.error(format!("expected {found} points by the count, found more")));
         }
+        are_decimal_commas = are_decimal_commas && has_decimal_commas(content);
         match &layout {
             Some(layout) => points.push(layout.point(&line, content)?),
             None => {
@@ -77,18 +79,37 @@ pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3
                          it out, or name the columns in a first line, such as `n,x,y,z`";
             Err(FormatError::malformed(name, "columns", cause))
         }
+        _ if are_decimal_commas && points.len() >= FEWEST => {
+            let cause = "expected x, y and z, found pairs of whole numbers, probably with decimal \
+                         commas: write decimal points, or semicolons between the columns";
+            Err(FormatError::malformed(name, "columns", cause))
+        }
         _ => Ok(points),
     }
 }
 
-/// Whether the x of `points` counts them, from 0 or 1, while y or z are not whole numbers. Fewer
-/// points could be so by chance.
+/// Fewer points could have the looks of other columns by chance.
+const FEWEST: usize = 8;
+
+/// Whether the x of `points` counts them, from 0 or 1, while y or z are not whole numbers.
 fn has_line_numbers(points: &[[f64; 3]]) -> bool {
-    const FEWEST: usize = 8;
     let counts_from = |first: usize| (first..).zip(points).all(|(n, [x, ..])| *x == n as f64);
     points.len() >= FEWEST
         && (counts_from(0) || counts_from(1))
         && points.iter().any(|[_, y, z]| y.fract() != 0.0 || z.fract() != 0.0)
+}
+
+/// Whether `content` is six whole numbers between commas, of which the second of each pair have no
+/// sign and equally many digits, as `1,250,-3,500,2,750`: 1.25, -3.5 and 2.75.
+fn has_decimal_commas(content: &str) -> bool {
+    let fields: Vec<&str> = content.split(',').map(str::trim).collect();
+    let are_digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    let is_pair = |pair: &[&str]| {
+        are_digits(pair[0].trim_start_matches('-'))
+            && are_digits(pair[1])
+            && pair[1].len() == fields[1].len()
+    };
+    fields.len() == 6 && fields[1].len() > 1 && fields.chunks(2).all(is_pair)
 }
 
 fn without_comment(line: &str) -> &str {

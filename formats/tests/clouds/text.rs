@@ -65,6 +65,19 @@ fn numbers_of_lines_are_no_coordinates() {
 }
 
 #[test]
+fn decimal_commas_between_commas_are_told() {
+    let rows = |row: &str| row.repeat(9);
+    let cause = "columns: expected x, y and z, found pairs of whole numbers, probably with decimal \
+                 commas: write decimal points, or semicolons between the columns";
+    assert_eq!(error("a.csv", rows("1,250,-3,500,2,750\n")), cause);
+    // Colours, or a point alone.
+    for text in [rows("1,250,-3,50,2,7\n"), rows("1,250,-3,-50,2,70\n"), "1,25,3,50,2,75\n".into()]
+    {
+        assert!(!read("a.csv", text).is_empty());
+    }
+}
+
+#[test]
 fn comments_are_passed_over() {
     let text = "# x y z\n//X Y Z\n\n1 -2.5 3e-7 # the first\n   # another\n4 5 6\n";
     assert_eq!(read("a.xyz", text), POINTS);

@@ -23,14 +23,14 @@ const FEWEST_SECTORS: u32 = 7;
 /// sensor across another axis, below which more ground is found.
 #[must_use]
 pub fn doubtful_axes(points: &[[f32; 3]]) -> Option<String> {
+    let squared = |point: &[f32; 3]| -> f64 { point.iter().map(|x| f64::from(*x).powi(2)).sum() };
+    let is_return = |point: &&[f32; 3]| squared(point) > 0.0 && squared(point).is_finite();
+    let points: Vec<[f32; 3]> = points.iter().filter(is_return).copied().collect();
     let (mut squares, mut below) = ([0.0; 3], [0i64; 3]);
-    for point in points.iter().map(|point| point.map(f64::from)) {
-        let square: f64 = point.iter().map(|x| x * x).sum();
-        if square > 0.0 && square.is_finite() {
-            for axis in 0..3 {
-                squares[axis] += point[axis] * point[axis] / square;
-                below[axis] += if point[axis] > 0.0 { -1 } else { 1 };
-            }
+    for point in &points {
+        for axis in 0..3 {
+            squares[axis] += f64::from(point[axis]).powi(2) / squared(point);
+            below[axis] += if point[axis] > 0.0 { -1 } else { 1 };
         }
     }
     let up = (0..3).rev().min_by(|&a, &b| squares[a].total_cmp(&squares[b]))?;
@@ -49,7 +49,7 @@ pub fn doubtful_axes(points: &[[f32; 3]]) -> Option<String> {
     if sectors.count_ones() < FEWEST_SECTORS {
         return None;
     }
-    let [found, other] = [ground(points), ground(&turned)];
+    let [found, other] = [ground(&points), ground(&turned)];
     let is_across = squares[2] > CLEARLY[0] * squares[up];
     let is_doubtful = found < other * if is_across { 1.0 } else { CLEARLY[1] };
     (other >= LEAST_GROUND && is_doubtful).then(|| {
@@ -64,7 +64,7 @@ pub fn doubtful_axes(points: &[[f32; 3]]) -> Option<String> {
     })
 }
 
-/// The share of ground among `points`, 0 to 1.
+/// The share of ground among `points`, which are returns, 0 to 1.
 fn ground(points: &[[f32; 3]]) -> f64 {
     let mut segmenter =
         Segmenter::new(Settings::default()).expect("invariant: the defaults are valid");

@@ -195,7 +195,10 @@ impl Session<'_> {
     ) -> anyhow::Result<()> {
         let judged = read.map_err(anyhow::Error::from).and_then(|points| {
             let named = || name.display().to_string();
-            let pose = read_viewpoint(name, self.args.format).ok().flatten();
+            let pose = match input::is_standard_input(name) {
+                true => None,
+                false => read_viewpoint(name, self.args.format)?,
+            };
             let sensor_m = Scan { pose, ..Scan::default() }.sensor_position_m();
             let unlike = judge_object(&points, sensor_m).map_err(anyhow::Error::msg);
             let unlike = unlike.with_context(named)?;

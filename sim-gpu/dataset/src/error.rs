@@ -29,7 +29,7 @@ pub enum DatasetError {
         /// The file or the folder.
         path: PathBuf,
         /// What it is.
-        what: &'static str,
+        what: String,
     },
     /// The dataset is not finished.
     #[error("{}: is not finished; continue it with --resume", path.display())]

@@ -89,14 +89,21 @@ fn refuse_occupied(out: &Path, terms: &Terms) -> Result<(), DatasetError> {
     if Journal::at(out).exists() {
         return occupied("an unfinished dataset");
     }
-    if Manifest::read(&layout::manifest(out)).is_ok() {
-        return occupied("a dataset");
+    let manifest = layout::manifest(out);
+    match Manifest::read(&manifest) {
+        Ok(_) => return occupied("a dataset"),
+        Err(DatasetError::NoManifest { .. }) => {}
+        Err(DatasetError::Malformed { path, cause }) => {
+            let what = format!("no manifest of a dataset ({cause})");
+            return Err(DatasetError::InTheWay { path, what });
+        }
+        Err(cause) => return Err(cause),
     }
     let names = layout::top_level(&terms.config);
     match names.iter().map(|name| out.join(name)).find(|path| path.exists()) {
         Some(path) => {
             let what = if path.is_dir() { "another folder" } else { "another file" };
-            Err(DatasetError::InTheWay { path, what })
+            Err(DatasetError::InTheWay { path, what: what.to_owned() })
         }
         None => Ok(()),
     }

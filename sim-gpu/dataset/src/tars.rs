@@ -155,7 +155,10 @@ fn begin(plan: &Plan, part: (u32, u32)) -> Result<(), DatasetError> {
     let occupied = |what| DatasetError::Occupied { path: plan.out.to_owned(), what };
     let others = [layout::manifest(plan.out), layout::journal(plan.out)];
     if let Some(path) = others.into_iter().find(|path| path.exists()) {
-        return Err(DatasetError::InTheWay { path, what: "a dataset of another layout" });
+        return Err(DatasetError::InTheWay {
+            path,
+            what: "part of a dataset without tars".to_owned(),
+        });
     }
     if plan.begin == Begin::Overwrite {
         retract(plan.out)?;

@@ -5,7 +5,8 @@ use crate::lime::{Explanation, Lime, explain};
 use crate::random_baseline::RandomBaseline;
 use anyhow::{Context, Error};
 use formats::atomic;
-use formats::cloud_file::{Unlike, judge_object};
+use formats::Scan;
+use formats::cloud_file::{Unlike, judge_object, read_viewpoint};
 use formats::outcome::say;
 use formats::outputs::Overwrite;
 use infer_cpu::sampler::{Resize, SamplerKind, SamplerSpec};
@@ -51,7 +52,9 @@ pub fn run(args: &ExplainArgs) -> anyhow::Result<()> {
     args.overwrite.check(args.svg.iter().map(PathBuf::as_path))?;
     let cloud = read_finite(&args.cloud)?;
     let file = || args.cloud.display().to_string();
-    let unlike = judge_object(&cloud, [0.0; 3]).map_err(Error::msg).with_context(file)?;
+    let pose = read_viewpoint(&args.cloud, None)?;
+    let sensor_m = Scan { pose, ..Scan::default() }.sensor_position_m();
+    let unlike = judge_object(&cloud, sensor_m).map_err(Error::msg).with_context(file)?;
     if unlike == Some(Unlike::Sweep) {
         say(format!("warning: {} {}", file(), Unlike::Sweep));
     }

@@ -88,7 +88,8 @@ struct Search<'a, I> {
 
 impl<I: Cells> Search<'_, I> {
     /// The nearest return on the row, or `up` above it, in the columns on one side: `aside` is 1 or
-    /// -1. Rows and columns are left out from where their angle alone is farther away.
+    /// -1. Rows and columns are left out from where their angle alone is farther away; a row's is
+    /// the mean of its returns, of which single ones may be nearer.
     fn nearest(&self, aside: isize, up: bool) -> Nearest {
         let elevations = self.image.elevations();
         let rows = if up { self.row + 1..elevations.len() } else { self.row..self.row + 1 };

@@ -103,7 +103,12 @@ impl Code {
             let mut queue = VecDeque::from([root]);
             while let Some((path, file, name)) = queue.pop_front() {
                 let Some((file, kind)) = self.find(&file, &name) else { continue };
-                if !seen.insert((file.clone(), kind.name())) {
+                // A choice of words has a section only where its own path is asked for.
+                let is_written = match kind {
+                    Kind::Enum(of) => !path.starts_with('[') || serde(&of.attrs, "tag").is_some(),
+                    Kind::Struct(_) => true,
+                };
+                if is_written && !seen.insert((file.clone(), kind.name())) {
                     continue;
                 }
                 // A type that serde makes of another one is written as the other one.

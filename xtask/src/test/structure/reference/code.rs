@@ -119,7 +119,13 @@ impl Checks<'_> {
 fn expectation(of: &Lit) -> Option<String> {
     let Lit::Str(text) = of else { return None };
     let mut text = text.value();
-    for words in ["expected ", "a finite number of ", "a finite number ", "two finite factors "] {
+    for words in [
+        "expected ",
+        "a finite number of ",
+        "a finite number ",
+        "two finite factors ",
+        "two numbers, ",
+    ] {
         text = text.strip_prefix(words).map(str::to_owned).unwrap_or(text);
     }
     let reason = text.find(", because").or(text.find(", for "));
