@@ -308,7 +308,8 @@ fn the_oldest_metadata_are_completed_as_by_ouster_sdk() {
     let metadata = Metadata::read(&path).unwrap();
     assert_eq!((metadata.columns_per_frame(), metadata.columns_per_packet()), (1024, 16));
     // Firmware 1.13: 16 columns of 64 pixels of 12 bytes, with 20 bytes around each column.
-    assert_eq!(Decoder::new(&metadata).packet_size(), 12_608);
+    let decoder = Decoder::new(&metadata);
+    assert_eq!((decoder.packet_size(), decoder.columns()), (12_608, 16));
 }
 
 #[test]

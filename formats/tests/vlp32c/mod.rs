@@ -89,7 +89,8 @@ fn both_returns_of_a_beam_are_the_same_in_blocks_of_one_azimuth() {
 #[test]
 fn of_two_returns_the_farther_is_in_the_even_blocks() {
     let scan = scan(&[(33, 5.0), (33, 7.0), (34, 6.0)]);
-    let (packets, _) = written(&REVOLUTION, Returns::Dual, &scan);
+    let (packets, count) = written(&REVOLUTION, Returns::Dual, &scan);
+    assert_eq!(count, 2, "two returns of a beam count once");
     let [last, other] = [2, 3].map(|block: usize| &packets[0].blocks[block].measured);
     assert_eq!([last[1].0, last[2].0, last[3].0], [1750, 1500, 0]);
     assert_eq!([other[1].0, other[2].0, other[3].0], [1250, 1500, 0]);

@@ -101,6 +101,14 @@ pub struct Dropped {
     pub overflow: u64,
 }
 
+impl Dropped {
+    /// The number of all.
+    #[must_use]
+    pub fn total(&self) -> u64 {
+        self.late + self.overflow
+    }
+}
+
 /// All returns of a turn, sorted by column and row.
 struct Turn {
     returns: Vec<Return>,

@@ -294,8 +294,7 @@ impl Pipeline {
         }
         let n_turns = sensor.stream.n_turns();
         sensor.push(facts, returns, packet, waiting, motion);
-        let dropped = sensor.stream.dropped();
-        counts.dropped_points = dropped.late + dropped.overflow;
+        counts.dropped_points = sensor.stream.dropped().total();
         if sensor.stream.n_turns() > n_turns {
             self.stats.end_turn();
         }

@@ -179,6 +179,26 @@ fn the_height_of_the_ground_is_known_between_the_beams() {
     });
 }
 
+/// In a hollow, z = c r^2 - HEIGHT: no plane has these heights, so that they are those between the
+/// means of cells, the largest of which are 3 m long. Between such means, a line is c (3 m / 2)^2, some
+/// 1 cm, above the hollow.
+#[test]
+fn the_height_of_a_hollow_is_known_between_the_beams() {
+    let c = 0.004;
+    let hollow: Surface = Box::new(move |[x, y, z]| {
+        let across = c * (x * x + y * y);
+        Some((z + (z * z + 4.0 * across * HEIGHT).sqrt()) / (2.0 * across))
+    });
+    scan(&VLP32C[..20], &[hollow]).check(|segmentation| {
+        for i in 0..300 {
+            let (range_m, azimuth) = (5.0 + 0.05 * f64::from(i), f64::from(i) * 0.7);
+            let [x, y] = [range_m * azimuth.cos(), range_m * azimuth.sin()];
+            let z_m = f64::from(segmentation.ground_z_m(x as f32, y as f32).unwrap());
+            assert!((z_m + HEIGHT - c * range_m * range_m).abs() < 0.03, "{range_m}: {z_m}");
+        }
+    });
+}
+
 /// A road beside a house, a wall alone, and a ceiling above a floor, in right and wrong axes.
 #[test]
 fn axes_are_doubted_if_another_one_points_up() {
@@ -216,4 +236,8 @@ fn axes_are_doubted_if_another_one_points_up() {
     let walls = [[3.0, 0.0], [-3.0, 0.0], [0.0, 3.0], [0.0, -3.0]].map(|[x, y]| wall(x, y));
     let room: Vec<_> = [flat(), ceiling()].into_iter().chain(walls).collect();
     assert_eq!(doubtful_axes(&scan(&upwards, &room).points), None);
+    // One that looks everywhere, in a corridor whose walls are nearer than its floor.
+    let everywhere: Vec<f64> = (-20..=20).map(|step| f64::from(step) * 4.0).collect();
+    let corridor = [wall(0.0, 1.0), wall(0.0, -1.0), flat(), ceiling()];
+    assert_eq!(doubtful_axes(&scan(&everywhere, &corridor).points), None);
 }

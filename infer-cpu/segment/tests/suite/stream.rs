@@ -237,11 +237,15 @@ fn unusual_returns_are_passed_over() {
     assert_eq!(stream.dropped().late, 1);
     stream.advance(f32::NAN, |_| ());
     stream.advance(1.0, |_| ());
-    for position in [[f32::NAN, 0.0, 0.0], [f32::INFINITY; 3], [0.0; 3], [1e30, 0.0, 0.0]] {
+    let far = settings(VLP32C.into_iter()).max_range_m;
+    for position in
+        [[f32::NAN, 0.0, 0.0], [f32::INFINITY; 3], [0.0; 3], [1e30, 0.0, 0.0], [0.1, 0.1, -far]]
+    {
         stream.push(position, 0, ());
     }
     stream.push([5.0, -5.0, 0.0], 99, ());
     stream.end(|_| unreachable!("there was no point"));
+    assert_eq!(Dropped { late: 2, overflow: 3 }.total(), 5);
 }
 
 #[test]
