@@ -44,6 +44,26 @@ fn a_profile_is_checked_and_what_looks_odd_of_it_is_said() {
     ] {
         assert!(said.contains(part), "{part}: {said}");
     }
+    // Millimetres, revolutions a second, nanoseconds and milliradians.
+    folder.write(
+        "units.toml",
+        "name = \"units\"\nrange = { min_m = 500, max_m = 50000, quantum_m = 4 }\n\
+         noise = { typical_sigma_m = 30 }\nfootprint = { divergence_deg = [3, 1.5], separation_m = 1 }\n\
+         [rotating]\nrpm = 10\nsequence_us = 1000000\nbeam = [\n\
+         { azimuth_offset_deg = 0, elevation_deg = 10, firing_us = 0 }]\n",
+    );
+    let said = folder.succeeds("profile units.toml");
+    for part in [
+        "range.min_m = 500: is it in metres?",
+        "range.quantum_m = 4: is it in metres?",
+        "noise.typical_sigma_m = 30: is it in metres?",
+        "footprint.divergence_deg = 3: is it in degrees?",
+        "rotating.rpm = 10: is it in revolutions a minute?",
+        "rotating.sequence_us = 1000000: is it in microseconds?",
+        "a scan has only 6 rays",
+    ] {
+        assert!(said.contains(part), "{part}: {said}");
+    }
     folder.write(
         "wrong.toml",
         folder.text("odd.toml").replace("sequence_us = 50", "sequence_us = 1"),

@@ -93,6 +93,9 @@ impl EgoMotion {
     #[must_use]
     pub fn doubts(&self) -> Vec<String> {
         let Self::Poses(poses) = self else { return Vec::new() };
+        if poses.len() == 1 {
+            return vec!["there is one pose: the sensor is taken to stand still there".into()];
+        }
         let steps = || poses.windows(2).map(|pair| (pair[0].0, pair[1].0 - pair[0].0, pair));
         let mut doubts = Vec::new();
         let speeds = steps().map(|(at_s, dt_s, pair)| {
@@ -183,6 +186,7 @@ mod tests {
             ("0 0 0 0 0 0 0 1\n0.1 2 0 0 0 0 0 1\n", None),
             ("0 0 0 0 0 0 0 1\n0.1 2000 0 0 0 0 0 1\n", Some("20000 m/s at 0 s")),
             ("0 0 0 0 1 0 0 0\n0.1 2 0 0 1 0 0 0\n", Some("on its head")),
+            ("0 0 0 0 0 0 0 1\n", Some("there is one pose")),
             ("0 0 0 0 0 0 0 1\n2.5 2 0 0 0 0 0 1\n", Some("no pose for 2.500 s after 0 s")),
         ] {
             let doubts = read(text).doubts();
