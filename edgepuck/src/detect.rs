@@ -1,6 +1,6 @@
 //! `edgepuck detect`: detects and classifies the objects of a sweep.
 
-mod kitti;
+pub(crate) mod kitti;
 mod rule;
 
 use std::path::{Path, PathBuf};
@@ -105,7 +105,7 @@ pub(crate) fn run(args: &DetectArgs) -> anyhow::Result<Outcome> {
     let outlines: Vec<_> = objects
         .iter()
         .map(|object| {
-            let [a, b, c, d, ..] = object.corners();
+            let [a, b, c, d, ..] = corners(&object.place);
             Outline {
                 corners: [a, b, c, d].map(|corner| corner.truncate().to_array()),
                 class: &object.class,
@@ -267,19 +267,6 @@ impl Object {
         self.known().map_or(of_number, |(.., tint)| tint)
     }
 
-    /// The corners of its box around the base and then around the top, metres.
-    fn corners(&self) -> [DVec3; 8] {
-        let OrientedBox { centre_m, size_m, yaw_rad } = self.place;
-        let turned = DQuat::from_rotation_z(yaw_rad.into());
-        let [ahead, aside, up] =
-            [0, 1, 2].map(|axis| turned * DVec3::AXES[axis] * f64::from(size_m[axis]) * 0.5);
-        let at = |level: f64, [x, y]: [f64; 2]| {
-            DVec3::from(centre_m.map(f64::from)) + x * ahead + y * aside + level * up
-        };
-        let around = [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]];
-        [0, 1, 2, 3, 4, 5, 6, 7].map(|i| at(if i < 4 { -1.0 } else { 1.0 }, around[i % 4]))
-    }
-
     fn json(&self) -> Value {
         let OrientedBox { centre_m, size_m, yaw_rad } = self.place;
         json!({
@@ -290,4 +277,17 @@ impl Object {
             "box": { "centre_m": centre_m, "size_m": size_m, "yaw_deg": yaw_rad.to_degrees() },
         })
     }
+}
+
+/// The corners of a box around the base and then around the top, metres.
+pub(crate) fn corners(place: &OrientedBox) -> [DVec3; 8] {
+    let OrientedBox { centre_m, size_m, yaw_rad } = *place;
+    let turned = DQuat::from_rotation_z(yaw_rad.into());
+    let [ahead, aside, up] =
+        [0, 1, 2].map(|axis| turned * DVec3::AXES[axis] * f64::from(size_m[axis]) * 0.5);
+    let at = |level: f64, [x, y]: [f64; 2]| {
+        DVec3::from(centre_m.map(f64::from)) + x * ahead + y * aside + level * up
+    };
+    let around = [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]];
+    [0, 1, 2, 3, 4, 5, 6, 7].map(|i| at(if i < 4 { -1.0 } else { 1.0 }, around[i % 4]))
 }

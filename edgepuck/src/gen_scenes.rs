@@ -1,5 +1,6 @@
 //! `edgepuck gen-scenes`: scans street scenes and packs their clusters as a training set.
 
+mod layout;
 mod sweep_file;
 
 use std::ffi::OsStr;
@@ -13,6 +14,7 @@ use edgepuck_scenes::{LabelledScene, Recipe, Stage, generate};
 use edgepuck_segment::Settings;
 use formats::atomic::{self, UnfinishedFolder};
 use indicatif::{ProgressBar, ProgressStyle};
+use layout::{Layout, Writer};
 use serde_json::{Value, json};
 use sweep_file::SweepFormat;
 
@@ -52,6 +54,12 @@ pub(crate) struct Args {
     #[arg(long, default_value = "npz")]
     format: SweepFormat,
 
+    /// Also write all sweeps as a data set for trainers, into a folder of this name in --out:
+    /// semantickitti, with the class and the object of each point; kitti, with the boxes before a
+    /// camera in the sensor; openpcdet (custom), with all boxes. Every tenth sweep is for validation
+    #[arg(long, value_name = "LAYOUT")]
+    layout: Option<Layout>,
+
     /// Seed of all random numbers
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -67,7 +75,9 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let cause = "--format: this build does not include las".to_owned();
     ensure!(args.format != SweepFormat::Las || cfg!(feature = "las"), Usage(cause));
     let mut recipe = read_recipe(&args.recipe)?;
-    let outputs = ["packed", "sweeps"].map(|folder| args.out.join(folder));
+    let mut outputs = ["packed", "sweeps"].map(|folder| args.out.join(folder)).to_vec();
+    let set = args.layout.map(|layout| args.out.join(layout.name()));
+    outputs.extend(set.clone());
     args.overwrite.clear(outputs.iter().map(PathBuf::as_path), is_written)?;
     recipe.use_sensors(&args.sensor);
     let meshes = args.meshes.as_deref();
@@ -82,6 +92,8 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let packed = args.out.join("packed");
     // Saved sweeps are complete, one by one; of packed clusters, only all are.
     let begun = UnfinishedFolder::begin(&packed);
+    let begun_set = set.as_deref().map(UnfinishedFolder::begin);
+    let mut set = args.layout.zip(set).map(|(layout, folder)| Writer::new(layout, folder));
     let counts = generate(&stage, &Settings::default(), args.sweeps, &packed, |done| {
         bar.inc(1);
         n_points += done.sweep.points().len();
@@ -96,8 +108,13 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
                 &args.out.join("preview.png"),
             )?;
         }
+        if let Some(set) = &mut set {
+            set.add(&stage, done, edgepuck_scenes::is_test(done.scene.number))?;
+        }
         if done.scene.number < args.save { save(&stage, done, args) } else { Ok(()) }
     })?;
+    set.map_or(Ok(()), |set| set.finish())?;
+    begun_set.into_iter().for_each(UnfinishedFolder::finish);
     begun.finish();
     bar.finish_and_clear();
     let seconds = started.elapsed().as_secs_f64();
@@ -129,7 +146,8 @@ fn is_written(file: &Path) -> bool {
     let (stem, extension) = (text(file.file_stem()), text(file.extension()));
     match &*extension {
         "npz" if ["train", "test"].contains(&&*stem) => true,
-        "npz" | "json" | "bin" | "label" | "pcd" | "las" => {
+        "txt" if ["train", "val", "calib", "poses", "times"].contains(&&*stem) => true,
+        "npz" | "npy" | "json" | "bin" | "label" | "pcd" | "las" | "txt" => {
             stem.len() == 6 && stem.parse::<u32>().is_ok()
         }
         _ => false,

@@ -6,6 +6,7 @@ use std::path::Path;
 use crate::atomic;
 use crate::error::FormatError;
 use crate::hash::{FileHash, Hashing};
+use crate::npy;
 use crate::scan::Column;
 
 /// Columns with their names, of which a vector has three.
@@ -21,7 +22,7 @@ pub const AXES: [&str; 3] = ["x", "y", "z"];
 pub fn write(
     path: &Path,
     hashing: Hashing,
-    header: &str,
+    header: impl AsRef<[u8]>,
     columns: &Columns<'_>,
 ) -> Result<Option<FileHash>, FormatError> {
     let n = n_points(columns);
@@ -30,7 +31,7 @@ pub fn write(
         return Err(FormatError::Length { attribute, expected: n, found });
     }
     atomic::write_hashed(path, hashing, |writer| {
-        writer.write_all(header.as_bytes())?;
+        writer.write_all(header.as_ref())?;
         for i in 0..n {
             for (_, column) in columns {
                 match column {
@@ -46,6 +47,12 @@ pub fn write(
         }
         Ok(())
     })
+}
+
+/// The header of NPY for rows of `width` numbers of f32.
+#[must_use]
+pub fn npy_header(n_rows: usize, width: usize) -> Vec<u8> {
+    npy::header_bytes("<f4", &[n_rows, width])
 }
 
 /// The header of PLY, with an origin other than 0 and a sensor's pose as comments.

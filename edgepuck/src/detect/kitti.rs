@@ -1,6 +1,7 @@
 //! Labels of KITTI's object benchmark, as the readme of its development kit defines them.
 
 use anyhow::Context;
+use edgepuck_segment::OrientedBox;
 use formats::FormatError;
 use formats::foreign::read_text;
 use glam::{DMat3, DMat4, DVec3};
@@ -8,7 +9,7 @@ use sim_gpu::glam;
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
-use super::Object;
+use super::{Object, STREET, corners};
 
 /// The most that products of a rotation's rows may be off: KITTI rounds to 7 digits, others to 3.
 const NOT_A_ROTATION: f64 = 0.01;
@@ -28,12 +29,14 @@ impl Camera {
     pub fn read(file: &Path) -> anyhow::Result<Self> {
         let text = read_text(file, u64::MAX).with_context(|| file.display().to_string())?;
         let flaw = |(key, cause): (&str, String)| FormatError::malformed(file, key, cause);
-        let of_lidar =
-            || Ok(rotation(&text, "R0_rect", 3)? * rotation(&text, "Tr_velo_to_cam", 4)?);
-        let rect_from_lidar = of_lidar().map_err(flaw)?;
-        let image_from_rect = matrix(&text, "P2", 4).map_err(flaw)?;
-        let camera = Self { rect_from_lidar, image_from_rect };
-        camera.check().map_err(flaw)?;
+        Ok(Self::parse(&text).map_err(flaw)?)
+    }
+
+    /// Reads the text of a calibration file.
+    pub fn parse(text: &str) -> Result<Self, Flaw> {
+        let rect_from_lidar = rotation(text, "R0_rect", 3)? * rotation(text, "Tr_velo_to_cam", 4)?;
+        let camera = Self { rect_from_lidar, image_from_rect: matrix(text, "P2", 4)? };
+        camera.check()?;
         Ok(camera)
     }
 
@@ -55,7 +58,7 @@ impl Camera {
 
     /// The left, top, right and bottom of the box with these corners in the picture, pixels; `None`
     /// if a corner is not before the camera.
-    fn bounds(&self, corners: [DVec3; 8]) -> Option<[f64; 4]> {
+    pub fn bounds(&self, corners: [DVec3; 8]) -> Option<[f64; 4]> {
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for corner in corners {
             let at = self.rect_from_lidar.transform_point3(corner);
@@ -102,12 +105,26 @@ fn rotation(text: &str, key: &'static str, columns: usize) -> Result<DMat4, Flaw
 /// The line of an object: type, truncation, occlusion, alpha, left, top, right, bottom, height,
 /// width, length, x, y, z, rotation and score, in the frame of `camera` or else the sensor's.
 pub fn label(object: &Object, camera: Option<&Camera>) -> String {
-    let kind = object.known().map_or(&*object.class, |(_, kind, _)| kind);
-    let kind = kind.replace(char::is_whitespace, "_");
-    let [length, width, height] = object.place.size_m.map(f64::from);
-    let yaw_rad = f64::from(object.place.yaw_rad);
-    let base = DVec3::from(object.place.centre_m.map(f64::from)) - 0.5 * height * DVec3::Z;
-    let (mut alpha, mut bounds, mut at, mut rotation) = (-10.0, [-1.0; 4], base, yaw_rad);
+    let bounds = camera.and_then(|camera| camera.bounds(corners(&object.place)));
+    let about = line(&object.class, [-1.0, -1.0], bounds, &object.place, camera);
+    format!("{about} {:.4}\n", object.confidence)
+}
+
+/// The same line without the score: `truncated` is 0 to 1, `occluded` 0 to 3, and `bounds` are in the
+/// picture, pixels.
+pub fn line(
+    class: &str,
+    [truncated, occluded]: [f64; 2],
+    bounds: Option<[f64; 4]>,
+    place: &OrientedBox,
+    camera: Option<&Camera>,
+) -> String {
+    let known = STREET.into_iter().find(|(known, ..)| *known == class);
+    let kind = known.map_or(class, |(_, kind, _)| kind).replace(char::is_whitespace, "_");
+    let [length, width, height] = place.size_m.map(f64::from);
+    let yaw_rad = f64::from(place.yaw_rad);
+    let base = DVec3::from(place.centre_m.map(f64::from)) - 0.5 * height * DVec3::Z;
+    let (mut alpha, mut at, mut rotation) = (-10.0, base, yaw_rad);
     if let Some(camera) = camera {
         let along = DVec3::new(yaw_rad.cos(), yaw_rad.sin(), 0.0);
         let along = camera.rect_from_lidar.transform_vector3(along);
@@ -115,21 +132,18 @@ pub fn label(object: &Object, camera: Option<&Camera>) -> String {
         // About the camera's y axis, which points downwards.
         rotation = (-along.z).atan2(along.x);
         alpha = (rotation - at.x.atan2(at.z) + PI).rem_euclid(TAU) - PI;
-        bounds = camera.bounds(object.corners()).unwrap_or(bounds);
     }
-    let [left, top, right, bottom] = bounds;
+    let [left, top, right, bottom] = bounds.unwrap_or([-1.0; 4]);
     let [x, y, z] = at.to_array();
     format!(
-        "{kind} -1 -1 {alpha:.2} {left:.2} {top:.2} {right:.2} {bottom:.2} {height:.2} {width:.2} \
-         {length:.2} {x:.2} {y:.2} {z:.2} {rotation:.2} {:.4}\n",
-        object.confidence
+        "{kind} {truncated} {occluded} {alpha:.2} {left:.2} {top:.2} {right:.2} {bottom:.2} \
+         {height:.2} {width:.2} {length:.2} {x:.2} {y:.2} {z:.2} {rotation:.2}"
     )
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use edgepuck_segment::OrientedBox;
 
     /// A camera at the LiDAR that looks along x, with a focal length of 700 pixels.
     const CALIBRATION: &str = "P2: 700 0 600 0 0 700 180 0 0 0 1 0\n\

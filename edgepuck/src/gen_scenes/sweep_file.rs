@@ -76,10 +76,7 @@ pub fn write(
     let is_narrow = format == SweepFormat::Las;
     ensure!(!is_narrow || n_classes <= 256, "las: expected at most 254 classes, found {n_classes}");
     ensure!(n_objects < 1 << 16, "{format}: expected at most 65535 objects, found {n_objects}");
-    let surfaces = surfaces(stage, &done.scene);
-    let air = n_objects + 1;
-    let of_points = done.sweep.surfaces().iter().map(|&i| surfaces[air.min(i as usize)]);
-    let of_points: Vec<Surface> = of_points.collect();
+    let of_points = of_points(stage, done);
     let column = |of: fn(&Surface) -> u32| of_points.iter().map(of).collect::<Vec<u32>>();
     let intensity = scan.intensity.as_deref().expect("invariant: sweeps have intensities");
     let mut columns = vec![
@@ -95,7 +92,7 @@ pub fn write(
         }
         SweepFormat::SemanticKitti => {
             let of_pair = |folder, end| sweeps.join(format!("{folder}/{number:06}.{end}"));
-            let labels = column(|s| u32::from(s.object) << 16 | u32::from(s.codes.0));
+            let labels = semantic_labels(stage, done)?;
             write(&of_pair("velodyne", "bin"), "", &columns)?;
             write(&of_pair("labels", "label"), "", &[(vec!["label"], Column::U32(&labels))])?;
         }
@@ -122,6 +119,24 @@ pub fn write(
         SweepFormat::Las => unreachable!("invariant: builds without LAS refuse it"),
     }
     Ok(())
+}
+
+/// SemanticKITTI's label of each point: its class, and its object in the high half.
+pub fn semantic_labels(stage: &Stage, done: &LabelledScene) -> anyhow::Result<Vec<u32>> {
+    let n_objects = done.scene.objects.len();
+    ensure!(
+        n_objects < 1 << 16,
+        "semantickitti: expected at most 65535 objects, found {n_objects}"
+    );
+    let label = |s: &Surface| u32::from(s.object) << 16 | u32::from(s.codes.0);
+    Ok(of_points(stage, done).iter().map(label).collect())
+}
+
+/// What each point lies on.
+fn of_points(stage: &Stage, done: &LabelledScene) -> Vec<Surface> {
+    let surfaces = surfaces(stage, &done.scene);
+    let air = surfaces.len() - 1;
+    done.sweep.surfaces().iter().map(|&i| surfaces[air.min(i as usize)]).collect()
 }
 
 /// The air, last, the ground, first, and the objects of `scene` between them.

@@ -67,8 +67,7 @@ pub fn generate<E: From<SceneError>>(
             .map(|number| LabelledScene::new(stage, number, settings))
             .collect::<Result<_, SceneError>>()?;
         for done in &batch {
-            let is_test = done.scene.number % TEST_EACH == TEST_EACH - 1;
-            let (writer, counts) = &mut splits[usize::from(is_test)];
+            let (writer, counts) = &mut splits[usize::from(is_test(done.scene.number))];
             pack(stage, done, writer, counts)?;
             each(done)?;
         }
@@ -77,6 +76,12 @@ pub fn generate<E: From<SceneError>>(
     train.finish().map_err(SceneError::from)?;
     test.finish().map_err(SceneError::from)?;
     Ok(ClusterCounts { train: train_counts, test: test_counts })
+}
+
+/// Whether the scene of this number is for the test set.
+#[must_use]
+pub fn is_test(number: u32) -> bool {
+    number % TEST_EACH == TEST_EACH - 1
 }
 
 impl LabelledScene {

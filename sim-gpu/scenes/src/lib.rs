@@ -11,6 +11,7 @@
 //! The same recipe, seed and number give the same scene, sweep and clusters on every machine,
 //! with any number of threads.
 
+mod boxes;
 mod clusters;
 mod drive;
 mod error;
@@ -38,10 +39,11 @@ mod tests;
 #[doc = include_str!("../README.md")]
 struct Readme;
 
+pub use boxes::ObjectBox;
 pub use clusters::{LabelledCluster, label_clusters};
 pub use drive::{Drive, Packet};
 pub use error::SceneError;
-pub use generate::{ClusterCounts, LabelledScene, generate};
+pub use generate::{ClusterCounts, LabelledScene, generate, is_test};
 pub use placed_object::PlacedObject;
 pub use recipe::{Ground, Mount, OTHER, Objects, Place, Recipe, SensorChoice, Span};
 pub use scene::DrawnScene;

@@ -73,7 +73,7 @@ impl Stage {
     }
 
     /// Scans the instances of `world`, as they are `placed`.
-    fn scan_placed(
+    pub(crate) fn scan_placed(
         &self,
         world: &Scene,
         placed: &[PlacedTarget],
@@ -90,12 +90,12 @@ impl Stage {
         Ok(Sweep::new(scan, scene))
     }
 
-    fn effects(&self, scene: &DrawnScene) -> &Effects {
+    pub(crate) fn effects(&self, scene: &DrawnScene) -> &Effects {
         self.sensors[scene.sensor].caster.effects()
     }
 
     /// The key of the random numbers of instance number `part` in scans of `scene`.
-    fn stream(&self, scene: &DrawnScene, part: u32) -> StreamKey {
+    pub(crate) fn stream(&self, scene: &DrawnScene, part: u32) -> StreamKey {
         Stream::SceneBeams { scene: scene.number, part }.key(self.seed())
     }
 

@@ -1,0 +1,201 @@
+//! Data sets of sweeps as trainers of detectors and of segmentation networks read them.
+//!
+//! Points and boxes are in the level frame of the sensor: the origin is the sensor, x is ahead and z
+//! is up. KITTI's calibrations are those of a camera in the sensor, which looks along x.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use edgepuck_scenes::{LabelledScene, ObjectBox, Stage};
+use edgepuck_segment::OrientedBox;
+use formats::hash::Hashing;
+use formats::scan::Column;
+use formats::{FormatError, atomic, rows};
+use glam::DVec3;
+use sim_gpu::glam;
+
+use super::sweep_file::semantic_labels;
+use crate::detect::corners;
+use crate::detect::kitti::{Camera, line};
+
+formats::named! {
+    /// A layout of data sets of sweeps.
+    pub enum Layout: "layout" {
+        /// That of SemanticKITTI, with the class and the object of each point.
+        SemanticKitti = "semantickitti",
+        /// That of KITTI's object benchmark, with the boxes before its camera.
+        Kitti = "kitti",
+        /// That of OpenPCDet's custom data sets, with the boxes all around.
+        OpenPcdet = "openpcdet",
+    }
+}
+
+/// The camera: a focal length and a middle of KITTI's order, and no distance to the sensor.
+const CALIBRATION: &str = "\
+P0: 720 0 621 0 0 720 187.5 0 0 0 1 0
+P1: 720 0 621 0 0 720 187.5 0 0 0 1 0
+P2: 720 0 621 0 0 720 187.5 0 0 0 1 0
+P3: 720 0 621 0 0 720 187.5 0 0 0 1 0
+R0_rect: 1 0 0 0 1 0 0 0 1
+Tr_velo_to_cam: 0 -1 0 0 0 0 -1 0 1 0 0 0
+Tr_imu_to_velo: 1 0 0 0 0 1 0 0 0 0 1 0
+";
+
+/// The size of KITTI's pictures, pixels.
+const PICTURE: [f64; 2] = [1242.0, 375.0];
+
+/// KITTI's sweeps are 0.1 s apart.
+const PERIOD_S: f64 = 0.1;
+
+/// A data set that is being written.
+pub struct Writer {
+    layout: Layout,
+    folder: PathBuf,
+    /// The names of the sweeps for training and for validation.
+    splits: [Vec<String>; 2],
+    camera: Camera,
+}
+
+impl Writer {
+    pub fn new(layout: Layout, folder: PathBuf) -> Self {
+        let camera = Camera::parse(CALIBRATION).expect("invariant: the calibration is valid");
+        Self { layout, folder, splits: Default::default(), camera }
+    }
+
+    /// Writes a sweep, for validation if it `is_test`.
+    pub fn add(
+        &mut self,
+        stage: &Stage,
+        done: &LabelledScene,
+        is_test: bool,
+    ) -> anyhow::Result<()> {
+        let split = &mut self.splits[usize::from(is_test)];
+        // Sequences have sweeps without gaps in their numbers.
+        let name = match self.layout {
+            Layout::SemanticKitti => format!("{:06}", split.len()),
+            _ => format!("{:06}", done.scene.number),
+        };
+        split.push(name.clone());
+        let level = done.scene.level_from_sensor();
+        let to_level =
+            |at: &[f32; 3]| (level * DVec3::from(at.map(f64::from))).as_vec3().to_array();
+        let positions: Vec<[f32; 3]> = done.sweep.points().iter().map(to_level).collect();
+        let intensity = done.sweep.scan.intensity.as_deref();
+        let intensity = intensity.expect("invariant: sweeps have intensities");
+        let columns = [
+            (rows::AXES.to_vec(), Column::Vector(&positions)),
+            (vec!["intensity"], Column::F32(intensity)),
+        ];
+        let write = |file: &str, header: &[u8], columns: &rows::Columns<'_>| {
+            rows::write(&self.folder.join(file), Hashing::None, header, columns)
+        };
+        match self.layout {
+            Layout::SemanticKitti => {
+                let sequence = sequence(is_test);
+                let labels = semantic_labels(stage, done)?;
+                let labels = [(vec!["label"], Column::U32(&labels))];
+                write(&format!("{sequence}/velodyne/{name}.bin"), b"", &columns)?;
+                write(&format!("{sequence}/labels/{name}.label"), b"", &labels)?;
+            }
+            Layout::Kitti => {
+                write(&format!("training/velodyne/{name}.bin"), b"", &columns)?;
+                let boxes = stage.boxes(&done.scene, &done.sweep)?;
+                let class = |of: &ObjectBox| class_of(stage, done, of);
+                let lines: String =
+                    boxes.iter().filter_map(|of| self.kitti_line(class(of), of)).collect();
+                self.text(&format!("training/label_2/{name}.txt"), &lines)?;
+                self.text(&format!("training/calib/{name}.txt"), CALIBRATION)?;
+            }
+            Layout::OpenPcdet => {
+                let header = rows::npy_header(positions.len(), 4);
+                write(&format!("points/{name}.npy"), &header, &columns)?;
+                let boxes = stage.boxes(&done.scene, &done.sweep)?;
+                let lines: String =
+                    boxes.iter().map(|of| openpcdet_line(class_of(stage, done, of), of)).collect();
+                self.text(&format!("labels/{name}.txt"), &lines)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes what is about all sweeps.
+    pub fn finish(&self) -> Result<(), FormatError> {
+        for (split, is_test) in self.splits.iter().zip([false, true]) {
+            if self.layout == Layout::SemanticKitti {
+                self.finish_sequence(split.len(), is_test)?;
+                continue;
+            }
+            let name = if is_test { "val" } else { "train" };
+            let list: String = split.iter().map(|name| format!("{name}\n")).collect();
+            self.text(&format!("ImageSets/{name}.txt"), &list)?;
+        }
+        Ok(())
+    }
+
+    /// Each sweep is a scene of its own: their poses are equal.
+    fn finish_sequence(&self, n: usize, is_test: bool) -> Result<(), FormatError> {
+        let sequence = sequence(is_test);
+        let transform = CALIBRATION.lines().find_map(|line| line.strip_prefix("Tr_velo_to_cam"));
+        let transform = transform.expect("invariant: the calibration has it");
+        let cameras: String = CALIBRATION.lines().take(4).map(|line| format!("{line}\n")).collect();
+        self.text(&format!("{sequence}/calib.txt"), &format!("{cameras}Tr{transform}\n"))?;
+        self.text(&format!("{sequence}/poses.txt"), &"1 0 0 0 0 1 0 0 0 0 1 0\n".repeat(n))?;
+        let times = (0..n).fold(String::new(), |mut text, i| {
+            writeln!(text, "{:.6e}", i as f64 * PERIOD_S).expect("invariant: a string takes all");
+            text
+        });
+        self.text(&format!("{sequence}/times.txt"), &times)
+    }
+
+    fn text(&self, file: &str, text: &str) -> Result<(), FormatError> {
+        atomic::write_bytes(&self.folder.join(file), text)
+    }
+
+    /// The line of a box, if it is before the camera and partly in its picture.
+    fn kitti_line(&self, class: &str, of: &ObjectBox) -> Option<String> {
+        let place = oriented(of);
+        let [left, top, right, bottom] = self.camera.bounds(corners(&place))?;
+        let [width, height] = PICTURE;
+        let clipped = [left.max(0.0), top.max(0.0), right.min(width), bottom.min(height)];
+        let area = |[left, top, right, bottom]: [f64; 4]| (right - left) * (bottom - top);
+        if clipped[0] >= clipped[2] || clipped[1] >= clipped[3] {
+            return None;
+        }
+        let truncated = 1.0 - area(clipped) / area([left, top, right, bottom]);
+        let truncated = (100.0 * truncated).round() / 100.0;
+        let occluded = occlusion(of.visible);
+        Some(line(class, [truncated, occluded], Some(clipped), &place, Some(&self.camera)) + "\n")
+    }
+}
+
+/// SemanticKITTI validates on sequence 08.
+fn sequence(is_test: bool) -> &'static str {
+    if is_test { "sequences/08" } else { "sequences/00" }
+}
+
+fn class_of<'a>(stage: &'a Stage, done: &LabelledScene, of: &ObjectBox) -> &'a str {
+    &stage.recipe().object[done.scene.objects[of.object].entry].class
+}
+
+/// KITTI's state of occlusion: 0 is all visible, 1 partly hidden, 2 largely hidden. KITTI's people
+/// judged pictures; here less than a tenth, and less than half of the points are hidden.
+fn occlusion(visible: f64) -> f64 {
+    [0.5, 0.9].into_iter().filter(|least| visible < *least).count() as f64
+}
+
+fn oriented(of: &ObjectBox) -> OrientedBox {
+    OrientedBox {
+        centre_m: of.centre_m.as_vec3().to_array(),
+        size_m: of.size_m.as_vec3().to_array(),
+        yaw_rad: of.yaw_rad as f32,
+    }
+}
+
+/// The middle, the size, the heading and the class of a box.
+fn openpcdet_line(class: &str, of: &ObjectBox) -> String {
+    let [x, y, z] = of.centre_m.to_array();
+    let [length, width, height] = of.size_m.to_array();
+    let class = class.replace(char::is_whitespace, "_");
+    let yaw_rad = of.yaw_rad;
+    format!("{x:.3} {y:.3} {z:.3} {length:.3} {width:.3} {height:.3} {yaw_rad:.4} {class}\n")
+}
