@@ -6,7 +6,7 @@ use std::path::Path;
 /// Flags about the meaning of a file's intensities.
 #[derive(clap::Args)]
 pub struct BrightnessArgs {
-    /// Intensity of a white surface that faces the sensor [default: 1]
+    /// Intensity of a white surface that faces the sensor [default: 1, which is 65535 in LAS]
     #[arg(long, value_name = "I", value_parser = crate::flags::positive)]
     white: Option<f64>,
 

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 
 use edgepuck_segment::doubtful_axes;
 use formats::cloud_file::{
-    CloudFormat, check_sweep, coarse_coordinates, read_cloud_as, read_intensities, read_viewpoint,
+    Cloud, CloudFormat, check_sweep, coarse_coordinates, must_be_scan, read_viewpoint,
+    read_with_intensities,
 };
 use formats::scan_file::read_scan;
 use formats::{FormatError, Scan, Senders, ouster, pcap, velodyne};
@@ -58,23 +59,42 @@ impl PointsArgs {
     /// The points in `file`, with all attributes that the program knows of its format; of a
     /// capture the first turn. Prints a warning if packets of the capture were not read.
     pub fn read(&self, file: &Path) -> Result<Scan, FormatError> {
+        // Files are read more than once.
+        let found = match file.to_str() {
+            Some("-") if !file.exists() => Some("standard input"),
+            _ if file.exists() && !file.is_file() && !file.is_dir() => Some("a pipe or device"),
+            _ => None,
+        };
+        if let Some(found) = found {
+            let cause = format!(
+                "expected a file, found {found}, which can be read only once: write it to a file first"
+            );
+            return Err(FormatError::malformed(file, "name", cause));
+        }
         if self.metadata.is_some() || (self.format.is_none() && pcap::is_capture(file)) {
             return self.read_capture(file);
         }
-        let cloud = read_cloud_as(file, self.format)?;
-        let Scan { origin, positions, .. } = Scan::of_points(&cloud);
-        // A cloud that is not a scan has no attributes, and a pipe can be read once.
-        let again = || file.is_file().then(|| read_scan(file).ok()).flatten();
-        let scan = again().filter(|scan| scan.len() == cloud.len());
-        Ok(match scan {
-            Some(scan) if origin == [0.0; 3] || scan.origin != [0.0; 3] => scan,
+        let Cloud { points, intensities } = read_with_intensities(file, self.format)?;
+        let Scan { origin, positions, .. } = Scan::of_points(&points);
+        let scan = match read_scan(file) {
+            Ok(scan) => Some(scan).filter(|scan| scan.len() == points.len()),
+            Err(error) if must_be_scan(file) => return Err(error),
+            // A cloud that is not a scan has no other attributes.
+            Err(_) => None,
+        };
+        let is_near = |scan: &Scan| origin == [0.0; 3] || scan.origin != [0.0; 3];
+        let mut scan = match scan {
+            Some(scan) if is_near(&scan) => scan,
             Some(scan) => Scan { origin, positions, ..scan },
             None => {
-                let intensity = read_intensities(file, self.format)?;
                 let pose = read_viewpoint(file, self.format)?;
-                Scan { origin, positions, intensity, pose, ..Scan::default() }
+                Scan { origin, positions, pose, ..Scan::default() }
             }
-        })
+        };
+        if scan.reflectivity.is_none() {
+            scan.intensity = scan.intensity.or(intensities);
+        }
+        Ok(scan)
     }
 
     fn read_capture(&self, file: &Path) -> Result<Scan, FormatError> {
@@ -85,6 +105,10 @@ impl PointsArgs {
         };
         if let Some(warning) = senders.warning() {
             eprintln!("warning: {}: {warning}", file.display());
+        }
+        if counts.missing > 0 {
+            let (file, n) = (file.display(), counts.missing);
+            eprintln!("warning: {file}: {n} packets of the turn are probably missing");
         }
         if counts.first_unread.is_some() {
             eprintln!("warning: {}: {} UDP packets{counts}", file.display(), counts.packets);

@@ -28,7 +28,12 @@ pub(crate) fn excerpt(text: &str) -> String {
     const LONGEST: usize = 60;
     let mut letters = text.trim().chars();
     let start = letters.by_ref().take(LONGEST);
-    let mut excerpt: String = start.map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect();
+    let mut excerpt = String::new();
+    start.for_each(|letter| match letter {
+        '\t' => excerpt.push_str("\\t"),
+        letter if letter.is_control() => excerpt.push('\u{fffd}'),
+        letter => excerpt.push(letter),
+    });
     if letters.next().is_some() {
         excerpt.push('…');
     }

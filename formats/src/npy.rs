@@ -204,6 +204,21 @@ pub(crate) fn read_elements<A: Number>(
     read_in_c_order(reader, header, size_of::<A>(), |bytes| A::from_bytes(bytes, order))
 }
 
+/// Checks that an array has the shape `[n, width]`, or `[n]` if `width` is 1.
+pub(crate) fn check_columns(header: &Header, width: usize, n: usize) -> io::Result<()> {
+    match header.shape[..] {
+        [found] if width == 1 && found == n => Ok(()),
+        [found, columns] if columns == width && found == n => Ok(()),
+        [found] if width == 1 => Err(other_length(n, found)),
+        [found, columns] if columns == width => Err(other_length(n, found)),
+        _ => Err(invalid(format!("expected shape [{n}, {width}], found {:?}", header.shape))),
+    }
+}
+
+fn other_length(expected: usize, found: usize) -> io::Error {
+    invalid(format!("expected {expected} values, one for each point, found {found}"))
+}
+
 /// Reads a whole array of numbers and returns them in C order, each converted by `convert`.
 pub(crate) fn read_numbers<T: Copy>(
     reader: &mut (impl Read + ?Sized),

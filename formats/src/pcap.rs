@@ -101,6 +101,8 @@ pub struct Counts {
     pub unread: u64,
     /// The number of the first of these, from 0, and its flaw.
     pub first_unread: Option<(usize, String)>,
+    /// UDP packets that are probably missing in a turn of a sensor, by the times of the others.
+    pub missing: u64,
 }
 
 /// What was not read, for the end of a sentence; nothing if all was.

@@ -20,6 +20,14 @@ pub(crate) fn read(
     if found < n { Err(truncated(found, n)) } else { Ok(()) }
 }
 
+/// Checks that less than a record of `size` bytes is left after the `n` that a header states.
+pub(crate) fn check_end(reader: &mut (impl Read + ?Sized), size: usize, n: u64) -> io::Result<()> {
+    match io::copy(reader, &mut io::sink())? / size as u64 {
+        0 => Ok(()),
+        more => Err(invalid(format!("expected {n} by the header, found {}", n + more))),
+    }
+}
+
 /// Passes every record of `size` bytes up to the end of the file to `each`, and returns the
 /// number of bytes that are left over.
 pub(crate) fn read_to_end(

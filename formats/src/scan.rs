@@ -133,6 +133,14 @@ pub enum ColumnSlot<'a> {
     Vector(&'a mut Option<Vec<[f32; 3]>>),
 }
 
+/// The whole number `x`, if the type has it.
+pub(crate) fn whole<T: TryFrom<u32>>(x: f64) -> Result<T, String> {
+    let is_u32 = x.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&x);
+    let fits = is_u32.then_some(x as u32).and_then(|n| T::try_from(n).ok());
+    let bits = 8 * size_of::<T>();
+    fits.ok_or_else(|| format!("expected a whole number of {bits} bits, found {x}"))
+}
+
 /// What [`pose_of`] takes.
 pub(crate) const POSE: &str = "expected the 16 numbers of a matrix whose last row is 0, 0, 0, 1";
 

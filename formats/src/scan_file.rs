@@ -21,13 +21,15 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::archive::{NpzReader, NpzWriter, Values, write_archive};
-use crate::cloud_file::read_npz_pose;
+use crate::archive::{NpzReader, NpzWriter, write_archive};
+use crate::cloud_file::{read_npz_points, read_npz_pose};
+use crate::decoding::invalid;
 use crate::error::FormatError;
 use crate::hash::{FileHash, Hashing};
 use crate::number::Number;
-use crate::scan::{Attribute, Column, ColumnSlot, Scan};
-use crate::{csv, ply, rows};
+use crate::number::NumberType::{F16, F32, F64};
+use crate::scan::{Attribute, Column, ColumnSlot, Scan, whole};
+use crate::{csv, npy, ply, rows};
 
 crate::named! {
     /// A file format of scans; its name is the extension.
@@ -38,10 +40,10 @@ crate::named! {
         Npz = "npz",
         /// Binary PLY.
         Ply = "ply",
-        /// Text with a header, which is written but not read.
+        /// Text with a header; it is read as a cloud with intensities.
         Csv = "csv",
         /// The Point Cloud Library's format, binary, with the columns of PLY, the pose as its
-        /// VIEWPOINT, and no origin; it is read as a cloud.
+        /// VIEWPOINT, and no origin; it is read as a cloud with intensities.
         Pcd = "pcd",
         /// A sensor's packets: see `vlp32c`. They hold ranges along beams instead of points, so
         /// that writing them requires the sensor.
@@ -117,8 +119,8 @@ pub fn read_scan(path: &Path) -> Result<Scan, FormatError> {
     match ScanFormat::of_path(path)? {
         ScanFormat::Npz => read_npz(path),
         ScanFormat::Ply => ply::read_scan(path),
-        ScanFormat::Csv => refuse("CSV is written but not read"),
-        ScanFormat::Pcd => refuse("PCD is read as a cloud, without attributes"),
+        ScanFormat::Csv => refuse("CSV is read as a cloud, with no attribute but the intensity"),
+        ScanFormat::Pcd => refuse("PCD is read as a cloud, with no attribute but the intensity"),
         ScanFormat::Pcap => refuse("packets hold a sensor's ranges, not points"),
     }
 }
@@ -153,61 +155,62 @@ fn write_columns<W: Write + Seek, A: Number>(
     npz.array(key, &[values.len() / width, width], values.iter().copied())
 }
 
-/// Attributes may be columns or vectors, compressed or not. Other keys are ignored.
+/// Attributes may be columns or vectors, compressed or not, of any type that holds their values. Other
+/// keys are ignored.
 fn read_npz(path: &Path) -> Result<Scan, FormatError> {
     let mut npz = NpzReader::open(path)?;
-    let positions = read_columns::<f32>(&mut npz, "positions", 3, None)?;
-    let n = positions.len() / 3;
-    let mut scan = Scan { positions: as_vectors(&positions), ..Scan::default() };
-    if npz.has("origin") {
-        let origin = npz.array::<f64>("origin")?.elements;
-        scan.origin =
-            origin.try_into().map_err(|_| npz.error("origin", "expected three numbers"))?;
-    }
+    let (cloud, origin) = read_npz_points(&mut npz)?;
+    let n = cloud.points.len();
+    let fits_single = |x: &f64| f64::from(*x as f32) == *x || x.is_nan();
+    let mut scan = if cloud.points.as_flattened().iter().all(fits_single) {
+        let positions = cloud.points.iter().map(|point| point.map(|x| x as f32));
+        Scan { positions: positions.collect(), ..Scan::default() }
+    } else {
+        Scan::of_points(&cloud.points)
+    };
+    scan.origin.iter_mut().zip(origin).for_each(|(sum, x)| *sum += x);
     scan.pose = read_npz_pose(&mut npz)?;
     for attribute in Attribute::ALL {
-        let key = attribute.name();
-        if !npz.has(key) {
+        if !npz.has(attribute.name()) {
             continue;
         }
+        let of = &mut npz;
         match scan.slot(attribute) {
-            ColumnSlot::F32(slot) => *slot = Some(read_columns(&mut npz, key, 1, Some(n))?),
-            ColumnSlot::U8(slot) => *slot = Some(read_columns(&mut npz, key, 1, Some(n))?),
-            ColumnSlot::U16(slot) => *slot = Some(read_columns(&mut npz, key, 1, Some(n))?),
-            ColumnSlot::U32(slot) => *slot = Some(read_columns(&mut npz, key, 1, Some(n))?),
+            ColumnSlot::F32(slot) => *slot = Some(read_column(of, attribute, 1, n, single)?),
+            ColumnSlot::U8(slot) => *slot = Some(read_column(of, attribute, 1, n, whole)?),
+            ColumnSlot::U16(slot) => *slot = Some(read_column(of, attribute, 1, n, whole)?),
+            ColumnSlot::U32(slot) => *slot = Some(read_column(of, attribute, 1, n, whole)?),
             ColumnSlot::Vector(slot) => {
-                *slot = Some(as_vectors(&read_columns(&mut npz, key, 3, Some(n))?));
+                let numbers = read_column(of, attribute, 3, n, single)?;
+                *slot = Some(numbers.as_chunks::<3>().0.to_vec());
             }
         }
     }
     Ok(scan)
 }
 
-/// The elements of an array of shape `[n, width]`, or `[n]` if `width` is 1.
-fn read_columns<A: Number>(
-    npz: &mut NpzReader,
-    key: &str,
-    width: usize,
-    expected: Option<usize>,
-) -> Result<Vec<A>, FormatError> {
-    let Values { shape, elements } = npz.array(key)?;
-    let n = match shape[..] {
-        [n] if width == 1 => n,
-        [n, columns] if columns == width => n,
-        _ => {
-            let cause = format!("expected shape [n, {width}], found {shape:?}");
-            return Err(npz.error(key, cause));
-        }
-    };
-    match expected {
-        Some(expected) if n != expected => {
-            Err(npz
-                .error(key, format!("expected {expected} values, one for each point, found {n}")))
-        }
-        _ => Ok(elements),
-    }
+fn single(x: f64) -> Result<f32, String> {
+    Ok(x as f32)
 }
 
-fn as_vectors(elements: &[f32]) -> Vec<[f32; 3]> {
-    elements.as_chunks::<3>().0.to_vec()
+/// The numbers of an attribute of `n` points, `width` for each.
+fn read_column<T: Copy>(
+    npz: &mut NpzReader,
+    attribute: Attribute,
+    width: usize,
+    n: usize,
+    of_number: impl Fn(f64) -> Result<T, String>,
+) -> Result<Vec<T>, FormatError> {
+    npz.entry(attribute.name(), |header, _, elements| {
+        npy::check_columns(&header, width, n)?;
+        let is_whole = !matches!(header.number(), Some((F16 | F32 | F64, _)));
+        // Whole numbers are probably milliseconds or millimetres.
+        if is_whole && matches!(attribute, Attribute::Time | Attribute::Range) {
+            let found = &header.descr;
+            let cause = format!("expected seconds or metres of a floating type, found {found}");
+            return Err(invalid(cause));
+        }
+        let numbers = npy::read_numbers(elements, &header, |x| x)?;
+        numbers.into_iter().map(of_number).collect::<Result<_, _>>().map_err(invalid)
+    })
 }

@@ -60,7 +60,16 @@ fn pose_of(line: &str, at_s: f64) -> Result<KeyedPose, String> {
         .split_whitespace()
         .map(|word| word.parse().ok().filter(|x: &f64| x.is_finite()).ok_or(word))
         .collect::<Result<_, _>>()
-        .map_err(|word| format!("expected a number, found {word:?}"))?;
+        .map_err(|word| match word.contains([',', ';']) {
+            true => format!("expected numbers with blanks between them, found {word:?}"),
+            false if word.parse::<f64>().is_ok() => {
+                format!("expected a number, found {word:?}: it must be finite")
+            }
+            false if word.starts_with(|c: char| c.is_alphabetic() || c == '_') => {
+                format!("expected a number, found {word:?}: begin lines of names with `#`")
+            }
+            false => format!("expected a number, found {word:?}"),
+        })?;
     let (time_s, position_m, quaternion) = match numbers[..] {
         [time_s, x, y, z, qx, qy, qz, qw] => (time_s, [x, y, z], [qx, qy, qz, qw]),
         [a, b, c, x, d, e, f, y, g, h, i, z] => {
@@ -201,8 +210,23 @@ mod tests {
         let cases = [
             ("", "f: line 1: expected a pose, found none in the file"),
             ("1 2 3\n", &format!("f: line 1: {numbers}")),
-            ("1 0 0 0 0 0 0 x", "f: line 1: expected a number, found \"x\""),
-            ("1 0 nan 0 0 0 0 1", "f: line 1: expected a number, found \"nan\""),
+            (
+                "1 0 0 0 0 0 0 x",
+                "f: line 1: expected a number, found \"x\": begin lines of names with `#`",
+            ),
+            (
+                "1,0,0,0,0,0,0,1",
+                "f: line 1: expected numbers with blanks between them, found \"1,0,0,0,0,0,0,1\"",
+            ),
+            (
+                "1; 0; 0; 0; 0; 0; 0; 1",
+                "f: line 1: expected numbers with blanks between them, found \"1;\"",
+            ),
+            (
+                "timestamp x y z qx qy qz qw\n1 0 0 0 0 0 0 1",
+                "f: line 1: expected a number, found \"timestamp\": begin lines of names with `#`",
+            ),
+            ("1 0 nan 0 0 0 0 1", "f: line 1: expected a number, found \"nan\": it must be finite"),
             ("1 0 0 0 0 0 0 2", "f: line 1: expected a quaternion of length 1, found length 2"),
             ("2 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1", "f: line 2: expected a time after 2 s, found 1 s"),
             (

@@ -7,6 +7,7 @@ use formats::scan::{ColumnSlot, Scan};
 use formats::scan_file::{ScanFormat, read_scan, write_scan};
 use proptest::prelude::*;
 
+use crate::numpy::{npy, npz};
 use crate::written_bytes;
 
 /// A scan of `n` points with the attributes whose bits are set in `wanted`.
@@ -206,6 +207,48 @@ fn errors_name_the_file_and_the_part() {
     assert_eq!(ring("property float ring", "0.5"), format!("{expected}0.5"));
     let list = ": element vertex: expected a number as property ring, found a list";
     assert_eq!(ring("property list uchar int ring", "1 7"), list);
+}
+
+/// Numbers of any type that holds their values, and columns of the points' length.
+#[test]
+fn columns_of_archives_may_be_of_other_types() {
+    let with = |key, descr, shape, data: &[u8]| {
+        let positions = [0.1f64; 6].map(f64::to_le_bytes).concat();
+        let positions = npy("<f8", "False", "(2, 3)", &positions);
+        npz(&[("positions", positions), (key, npy(descr, "False", shape, data))])
+    };
+    let read = |bytes: &[u8]| {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.npz");
+        fs::write(&path, bytes).unwrap();
+        read_scan(&path).unwrap()
+    };
+    let rings = [7i64, 65535].map(i64::to_le_bytes).concat();
+    let scan = read(&with("ring", "<i8", "(2,)", &rings));
+    assert_eq!((scan.positions[1], scan.ring), ([0.1; 3], Some(vec![7, 65535])));
+    let times = [0.5f64, 0.1].map(f64::to_be_bytes).concat();
+    assert_eq!(read(&with("time", ">f8", "(2, 1)", &times)).time_s, Some(vec![0.5, 0.1]));
+    let returns = [1f32, 2.0].map(f32::to_le_bytes).concat();
+    assert_eq!(read(&with("return", "<f4", "(2,)", &returns)).return_number, Some(vec![1, 2]));
+    assert_eq!(read(&with("intensity", "|u1", "(2,)", &[0, 9])).intensity, Some(vec![0.0, 9.0]));
+    for (key, descr, shape, data, cause) in [
+        ("ring", "<i8", "(2,)", &[255; 16][..], "expected a whole number of 16 bits, found -1"),
+        ("ring", "<f4", "(2,)", &[63; 8], "expected a whole number of 16 bits, found 0.74"),
+        ("ring", "|u1", "(3,)", &[1; 3], "expected 2 values, one for each point, found 3"),
+        ("beam", "|u1", "(2, 2)", &[1; 4], "expected shape [2, 1], found [2, 2]"),
+        ("normal", "<f4", "(2,)", &[0; 8], "expected shape [2, 3], found [2]"),
+        (
+            "time",
+            "<i8",
+            "(2,)",
+            &[0; 16],
+            "expected seconds or metres of a floating type, found <i8",
+        ),
+        ("intensity", "<U1", "(2,)", &[0; 8], "expected numbers, found elements of type `<U1`"),
+    ] {
+        let error = error_of("a.npz", &with(key, descr, shape, data));
+        assert!(error.starts_with(&format!(": {key}: {cause}")), "{error}");
+    }
 }
 
 #[test]

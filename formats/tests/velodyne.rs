@@ -282,6 +282,13 @@ fn a_turn_is_that_of_the_packets_times() {
     assert_eq!(of_frames(&repeated).unwrap(), expected);
     let echoed: Vec<_> = [&frames[..9], &frames[3..5], &frames[9..]].concat();
     assert_eq!(of_frames(&echoed).unwrap(), expected);
+    // Of 1808 sequences, 12 of which fill a packet, the time of three packets is empty.
+    let gaps = [&frames[..20], &frames[21..70], &frames[72..]].concat();
+    for (frames, missing) in [(&frames, 0), (&gaps, 3)] {
+        fs::write(folder.path().join("gaps.pcap"), classic(1, frames, 65_535)).unwrap();
+        let read = read_turn(&folder.path().join("gaps.pcap"), &mut Senders::default());
+        assert_eq!(read.unwrap().1.missing, missing);
+    }
     let mut swapped = frames.clone();
     swapped.swap(7, 8);
     swapped.swap(90, 92);

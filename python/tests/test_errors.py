@@ -43,7 +43,7 @@ CUBE = ep.Mesh(*ep.box((1, 1, 1)))
         (lambda: ep.segment(np.zeros((2, 3)), rings=[1, 2.5]), "rings: expected whole numbers"),
         (lambda: ep.detect(np.zeros((2, 3)), rings=[1, np.nan]), "rings: expected whole numbers"),
         (lambda: ep.detect(np.full((5, 3), 49520.0)), "point 0: expected metres from the sensor"),
-        (lambda: ep.segment([[1.0, 2.0, np.nan]]), "point 0: expected metres from the sensor"),
+        (lambda: ep.segment([[1.0, 2.0, np.nan]]), "point 0: expected three finite numbers"),
         (lambda: ep.segment(np.zeros((5, 3))), "points: expected metres from the sensor, found no point"),
         (lambda: ep.detect(np.full((5, 3), np.nan)), "found no point with a position"),
         (lambda: ep.detect(np.zeros((0, 3))), "found no point with a position"),

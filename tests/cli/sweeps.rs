@@ -306,6 +306,9 @@ fn every_command_reads_points_of_every_format() {
             ),
             ("detect five.bin --out out.json", "five.bin: format: the fifth numbers"),
             ("preview five --out out.png", "five: extension: unknown cloud format ``"),
+            ("preview - --out out.png", "-: name: expected a file, found standard input, which"),
+            #[cfg(unix)]
+            ("detect /dev/null --out out.json", "expected a file, found a pipe or device, which"),
         ],
     );
     for file in ["five.bin", "five"] {

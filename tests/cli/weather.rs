@@ -34,6 +34,14 @@ fn a_recorded_scan_is_weathered_and_each_of_its_points_labelled() {
     assert_eq!(rainy.ring.as_ref().unwrap().len(), rainy.len());
     folder.succeeds("weather clear.npz --fog 60 --haze 2000 --snow 1 --out fog.ply --seed 4");
     assert!(folder.scan("fog.ply").medium.unwrap().contains(&3));
+    // Of each format, the same points with the same intensities.
+    for name in ["clear.pcd", "clear.csv"] {
+        folder.succeeds(&format!("scan clear.toml --adapter cpu --out {name}"));
+        let said =
+            folder.succeeds(&format!("weather {name} --rain 50 --out again.npz --overwrite"));
+        assert!(said.contains(&format!("{} points", rainy.len())), "{said}");
+        assert_eq!(folder.scan("again.npz").intensity, rainy.intensity, "{name}");
+    }
     folder.write("cloud.xyz", "5 0 0\n9 1 0\nnan nan nan\n0 0 0\n");
     let said = folder.succeeds("weather cloud.xyz --reflectivity 0.5 --rain 1 --out cloud.csv");
     assert!(said.contains("no point") && said.contains("4 points"), "{said}");
@@ -83,6 +91,7 @@ fn effects_work_in_scenes_datasets_and_drives() {
 fn what_cannot_be_weathered_is_refused() {
     let folder = Folder::new();
     folder.write("cloud.xyz", "5 0 0\n9 1 0\n");
+    folder.write("cloud.csv", "x,y,z,Intensity\n5,0,0,255\n");
     folder.write("dark.toml", DARK);
     folder.write("bright.bin", [5f32, 0.0, 0.0, 200.0].map(f32::to_le_bytes).concat());
     folder.write("black.bin", [5f32, 0.0, 0.0, -1.0].map(f32::to_le_bytes).concat());
@@ -91,6 +100,7 @@ fn what_cannot_be_weathered_is_refused() {
         &[
             ("weather cloud.xyz --out a.npz", "expected one of --rain, --snow, --fog and --haze"),
             ("weather cloud.xyz --rain 5 --out a.npz", "have no intensity: give --reflectivity"),
+            ("weather cloud.csv --rain 5 --out a.npz", "around 0 to 1, found 255: give --white"),
             ("weather cloud.xyz --rain -1 --out a.npz", "rain_mm_h: expected a number within"),
             ("weather cloud.xyz --rain nan --out a.npz", "rain_mm_h: expected a number within"),
             ("weather cloud.xyz --fog 0 --out a.npz", "fog_visibility_m: expected a number within"),

@@ -91,7 +91,7 @@ impl CloudFormat {
 
 pub(super) const COMPRESSED_LAS: &str =
     "LAZ is compressed LAS: decompress it first (`laszip`, or `pdal translate in.laz out.las`)";
-const MESH: &str = "expected a cloud, found a mesh: scan it first";
+pub(super) const MESH: &str = "expected a cloud, found a mesh: scan it first";
 const CAPTURE: &str =
     "expected a cloud, found a capture: `edgepuck segment` cuts its first turn into clouds";
 const UNKNOWN: &str = "the first bytes are of no known binary format; name the format";

@@ -7,7 +7,8 @@ use std::fs::File;
 use std::io::{BufRead, Read, Write};
 use std::path::Path;
 
-use super::CloudFormat;
+use super::intensity::{Rows, Unit};
+use super::{Cloud, CloudFormat};
 use crate::atomic;
 use crate::error::FormatError;
 use crate::foreign::foreign;
@@ -30,30 +31,25 @@ pub(super) fn read(
     reader: &mut impl BufRead,
     format: CloudFormat,
     name: &Path,
-) -> Result<Vec<[f64; 3]>, FormatError> {
-    let mut points = Vec::new();
-    read_points(reader, columns(format, name), name, |number| points.push([0, 1, 2].map(number)))?;
-    Ok(points)
+) -> Result<Cloud, FormatError> {
+    let (mut rows, columns) = (Rows::default(), columns(format, name));
+    let mut row = vec![0.0; columns.min(KITTI_COLUMNS)];
+    read_points(reader, columns, name, |number| {
+        row.iter_mut().enumerate().for_each(|(column, value)| *value = number(column));
+        rows.push(&row);
+    })?;
+    Ok(rows.cloud((columns >= KITTI_COLUMNS).then_some(Unit::Own)))
 }
 
-/// The fourth number of every point, its intensity; `None` if the points have three.
-pub(super) fn read_intensities(
-    reader: &mut impl BufRead,
+/// Checks that a file of KITTI has no fifth column of rings, or intensities that are coordinates, where
+/// its name alone makes it KITTI's, and both where a user named the format; and that one of nuScenes
+/// has rings.
+pub(super) fn check_columns(
+    file: &mut File,
+    path: &Path,
     format: CloudFormat,
-    name: &Path,
-) -> Result<Option<Vec<f32>>, FormatError> {
-    let columns = columns(format, name);
-    if columns < KITTI_COLUMNS {
-        return Ok(None);
-    }
-    let mut intensities = Vec::new();
-    read_points(reader, columns, name, |number| intensities.push(number(3) as f32))?;
-    Ok(Some(intensities))
-}
-
-/// Checks that a file whose name alone makes it KITTI's has no fifth column of rings, and that its
-/// intensities are not coordinates.
-pub(super) fn check_columns(file: &mut File, path: &Path) -> Result<(), FormatError> {
+    is_named: bool,
+) -> Result<(), FormatError> {
     /// Bytes at the start of the file that are examined.
     const EXAMINED: u64 = 1 << 16;
     let mut start = Vec::new();
@@ -64,12 +60,18 @@ pub(super) fn check_columns(file: &mut File, path: &Path) -> Result<(), FormatEr
         Ok(size)
     });
     let size = size.map_err(|source| FormatError::io(path, source))?;
-    let seem = if size % (NUSCENES_COLUMNS * COLUMN_SIZE) as u64 == 0 && has_rings(&start) {
-        "the fifth numbers look like rings of nuScenes"
-    } else if has_negative_intensities(&start) {
-        "the fourth numbers are negative, as intensities are not"
-    } else {
-        return Ok(());
+    let are_rings = size % (NUSCENES_COLUMNS * COLUMN_SIZE) as u64 == 0 && has_rings(&start);
+    let are_negative = has_negative_intensities(&start);
+    let seem = match format {
+        CloudFormat::Nuscenes if has_fractions(&start) => {
+            "the fifth numbers are not whole, as rings are"
+        }
+        CloudFormat::Nuscenes => return Ok(()),
+        _ if are_rings && (are_negative || !is_named) => {
+            "the fifth numbers look like rings of nuScenes"
+        }
+        _ if are_negative && !is_named => "the fourth numbers are negative, as intensities are not",
+        _ => return Ok(()),
     };
     match stated_columns(path) {
         None if !is_velodyne_packets(&start) => {
@@ -86,6 +88,14 @@ fn has_negative_intensities(start: &[u8]) -> bool {
     let intensity = |point: &[u8]| NumberType::F32.decode(&point[12..], ByteOrder::Little);
     let negative = points.iter().filter(|point| intensity(&point[..]) < 0.0).count();
     points.len() >= FEWEST && negative > points.len() / 10
+}
+
+/// Whether a tenth of the fifth numbers, at least, is not whole.
+fn has_fractions(start: &[u8]) -> bool {
+    let points = start.as_chunks::<{ NUSCENES_COLUMNS * COLUMN_SIZE }>().0;
+    let fifth = |point: &[u8]| NumberType::F32.decode(&point[16..], ByteOrder::Little);
+    let broken = points.iter().filter(|point| fifth(&point[..]).fract() != 0.0).count();
+    points.len() >= FEWEST && broken > points.len() / 10
 }
 
 /// Whether each fifth number is a small whole number, as the rings of nuScenes are, and others are

@@ -11,28 +11,31 @@ use las::Transform;
 use las::point::Format;
 use las::raw::Header;
 
+use super::Cloud;
 use super::format::COMPRESSED_LAS;
+use super::intensity::{Rows, Unit};
 use crate::decoding::{error_in, invalid};
 use crate::error::FormatError;
 use crate::number::{ByteOrder, NumberType};
 use crate::records;
 
 /// Reads every point, with the header's scale and offset applied.
-pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
+pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Cloud, FormatError> {
     let (header, n_bytes) = read_header(reader).map_err(|error| error_in(name, "header", error))?;
     let gap = u64::from(header.offset_to_point_data).checked_sub(n_bytes);
     let gap = gap.ok_or_else(|| {
         FormatError::malformed(name, "header", "the points begin before the header ends")
     })?;
     records::skip(reader, gap).map_err(|error| error_in(name, "header", error))?;
-    let mut points = Vec::new();
+    let mut rows = Rows::default();
     let transforms = transforms(&header);
     let size = usize::from(header.point_data_record_length);
     records::read(reader, size, n_points(&header), |record| {
-        points.push([0, 1, 2].map(|axis| coordinate(transforms[axis], &record[4 * axis..])));
+        let [x, y, z] = [0, 1, 2].map(|axis| coordinate(transforms[axis], &record[4 * axis..]));
+        rows.push(&[x, y, z, NumberType::U16.decode(&record[12..], ByteOrder::Little)]);
     })
     .map_err(|error| error_in(name, "points", error))?;
-    Ok(points)
+    Ok(rows.cloud(Some(Unit::Las)))
 }
 
 /// The header and its size, bytes.
@@ -74,7 +77,7 @@ fn transforms(header: &Header) -> [Transform; 3] {
     ]
 }
 
-/// Every point format begins with x, y and z as i32.
+/// Every point format begins with x, y and z as i32, and the intensity as u16.
 fn coordinate(transform: Transform, bytes: &[u8]) -> f64 {
     transform.scale * NumberType::I32.decode(bytes, ByteOrder::Little) + transform.offset
 }

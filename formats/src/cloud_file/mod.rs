@@ -16,6 +16,7 @@
 //! with the decompressed bytes of the file, never with a count in a header.
 
 mod format;
+mod intensity;
 mod kitti;
 #[cfg(feature = "las")]
 mod las;
@@ -48,9 +49,21 @@ pub use format::CloudFormat;
 #[cfg(feature = "las")]
 pub use las_write::{LasPoint, write_las};
 #[cfg(feature = "dataset")]
-pub(crate) use npz::read_pose as read_npz_pose;
+pub(crate) use npz::{read_points as read_npz_points, read_pose as read_npz_pose};
 pub use plausible::{Unlike, check_sweep, coarse_coordinates, judge_object, judge_sweep};
 use precision::Precision;
+
+/// Points, and what a file says of their brightness.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cloud {
+    /// The points, metres.
+    pub points: Vec<[f64; 3]>,
+    /// One number for each point, if the file has them: the column `intensity`, `i`,
+    /// `scalar_intensity` or `reflectivity` in upper or lower case, or the fourth of KITTI and
+    /// nuScenes. They are as in the file, except for those of LAS, of which 65535 is 1 unless all are
+    /// below 256, and reflectivities of whole numbers up to 255, of which 100 is 1.
+    pub intensities: Option<Vec<f32>>,
+}
 
 /// Reads the cloud at `path` in the format of its extension.
 ///
@@ -67,20 +80,33 @@ pub fn read_cloud(path: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
 /// or the numbers of beams or rings. A pipe, which can be read once, is none.
 #[must_use]
 pub fn is_scan(path: &Path) -> bool {
-    const KEYS: [&str; 3] = ["range", "beam", "ring"];
+    has_any(path, &["range", "beam", "ring"])
+}
+
+/// Whether the NPZ or PLY file at `path` must be one that [`crate::scan_file::read_scan`] reads: a scan, or
+/// an archive whose points have the name that they have in scans.
+#[cfg(feature = "dataset")]
+#[must_use]
+pub fn must_be_scan(path: &Path) -> bool {
+    has_any(path, &["positions", "range", "beam", "ring"])
+}
+
+/// Whether the NPZ or PLY file at `path` has one of these arrays or properties.
+#[allow(unused_variables, reason = "a build may leave both formats out")]
+fn has_any(path: &Path, keys: &[&str]) -> bool {
     if !path.is_file() {
         return false;
     }
     match CloudFormat::of_path(path) {
         #[cfg(feature = "npz")]
         Ok(CloudFormat::Npz) => crate::archive::NpzReader::open(path)
-            .is_ok_and(|npz| KEYS.iter().any(|key| npz.has(key))),
+            .is_ok_and(|npz| keys.iter().any(|key| npz.has(key))),
         #[cfg(feature = "ply")]
         Ok(CloudFormat::Ply) => File::open(path).is_ok_and(|file| {
             let mut found = false;
             // The error ends the reading after the header.
             let choose = |_: usize, vertex: &crate::ply::Element| {
-                found = KEYS.iter().any(|key| vertex.has(key));
+                found = keys.iter().any(|key| vertex.has(key));
                 Err(String::new())
             };
             let _ = crate::ply::read_elements(
@@ -104,46 +130,40 @@ pub fn read_cloud_as(
     path: &Path,
     format: Option<CloudFormat>,
 ) -> Result<Vec<[f64; 3]>, FormatError> {
+    read_with_intensities(path, format).map(|cloud| cloud.points)
+}
+
+/// As [`read_cloud_as`], with the intensities.
+///
+/// # Errors
+/// As [`read_cloud`]; intensities of another number than the points.
+pub fn read_with_intensities(
+    path: &Path,
+    format: Option<CloudFormat>,
+) -> Result<Cloud, FormatError> {
     read_file(path, format).map_err(|error| {
         let expected = format.or(CloudFormat::of_path(path).ok());
         or_foreign_file(path, expected.map_or("a cloud", CloudFormat::name), error)
     })
 }
 
-fn read_file(path: &Path, format: Option<CloudFormat>) -> Result<Vec<[f64; 3]>, FormatError> {
+fn read_file(path: &Path, format: Option<CloudFormat>) -> Result<Cloud, FormatError> {
     let (mut file, found) = open(path, format)?;
     match found {
         #[cfg(feature = "npz")]
         CloudFormat::Npz => npz::read(BufReader::new(file), path),
         CloudFormat::Kitti if format.is_none() => {
-            kitti::check_columns(&mut file, path)?;
-            let points = kitti::read(&mut BufReader::new(file), found, path)?;
+            kitti::check_columns(&mut file, path, found, false)?;
+            let cloud = kitti::read(&mut BufReader::new(file), found, path)?;
             let remedy = format!("are they in millimetres? Scale them, or {}", kitti::REMEDY);
-            check_sweep(points.iter().copied(), path, &remedy)?;
-            Ok(points)
+            check_sweep(cloud.points.iter().copied(), path, &remedy)?;
+            Ok(cloud)
+        }
+        CloudFormat::Kitti | CloudFormat::Nuscenes if path.is_file() => {
+            kitti::check_columns(&mut file, path, found, true)?;
+            read_as(&mut BufReader::new(file), found, path)
         }
         _ => read_as(&mut BufReader::new(file), found, path),
-    }
-}
-
-/// Reads the intensities of the points at `path`, unscaled, or returns `None` if its format is not
-/// KITTI's or nuScenes' or has no intensities. A pipe, which can be read once, has none.
-///
-/// # Errors
-/// As [`read_cloud`].
-pub fn read_intensities(
-    path: &Path,
-    format: Option<CloudFormat>,
-) -> Result<Option<Vec<f32>>, FormatError> {
-    if path.exists() && !path.is_file() {
-        return Ok(None);
-    }
-    let (file, format) = open(path, format)?;
-    match format {
-        CloudFormat::Kitti | CloudFormat::Nuscenes => {
-            kitti::read_intensities(&mut BufReader::new(file), format, path)
-        }
-        _ => Ok(None),
     }
 }
 
@@ -202,14 +222,14 @@ pub fn read_cloud_from(
         Some(format) => format,
         None => CloudFormat::of_content(start, name)?,
     };
-    read_as(&mut BufReader::new(start.chain(reader)), format, name)
+    read_as(&mut BufReader::new(start.chain(reader)), format, name).map(|cloud| cloud.points)
 }
 
 fn read_as(
     reader: &mut impl BufRead,
     format: CloudFormat,
     name: &Path,
-) -> Result<Vec<[f64; 3]>, FormatError> {
+) -> Result<Cloud, FormatError> {
     match format {
         CloudFormat::Text | CloudFormat::Csv => text::read(reader, name),
         CloudFormat::Npy => npy::read(reader, name),

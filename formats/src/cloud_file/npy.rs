@@ -4,6 +4,8 @@
 use std::io::{self, Read, Write};
 use std::path::Path;
 
+use super::Cloud;
+use super::intensity::{self, Rows, Unit};
 use super::precision::Precision;
 use crate::decoding::{error_in, excerpt, invalid};
 use crate::error::FormatError;
@@ -11,44 +13,47 @@ use crate::npy::{self, Header, RecordField};
 use crate::number::{ByteOrder, NumberType};
 use crate::records;
 
-pub(super) fn read(reader: &mut impl Read, name: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
+pub(super) fn read(reader: &mut impl Read, name: &Path) -> Result<Cloud, FormatError> {
     let header = npy::read_header(reader).map_err(|error| error_in(name, "header", error))?;
     read_points(&header, reader).map_err(|error| error_in(name, "array", error))
 }
 
 pub(super) fn holds_points(header: &Header) -> bool {
     let is_table = matches!(header.shape[..], [_, columns] if columns >= 3);
-    (is_table && header.number().is_some()) || axes(header).is_some()
+    (is_table && header.number().is_some()) || columns(header).is_some()
 }
 
-/// The coordinates x, y and z of a record, and its size, bytes.
-fn axes(header: &Header) -> Option<([RecordField<'_>; 3], usize)> {
+/// The coordinates x, y and z of a record and perhaps its intensity, with the unit of that, and the
+/// size of a record, bytes.
+fn columns(header: &Header) -> Option<(Vec<RecordField<'_>>, Option<Unit>, usize)> {
     let (mut fields, size) = header.record()?;
-    let mut take = |axis: &str| {
-        let at = fields.iter().position(|field| field.name.eq_ignore_ascii_case(axis))?;
+    let mut take = |name: &str| {
+        let at = fields.iter().position(|field| field.name.eq_ignore_ascii_case(name))?;
         Some(fields.swap_remove(at))
     };
-    Some(([take("x")?, take("y")?, take("z")?], size))
+    let mut columns = vec![take("x")?, take("y")?, take("z")?];
+    let (intensity, unit) = intensity::find(take).unzip();
+    columns.extend(intensity);
+    Some((columns, unit, size))
 }
 
 /// Most values of a point. A wider array of three rows is transposed.
 const WIDEST_POINT: usize = 64;
 
 /// Reads the points that follow `header`: numbers of any type.
-pub(super) fn read_points(
-    header: &Header,
-    reader: &mut (impl Read + ?Sized),
-) -> io::Result<Vec<[f64; 3]>> {
-    let mut points = Vec::new();
-    if let Some((axes, size)) = axes(header) {
+pub(super) fn read_points(header: &Header, reader: &mut (impl Read + ?Sized)) -> io::Result<Cloud> {
+    if let Some((columns, unit, size)) = columns(header) {
         let n = header.n_elements().unwrap_or(usize::MAX);
+        let (mut rows, mut row) = (Rows::default(), vec![0.0; columns.len()]);
         records::read(reader, size, n as u64, |record| {
-            let decode =
-                |axis: &RecordField<'_>| axis.number.decode(&record[axis.offset..], axis.order);
-            points.push(axes.each_ref().map(decode));
+            for (value, column) in row.iter_mut().zip(&columns) {
+                *value = column.number.decode(&record[column.offset..], column.order);
+            }
+            rows.push(&row);
         })?;
-        return Ok(points);
+        return Ok(rows.cloud(unit));
     }
+    let mut points = Vec::new();
     if header.descr.starts_with('[') {
         let found = excerpt(&header.descr);
         return Err(invalid(format!("expected records with numbers x, y and z, found {found}")));
@@ -68,13 +73,14 @@ pub(super) fn read_points(
     };
     let (number, order) = header.number_or_error()?;
     if header.is_fortran_order {
-        return read_columns(reader, n as u64, number, order);
+        read_columns(reader, n as u64, number, order, &mut points)?;
+        return Ok(Cloud { points, intensities: None });
     }
     let size = number.size();
     records::read(reader, columns.saturating_mul(size), n as u64, |row| {
         points.push([0, 1, 2].map(|axis| number.decode(&row[axis * size..], order)));
     })?;
-    Ok(points)
+    Ok(Cloud { points, intensities: None })
 }
 
 /// Reads all x, then all y, then all z.
@@ -83,8 +89,8 @@ fn read_columns(
     n: u64,
     number: NumberType,
     order: ByteOrder,
-) -> io::Result<Vec<[f64; 3]>> {
-    let mut points = Vec::new();
+    points: &mut Vec<[f64; 3]>,
+) -> io::Result<()> {
     records::read(reader, number.size(), n, |x| points.push([number.decode(x, order), 0.0, 0.0]))?;
     for axis in [1, 2] {
         let mut rest = points.iter_mut();
@@ -94,7 +100,7 @@ fn read_columns(
             }
         })?;
     }
-    Ok(points)
+    Ok(())
 }
 
 /// Writes `points` as an array of shape `[n, 3]`.

@@ -3,9 +3,10 @@
 use std::io::{self, Read, Seek, Write};
 use std::path::Path;
 
-use super::npy;
 use super::precision::Precision;
+use super::{Cloud, intensity, npy};
 use crate::archive::{NpzReader, NpzWriter};
+use crate::decoding::invalid;
 use crate::error::FormatError;
 use crate::scan::{POSE, pose_of};
 
@@ -16,26 +17,59 @@ const POSE_KEY: &str = "pose";
 /// The key of the points in most other archives.
 const POINTS: &str = "points";
 
-pub(super) fn read(reader: impl Read + Seek, name: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
+/// The key that makes an archive a set of clouds.
+const OFFSETS: &str = "offsets";
+
+pub(super) fn read(reader: impl Read + Seek, name: &Path) -> Result<Cloud, FormatError> {
     let mut npz = NpzReader::new(reader, name)?;
+    let (mut cloud, [x, y, z]) = read_points(&mut npz)?;
+    if [x, y, z] != [0.0; 3] {
+        cloud.points.iter_mut().for_each(|p| *p = [p[0] + x, p[1] + y, p[2] + z]);
+    }
+    let keys = npz.keys();
+    let key = |name: &str| keys.iter().find(|key| key.eq_ignore_ascii_case(name));
+    if cloud.intensities.is_none()
+        && let Some((key, unit)) = intensity::find(key)
+    {
+        let n = cloud.points.len();
+        let values = npz.entry(key, |header, _, elements| {
+            crate::npy::check_columns(&header, 1, n)?;
+            crate::npy::read_numbers(elements, &header, |x| x as f32)
+        })?;
+        cloud.intensities = unit.intensities(values);
+    }
+    Ok(cloud)
+}
+
+/// The points, and the origin to add to each.
+pub(crate) fn read_points<R: Read + Seek>(
+    npz: &mut NpzReader<R>,
+) -> Result<(Cloud, [f64; 3]), FormatError> {
+    if npz.has(OFFSETS) && !npz.has(POSITIONS) {
+        return npz.entry(OFFSETS, |header, _, _| {
+            let n = header.n_elements().unwrap_or_default().saturating_sub(1);
+            Err(invalid(format!(
+                "expected one cloud, found a packed set of {n} clouds: `edgepuck eval --data` \
+                 classifies them, and in NumPy the first is points[offsets[0]:offsets[1]]"
+            )))
+        });
+    }
     let key = match [POSITIONS, POINTS].into_iter().find(|key| npz.has(key)) {
         Some(key) => key.to_owned(),
-        None => only_array_of_points(&mut npz)?,
+        None => only_array_of_points(npz)?,
     };
-    let mut points = npz.entry(&key, |header, _, elements| {
-        let points = npy::read_points(&header, elements)?;
+    let cloud = npz.entry(&key, |header, _, elements| {
+        let cloud = npy::read_points(&header, elements)?;
         // An array in Fortran order may have further columns after z.
         io::copy(elements, &mut io::sink())?;
-        Ok(points)
+        Ok(cloud)
     })?;
-    if key == POSITIONS && npz.has(ORIGIN) {
-        let origin = npz.array::<f64>(ORIGIN)?.elements;
-        let &[x, y, z] = &origin[..] else {
-            return Err(npz.error(ORIGIN, "expected three numbers"));
-        };
-        points.iter_mut().for_each(|p| *p = [p[0] + x, p[1] + y, p[2] + z]);
+    if key != POSITIONS || !npz.has(ORIGIN) {
+        return Ok((cloud, [0.0; 3]));
     }
-    Ok(points)
+    let origin = npz.array::<f64>(ORIGIN)?.elements;
+    let origin = origin.try_into().map_err(|_| npz.error(ORIGIN, "expected three numbers"))?;
+    Ok((cloud, origin))
 }
 
 /// The pose of a scan's sensor, row by row.

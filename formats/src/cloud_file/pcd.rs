@@ -7,32 +7,40 @@
 use std::io::{self, BufRead, Read, Write};
 use std::path::Path;
 
-use super::lzf;
+use super::intensity::Rows;
 use super::pcd_header::{Coordinate, Encoding, Header, read_header};
 use super::precision::Precision;
+use super::{Cloud, lzf};
 use crate::decoding::{error_in, invalid};
 use crate::error::FormatError;
 use crate::lines::Lines;
 use crate::number::{ByteOrder, NumberType};
 use crate::records;
 
-pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
+pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Cloud, FormatError> {
     let mut lines = Lines::new(reader, name);
     let mut header = read_header(&mut lines, name)?;
-    let axes = header.axes().map_err(|cause| FormatError::malformed(name, "FIELDS", cause))?;
+    let columns =
+        header.columns().map_err(|cause| FormatError::malformed(name, "FIELDS", cause))?;
+    let mut rows = Rows::default();
     match header.encoding {
-        Encoding::Ascii => read_ascii(&mut lines, header.n, axes),
+        Encoding::Ascii => read_ascii(&mut lines, header.n, &columns, &mut rows)?,
         Encoding::Binary => {
             let size = usize::try_from(header.point_size()).unwrap_or(usize::MAX);
-            let mut points = Vec::new();
+            let mut row = vec![0.0; columns.len()];
             let read = records::read(lines.reader, size, header.n, |point| {
-                points.push(axes.map(|axis| axis.decode(&point[axis.offset as usize..])));
+                for (value, column) in row.iter_mut().zip(&columns) {
+                    *value = column.decode(&point[column.offset as usize..]);
+                }
+                rows.push(&row);
             });
-            read.map(|()| points).map_err(|error| error_in(name, "points", error))
+            read.and_then(|()| records::check_end(lines.reader, size, header.n))
+                .map_err(|error| error_in(name, "points", error))?;
         }
-        Encoding::Compressed => read_compressed(lines.reader, &mut header)
-            .map_err(|error| error_in(name, "points", error)),
+        Encoding::Compressed => read_compressed(lines.reader, &mut header, &mut rows)
+            .map_err(|error| error_in(name, "points", error))?,
     }
+    Ok(rows.cloud(header.intensity().map(|(_, unit)| unit)))
 }
 
 /// The pose from which the points were seen, from the sensor's frame to that of the points.
@@ -62,13 +70,13 @@ fn pose_of_viewpoint([tx, ty, tz, w, x, y, z]: [f64; 7]) -> Option<[f64; 16]> {
 fn read_ascii<R: BufRead>(
     lines: &mut Lines<'_, R>,
     n: u64,
-    axes: [Coordinate; 3],
-) -> Result<Vec<[f64; 3]>, FormatError> {
-    let mut points = Vec::new();
+    columns: &[Coordinate],
+    rows: &mut Rows,
+) -> Result<(), FormatError> {
+    let mut row = vec![0.0; columns.len()];
     for i in 0..n {
         let line = lines.next_of(i, n)?;
-        let mut point = [0.0; 3];
-        for (axis, coordinate) in axes.iter().enumerate() {
+        for (value, coordinate) in row.iter_mut().zip(columns) {
             let word = line.text.split_ascii_whitespace().nth(coordinate.column as usize);
             let word = word.ok_or_else(|| {
                 line.error(format!(
@@ -76,15 +84,15 @@ fn read_ascii<R: BufRead>(
                     coordinate.column.saturating_add(1)
                 ))
             })?;
-            point[axis] = line.number(word)?;
+            *value = line.number(word)?;
         }
-        points.push(point);
+        rows.push(&row);
     }
-    Ok(points)
+    Ok(())
 }
 
 /// Reads compressed points, whose numbers are stored field by field.
-fn read_compressed(reader: &mut impl Read, header: &mut Header) -> io::Result<Vec<[f64; 3]>> {
+fn read_compressed(reader: &mut impl Read, header: &mut Header, rows: &mut Rows) -> io::Result<()> {
     let mut sizes = [0; 8];
     reader.read_exact(&mut sizes)?;
     let [compressed, uncompressed] =
@@ -106,14 +114,16 @@ fn read_compressed(reader: &mut impl Read, header: &mut Header) -> io::Result<Ve
         return Err(records::truncated(bytes.len() as u64, compressed));
     }
     let bytes = lzf::decompress(&bytes, uncompressed)?;
-    let axes = header.axes().map_err(invalid)?;
-    let point = |i: u64| {
-        axes.map(|axis| {
-            let at = axis.offset * header.n + i * axis.number.size() as u64;
-            axis.decode(&bytes[at as usize..])
-        })
-    };
-    Ok((0..header.n).map(point).collect())
+    let columns = header.columns().map_err(invalid)?;
+    let mut row = vec![0.0; columns.len()];
+    for i in 0..header.n {
+        for (value, column) in row.iter_mut().zip(&columns) {
+            let at = column.offset * header.n + i * column.number.size() as u64;
+            *value = column.decode(&bytes[at as usize..]);
+        }
+        rows.push(&row);
+    }
+    Ok(())
 }
 
 /// Writes `points` as binary PCD 0.7.

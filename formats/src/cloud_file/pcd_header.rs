@@ -3,6 +3,7 @@
 use std::io::BufRead;
 use std::path::Path;
 
+use super::intensity::{self, Unit};
 use crate::decoding::excerpt;
 use crate::error::FormatError;
 use crate::lines::{Line, Lines};
@@ -34,7 +35,7 @@ pub(super) enum Encoding {
     Compressed,
 }
 
-/// One coordinate of every point.
+/// One coordinate of every point, or its intensity.
 #[derive(Clone, Copy)]
 pub(super) struct Coordinate {
     pub number: NumberType,
@@ -87,8 +88,14 @@ pub(super) fn read_header<R: BufRead>(
             }
             "DATA" => {
                 let encoding = Encoding::named(&line, words.next().unwrap_or_default())?;
-                let n = points.or_else(|| width?.checked_mul(height?));
-                let n = n.ok_or_else(|| missing("POINTS"))?;
+                let by_sides = width.zip(height).and_then(|(w, h): (u64, u64)| w.checked_mul(h));
+                if let Some((n, by_sides)) = points.zip(by_sides).filter(|(n, sides)| n != sides) {
+                    let cause = format!(
+                        "expected as many POINTS as WIDTH times HEIGHT, {by_sides}, found {n}"
+                    );
+                    return Err(FormatError::malformed(name, "header", cause));
+                }
+                let n = points.or(by_sides).ok_or_else(|| missing("POINTS"))?;
                 return Ok(Header { n, fields, encoding, viewpoint });
             }
             _ => {}
@@ -108,10 +115,15 @@ impl Header {
         self.fields.retain(|field| field.name != "_");
     }
 
-    /// The coordinates x, y and z.
-    pub fn axes(&self) -> Result<[Coordinate; 3], String> {
-        let [x, y, z] = ["x", "y", "z"].map(|axis| self.coordinate(axis));
-        Ok([x?, y?, z?])
+    /// The coordinates x, y and z, and the intensity if there is one.
+    pub fn columns(&self) -> Result<Vec<Coordinate>, String> {
+        let intensity = self.intensity().map(|(column, _)| Ok(column));
+        ["x", "y", "z"].map(|axis| self.coordinate(axis)).into_iter().chain(intensity).collect()
+    }
+
+    /// The intensity.
+    pub fn intensity(&self) -> Option<(Coordinate, Unit)> {
+        intensity::find(|name| self.coordinate(name).ok())
     }
 
     fn coordinate(&self, axis: &str) -> Result<Coordinate, String> {

@@ -59,7 +59,13 @@ pub fn judge_sweep(
     for (i, point) in points.into_iter().enumerate() {
         let finite = point.iter().filter(|x| x.is_finite()).count();
         if !matches!(finite, 0 | 3) || point.iter().any(|x| x.is_finite() && x.abs() > FARTHEST_M) {
-            let cause = format!("expected metres from the sensor, found {point:?}: {remedy}");
+            let cause = match point.iter().find(|x| !x.is_finite()) {
+                Some(x) => format!(
+                    "expected three finite numbers, or none for a lost return, found {point:?}, of \
+                     which {x} is no place: remove the point"
+                ),
+                None => format!("expected metres from the sensor, found {point:?}: {remedy}"),
+            };
             return Err((format!("point {i}"), cause));
         }
         let range = length(point);

@@ -3,26 +3,35 @@
 use std::io::{self, BufRead, Write};
 use std::path::Path;
 
+use super::Cloud;
+use super::format::MESH;
+use super::intensity::{self, Rows};
 use super::precision::Precision;
 use crate::error::FormatError;
-use crate::ply::read_elements;
+use crate::ply::{Element, read_elements};
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// Reads the position of every vertex, with the file's `origin` added.
-pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
-    let mut points = Vec::new();
-    let frame = read_elements(
-        reader,
-        name,
-        &["vertex"],
-        |_, vertex| AXES.iter().map(|axis| vertex.scalar(axis)).collect(),
-        |_, row| points.push([row[0], row[1], row[2]]),
-    )?;
+/// Reads the position of every vertex, with the file's `origin` added, and its intensity.
+pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Cloud, FormatError> {
+    let (mut rows, mut unit) = (Rows::default(), None);
+    let choose = |kind: usize, element: &Element| match kind {
+        0 => {
+            let intensity = intensity::find(|name| element.scalar(name).ok());
+            unit = intensity.map(|(_, unit)| unit);
+            let axes = AXES.iter().map(|axis| element.scalar(axis));
+            axes.chain(intensity.map(|(at, _)| Ok(at))).collect()
+        }
+        _ if element.is_empty() => Ok(Vec::new()),
+        _ => Err(MESH.to_owned()),
+    };
+    let kinds = ["vertex", "face", "tristrips"];
+    let frame = read_elements(reader, name, &kinds, choose, |_, row| rows.push(row))?;
+    let mut cloud = rows.cloud(unit);
     if let Some([x, y, z]) = frame.origin {
-        points.iter_mut().for_each(|p| *p = [p[0] + x, p[1] + y, p[2] + z]);
+        cloud.points.iter_mut().for_each(|p| *p = [p[0] + x, p[1] + y, p[2] + z]);
     }
-    Ok(points)
+    Ok(cloud)
 }
 
 /// The pose of a scan's sensor, row by row.

@@ -1,15 +1,17 @@
 //! Clouds as text, with a line for each point.
 //!
-//! Semicolons, commas, tabs or blanks separate columns: the first of these that the
-//! first line has. A first line of names, which may be a comment, states the columns of x, y and z,
-//! and their unit if that is not the metre; without names they are the first three, and where pandas
-//! numbers the columns, those after the nameless one. Text after a `#`, and a line that begins with
-//! `//`, is a comment. A line with nothing but a count is that of the points after it, as in Leica's
-//! `.pts`.
+//! Semicolons, commas, tabs or blanks separate columns: the first of these that the first line has, and
+//! tabs rather than the commas between them. A first line of names, which may be a comment, states the
+//! columns of x, y and z, their unit if that is not the metre, and the column of intensities; without
+//! names they are the first three, and where pandas numbers the columns, those after the nameless one.
+//! Text after a `#`, and a line that begins with `//`, is a comment. A line with nothing but a count is
+//! that of the points after it, as in Leica's `.pts`.
 
 use std::io::{self, BufRead, Write};
 use std::path::Path;
 
+use super::Cloud;
+use super::intensity::{self, Rows, Unit};
 use crate::decoding::excerpt;
 use crate::error::FormatError;
 use crate::lines::{Line, Lines};
@@ -24,16 +26,19 @@ enum Separator {
 
 struct Layout {
     separator: Separator,
-    columns: [usize; 3],
+    /// Those of x, y and z, and of the intensity if there is one.
+    columns: Vec<usize>,
     unit_m: [f64; 3],
+    /// That of the intensity.
+    unit: Option<Unit>,
     /// Whether nothing names the columns, and there are more than three.
     is_guessed: bool,
 }
 
-pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
+pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Cloud, FormatError> {
     let mut lines = Lines::new(reader, name);
     let mut layout: Option<Layout> = None;
-    let mut points = Vec::new();
+    let (mut rows, mut row) = (Rows::default(), Vec::new());
     // The number of points that the counts so far promise.
     let mut promised = None;
     let mut comment = String::new();
@@ -46,7 +51,7 @@ pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3
             }
             continue;
         }
-        let found = points.len() as u64;
+        let found = rows.points().len() as u64;
         let is_complete = promised.is_some_and(|n| n == found);
         if (layout.is_none() || is_complete)
             && let Ok(n) = content.parse::<u64>()
@@ -59,22 +64,27 @@ pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3
         }
         are_decimal_commas = are_decimal_commas && has_decimal_commas(content);
         match &layout {
-            Some(layout) => points.push(layout.point(&line, content)?),
+            Some(layout) => {
+                layout.read(&line, content, &mut row)?;
+                rows.push(&row);
+            }
             None => {
                 let (first, is_header) = Layout::from_first_line(&line, content, &comment)?;
                 if !is_header {
-                    points.push(first.point(&line, content)?);
+                    first.read(&line, content, &mut row)?;
+                    rows.push(&row);
                 }
                 layout = Some(first);
             }
         }
     }
+    let (points, unit) = (rows.points(), layout.as_ref().and_then(|layout| layout.unit));
     match promised {
         Some(n) if n > points.len() as u64 => {
             let cause = format!("the file ends after {} of {n}", points.len());
             Err(FormatError::malformed(name, "points", cause))
         }
-        _ if layout.is_some_and(|layout| layout.is_guessed) && has_line_numbers(&points) => {
+        _ if layout.is_some_and(|layout| layout.is_guessed) && has_line_numbers(points) => {
             let cause = "expected x, y and z, found numbers of the lines in the first column: leave \
                          it out, or name the columns in a first line, such as `n,x,y,z`";
             Err(FormatError::malformed(name, "columns", cause))
@@ -84,7 +94,7 @@ pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Vec<[f64; 3
                          commas: write decimal points, or semicolons between the columns";
             Err(FormatError::malformed(name, "columns", cause))
         }
-        _ => Ok(points),
+        _ => Ok(rows.cloud(unit)),
     }
 }
 
@@ -136,8 +146,7 @@ impl Layout {
             && n > AXES.len()
             && (0..).zip(&fields[1..]).all(|(i, field)| field.parse() == Ok(i));
         if is_numbered {
-            let (columns, unit_m) = ([1, 2, 3], [1.0; 3]);
-            return Ok((Self { separator, columns, unit_m, is_guessed: false }, true));
+            return Ok((Self::unnamed(separator, 1), true));
         }
         let is_header = fields.iter().all(|field| is_name(field));
         let names: Vec<_> = match is_header {
@@ -155,7 +164,10 @@ impl Layout {
         {
             let unit_m =
                 [x, y, z].map(|at| axis_named(names[at]).map_or(1.0, |(_, unit_m)| unit_m));
-            let layout = Self { separator, columns: [x, y, z], unit_m, is_guessed: false };
+            let place = |of: &str| names.iter().position(|name| name.eq_ignore_ascii_case(of));
+            let (intensity, unit) = intensity::find(place).unzip();
+            let columns = [x, y, z].into_iter().chain(intensity).collect();
+            let layout = Self { separator, columns, unit_m, unit, is_guessed: false };
             return Ok((layout, is_header));
         }
         if is_header {
@@ -167,27 +179,37 @@ impl Layout {
                  `{found}`"
             )));
         }
-        let (columns, is_guessed) = ([0, 1, 2], n > AXES.len());
-        Ok((Self { separator, columns, unit_m: [1.0; 3], is_guessed }, false))
+        Ok((Self { is_guessed: n > AXES.len(), ..Self::unnamed(separator, 0) }, false))
     }
 
-    fn point(&self, line: &Line<'_>, content: &str) -> Result<[f64; 3], FormatError> {
-        let mut point = [0.0; 3];
+    /// The layout of lines whose coordinates begin in the column `first`.
+    fn unnamed(separator: Separator, first: usize) -> Self {
+        let columns = (first..first + AXES.len()).collect();
+        Self { separator, columns, unit_m: [1.0; 3], unit: None, is_guessed: false }
+    }
+
+    /// Reads the numbers of a line into `row`. An intensity that is missing or not a number is NaN.
+    fn read(&self, line: &Line<'_>, content: &str, row: &mut Vec<f64>) -> Result<(), FormatError> {
+        row.clear();
+        row.resize(self.columns.len(), f64::NAN);
         let mut missing = AXES.len();
         for (i, field) in self.separator.fields(content).enumerate() {
-            if let Some(axis) = self.columns.iter().position(|&column| column == i) {
-                if self.separator != Separator::Letter(',') && field.contains(',') {
-                    let cause = "expected a decimal point, or commas between all columns, found";
-                    return Err(line.error(format!("{cause} `{}`", excerpt(field))));
-                }
-                point[axis] = line.number(field)? * self.unit_m[axis];
-                missing -= 1;
-                if missing == 0 {
-                    return Ok(point);
-                }
+            let Some(at) = self.columns.iter().position(|&column| column == i) else { continue };
+            if at >= AXES.len() {
+                row[at] = field.parse().unwrap_or(f64::NAN);
+                continue;
             }
+            if self.separator != Separator::Letter(',') && field.contains(',') {
+                let cause = "expected a decimal point, or commas between all columns, found";
+                return Err(line.error(format!("{cause} `{}`", excerpt(field))));
+            }
+            row[at] = line.number(field)? * self.unit_m[at];
+            missing -= 1;
         }
-        let expected = self.columns.iter().max().map_or(0, |last| last + 1);
+        if missing == 0 {
+            return Ok(());
+        }
+        let expected = self.columns[..AXES.len()].iter().max().map_or(0, |last| last + 1);
         let found = self.separator.fields(content).count();
         Err(line.error(format!("expected {expected} columns, found {found}")))
     }
@@ -235,7 +257,12 @@ fn is_name(field: &str) -> bool {
 
 impl Separator {
     fn in_line(content: &str) -> Self {
-        let letter = [';', ',', '\t'].into_iter().find(|&letter| content.contains(letter));
+        // Tabs between columns leave commas to the decimals.
+        let is_within = |field: &str| field.trim().contains('\t');
+        let letter = match [';', ',', '\t'].into_iter().find(|&letter| content.contains(letter)) {
+            Some(',') if content.split(',').any(is_within) => Some('\t'),
+            letter => letter,
+        };
         letter.map_or(Self::Blanks, Self::Letter)
     }
 

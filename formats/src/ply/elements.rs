@@ -43,7 +43,8 @@ pub fn read_elements(
     }
     // The rest of the file after the last wanted element is ignored.
     let end = choices.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
-    for (element, choice) in header.elements.iter().zip(choices.into_iter().take(end)) {
+    let last = header.elements.iter().rposition(|element| element.n > 0);
+    for (at, (element, choice)) in header.elements.iter().zip(choices).take(end).enumerate() {
         // Elements without properties take no line and no byte.
         if element.properties.is_empty() {
             continue;
@@ -53,6 +54,10 @@ pub fn read_elements(
         match header.encoding {
             Encoding::Ascii => read_ascii(&mut lines, element, &chosen, each)?,
             Encoding::Binary(order) => read_binary(lines.reader, element, &chosen, order, each)
+                .and_then(|()| match element.size().filter(|_| last == Some(at)) {
+                    Some(size) => records::check_end(lines.reader, size, element.n),
+                    None => Ok(()),
+                })
                 .map_err(|error| error_in(name, &format!("element {}", element.name), error))?,
         }
     }

@@ -54,6 +54,12 @@ impl Element {
         self.place(name).is_some()
     }
 
+    /// Whether the file has none of it.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.n == 0
+    }
+
     fn place(&self, name: &str) -> Option<usize> {
         self.properties.iter().position(|property| property.name.eq_ignore_ascii_case(name))
     }

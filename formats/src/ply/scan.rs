@@ -12,7 +12,7 @@ use std::path::Path;
 
 use super::elements::read_elements;
 use crate::error::FormatError;
-use crate::scan::{Attribute, ColumnSlot, Scan};
+use crate::scan::{Attribute, ColumnSlot, Scan, whole};
 
 /// Reads a scan, ASCII or binary, with properties in any order. Other properties are skipped.
 pub fn read_scan(path: &Path) -> Result<Scan, FormatError> {
@@ -69,12 +69,6 @@ impl Rows<'_> {
     }
 
     fn whole<T: TryFrom<u32>>(&self, at: usize) -> Result<Vec<T>, String> {
-        let most = 8 * size_of::<T>();
-        let whole = |x: f64| {
-            let is_u32 = x.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&x);
-            let fits = is_u32.then_some(x as u32).and_then(|n| T::try_from(n).ok());
-            fits.ok_or_else(|| format!("expected a whole number of {most} bits, found {x}"))
-        };
         self.column(at).map(whole).collect()
     }
 }

@@ -50,7 +50,7 @@ pub fn count_returns(path: &Path) -> Result<u64, FormatError> {
 pub fn read_turn(path: &Path, senders: &mut Senders) -> Result<(Scan, Counts), FormatError> {
     let mut turn = Turn::default();
     let is_data = |payload: &[u8]| Header::parse(payload).is_ok();
-    let counts = each_packet(path, senders, is_data, |payload| turn.take(payload))?;
+    let mut counts = each_packet(path, senders, is_data, |payload| turn.take(payload))?;
     // Rounding may lose a unit.
     if !turn.is_complete && turn.end() < f64::from(TURN) - 1.0 {
         let found = match turn.decoder {
@@ -64,6 +64,7 @@ pub fn read_turn(path: &Path, senders: &mut Senders) -> Result<(Scan, Counts), F
         );
         return Err(FormatError::malformed(path, "packets", cause));
     }
+    counts.missing = turn.n_missing();
     Ok((turn.points.scan(), counts))
 }
 
@@ -105,6 +106,7 @@ impl Turn {
                 *self = Self::default();
                 (start, time_us) = (0.0, 0.0);
             } else if start >= f64::from(TURN) {
+                self.stamps.insert(stamp);
                 self.is_complete = true;
                 return Ok(ControlFlow::Break(()));
             } else if start < 0.0 || time_us < 0.0 {
@@ -123,6 +125,16 @@ impl Turn {
             }
         })?;
         Ok(ControlFlow::Continue(()))
+    }
+
+    /// The number of packets that fit into the gaps between the times of the packets.
+    fn n_missing(&self) -> u64 {
+        let Some((last, ..)) = self.last else { return 0 };
+        let times = || self.stamps.iter().map(|(time_us, _)| f64::from(*time_us));
+        let steps = times().zip(times().skip(1)).map(|(from, to)| to - from);
+        let in_gap = |us: f64| ((us / last.duration_us()).round() as u64).saturating_sub(1);
+        // A longer step is from the end of an hour to its start.
+        steps.filter(|us| *us < LONGEST_STEP_US).map(in_gap).sum()
     }
 
     /// Azimuth units from the start of the first packet to the end of the last.

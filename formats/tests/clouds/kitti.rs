@@ -48,22 +48,35 @@ fn what_only_its_name_makes_kittis_must_make_sense() {
     let rings = format!("format: the fifth numbers look like rings of nuScenes: {remedy}");
     assert_eq!(read(None, &five), Err(rings.clone()));
     assert_eq!(read(Some(CloudFormat::Nuscenes), &five), Ok(100));
-    assert_eq!(read(Some(CloudFormat::Kitti), &five), Ok(125));
+    assert_eq!(read(Some(CloudFormat::Kitti), &five), Err(rings.clone()));
+    let timed: Vec<_> = (0..100u8).map(|i| [1.0, 2.0, 0.5, 0.25, 0.01 * f32::from(i)]).collect();
+    let timed: Vec<_> = timed.iter().map(|point| &point[..]).collect();
+    let times = format!("format: the fifth numbers are not whole, as rings are: {remedy}");
+    assert_eq!(read(Some(CloudFormat::Nuscenes), &timed), Err(times));
+    assert_eq!(read(Some(CloudFormat::Kitti), &timed), Ok(125));
     assert_eq!(read(None, &four), Ok(100));
     let three: Vec<_> = five.iter().map(|point| &point[..3]).collect();
     let negative = "format: the fourth numbers are negative, as intensities are not";
     assert_eq!(read(None, &three), Err(format!("{negative}: {remedy}")));
     let lost = [f32::NAN, f32::NAN, f32::NAN, 0.0];
     assert_eq!(read(None, &[&[1.0, 2.0, 3.0, 0.0], &lost]), Ok(2));
-    for (wrong, found) in [
-        ([1.0, f32::NAN, 3.0, 0.0], "[1.0, NaN, 3.0]"),
-        ([0.0, 1e5, 0.0, 0.0], "[0.0, 100000.0, 0.0]"),
+    let finite = "expected three finite numbers, or none for a lost return, found";
+    let millimetres = format!(": are they in millimetres? Scale them, or {remedy}");
+    for (wrong, cause) in [
+        (
+            [1.0, f32::NAN, 3.0, 0.0],
+            format!("{finite} [1.0, NaN, 3.0], of which NaN is no place: remove the point"),
+        ),
+        (
+            [1.0, f32::NEG_INFINITY, 3.0, 0.0],
+            format!("{finite} [1.0, -inf, 3.0], of which -inf is no place: remove the point"),
+        ),
+        (
+            [0.0, 1e5, 0.0, 0.0],
+            format!("expected metres from the sensor, found [0.0, 100000.0, 0.0]{millimetres}"),
+        ),
     ] {
-        let expected = format!(
-            "point 1: expected metres from the sensor, found {found}: are they in millimetres? \
-             Scale them, or {remedy}"
-        );
-        assert_eq!(read(None, &[&lost, &wrong]), Err(expected));
+        assert_eq!(read(None, &[&lost, &wrong]), Err(format!("point 1: {cause}")));
         assert_eq!(read(Some(CloudFormat::Kitti), &[&lost, &wrong]), Ok(2));
     }
     let folder = folder.path().display().to_string();

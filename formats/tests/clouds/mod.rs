@@ -1,4 +1,6 @@
 mod damaged;
+#[cfg(feature = "dataset")]
+mod intensities;
 mod kitti;
 mod las;
 mod npy;

@@ -78,6 +78,12 @@ fn what_is_no_cloud_is_refused_with_its_key() {
         error("a.npz", npz(&[("positions", cloud()), ("origin", short)])),
         "origin: expected three numbers"
     );
+    let offsets = npy("<i8", "False", "(3,)", &[0; 24]);
+    assert_eq!(
+        error("a.npz", npz(&[("points", cloud()), ("offsets", offsets)])),
+        "offsets: expected one cloud, found a packed set of 2 clouds: `edgepuck eval --data` \
+         classifies them, and in NumPy the first is points[offsets[0]:offsets[1]]"
+    );
     let promise = bytes_of(&format!("({MANY}, 3)"), &[1; 6]);
     assert_eq!(
         error("a.npz", npz(&[("points", promise)])),

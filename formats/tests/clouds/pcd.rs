@@ -125,6 +125,13 @@ fn what_is_no_cloud_is_refused() {
     assert_eq!(refuse(&ascii, b"1 2 3\n"), "line 10: the file ends after 1 of 2");
     let binary = with("POINTS 2\nDATA binary\n");
     assert_eq!(refuse(&binary, &[0; 23]), "points: the file ends after 1 of 2");
+    assert_eq!(refuse(&binary, &[0; 48]), "points: expected 2 by the header, found 4");
+    assert_eq!(read("a.pcd", pcd(&binary, &[0; 35])).len(), 2);
+    // The Point Cloud Library refuses it, too.
+    assert_eq!(
+        refuse(&with("WIDTH 3\nHEIGHT 2\nPOINTS 5\nDATA ascii\n"), b""),
+        "header: expected as many POINTS as WIDTH times HEIGHT, 6, found 5"
+    );
 }
 
 #[test]

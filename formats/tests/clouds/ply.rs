@@ -11,7 +11,7 @@ const BUSY: &str = "element camera 2\nproperty list uchar float pose\nproperty i
                     element tag 2\nproperty short tag\n\
                     element vertex 2\nproperty uchar red\nproperty double z\n\
                     property list uchar int neighbours\nproperty short y\nproperty float x\n\
-                    element face 1\nproperty list uchar int vertex_indices\n";
+                    element strip 1\nproperty list uchar int vertex_indices\n";
 
 #[test]
 fn text_is_read_by_its_properties() {
@@ -131,6 +131,16 @@ fn what_is_no_cloud_is_refused() {
     assert_eq!(rows(b"1 2 3\n4 5 up\n"), "line 10: expected a number, found `up`");
     assert_eq!(rows(b"1 2 3\n4 5\n"), "line 10: the number for property z is missing");
     assert_eq!(rows(b"1 2 3\n"), "line 10: the file ends after 1 of 2");
+    let vertices = |faces: usize, size: usize| {
+        let header =
+            format!("element vertex 2\n{XYZ}element face {faces}\nproperty list char int v\n");
+        ply("binary_little_endian", &header, &vec![0; size])
+    };
+    assert_eq!(read("a.ply", vertices(0, 35)).len(), 2);
+    let more = error("a.ply", vertices(0, 36));
+    assert_eq!(more, "element vertex: expected 2 by the header, found 3");
+    let mesh = error("a.ply", vertices(1, 29));
+    assert_eq!(mesh, "element face: expected a cloud, found a mesh: scan it first");
     let list = format!("element vertex 1\nproperty list char int n\n{XYZ}");
     let negative = ply("binary_big_endian", &list, &[0xff; 40]);
     assert_eq!(error("a.ply", negative), "element vertex: the list n has length -1");

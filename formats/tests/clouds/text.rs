@@ -134,6 +134,12 @@ fn what_is_no_cloud_is_refused_with_its_line() {
             "1,5;2,5;3,5\n",
             "line 1: expected a decimal point, or commas between all columns, found `1,5`",
         ),
+        (
+            "17,5\t209,8\t2,1\n",
+            "line 1: expected a decimal point, or commas between all columns, found `17,5`",
+        ),
+        ("1 2 3\n4;5\t6 7 8\n", "line 2: expected a number, found `4;5`"),
+        ("x;y;z\n1;2\t3;4\n", "line 2: expected a number, found `2\\t3`"),
         ("1\t2\t\t3\n", "line 1: expected a number, found ``"),
         (
             "x,y,intensity\n1,2,3\n",

@@ -11,7 +11,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use crate::live::{EgoMotion, Flaw, LiveOptions, Pipeline, Recorder, Timeline};
+use crate::live::{Counts, EgoMotion, Flaw, LiveOptions, Pipeline, Recorder, Timeline};
 use crate::{Classifier, Options, Precision};
 use formats::FormatError;
 use formats::ouster::Metadata;
@@ -199,7 +199,12 @@ pub fn run(args: &LiveArgs) -> anyhow::Result<Outcome> {
     if !args.stats && read.capture.first_unread.is_some() {
         eprintln!("warning: {}{} UDP packets{}", args.capture(), read.n_packets, read.capture);
     }
-    if pipeline.counts().packets == 0 {
+    let Counts { packets, lost, .. } = *pipeline.counts();
+    if !args.stats && lost > 0 {
+        let of = packets + lost;
+        eprintln!("warning: {}{lost} of {of} packets are probably missing", args.capture());
+    }
+    if packets == 0 {
         let cause = format!(
             "{}expected packets of {}, found none among {} UDP packets{}{}",
             args.capture(),
