@@ -105,7 +105,7 @@ pub(crate) fn run(args: &DetectArgs) -> anyhow::Result<Outcome> {
     let outlines: Vec<_> = objects
         .iter()
         .map(|object| {
-            let [a, b, c, d, ..] = corners(&object.place);
+            let [a, b, c, d, ..] = corners(&object.whole);
             Outline {
                 corners: [a, b, c, d].map(|corner| corner.truncate().to_array()),
                 class: &object.class,
@@ -124,14 +124,47 @@ pub(crate) fn run(args: &DetectArgs) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-/// The classes of streets, KITTI's types for them, and their colours in pictures.
-const STREET: [(&str, &str, RGBColor); 5] = [
-    ("bus", "Misc", RGBColor(0, 90, 210)),
-    ("car", "Car", RGBColor(210, 20, 40)),
-    ("person", "Pedestrian", RGBColor(0, 140, 60)),
-    ("truck", "Truck", RGBColor(220, 110, 0)),
-    ("two-wheeler", "Cyclist", RGBColor(150, 30, 180)),
+/// A class of streets.
+#[derive(Clone, Copy)]
+struct StreetClass {
+    name: &'static str,
+    /// KITTI's type for it.
+    kitti: &'static str,
+    /// The usual length and width, metres: the anchors of OpenPCDet's configurations for KITTI
+    /// (pointpillar.yaml), and for trucks and buses those for nuScenes (cbgs_pp_multihead.yaml).
+    usual_m: [f32; 2],
+    /// Its colour in pictures.
+    tint: RGBColor,
+}
+
+const STREET: [StreetClass; 5] = [
+    StreetClass { name: "bus", kitti: "Misc", usual_m: [10.5, 2.94], tint: RGBColor(0, 90, 210) },
+    StreetClass { name: "car", kitti: "Car", usual_m: [3.9, 1.6], tint: RGBColor(210, 20, 40) },
+    StreetClass {
+        name: "person",
+        kitti: "Pedestrian",
+        usual_m: [0.8, 0.6],
+        tint: RGBColor(0, 140, 60),
+    },
+    StreetClass {
+        name: "truck",
+        kitti: "Truck",
+        usual_m: [6.93, 2.51],
+        tint: RGBColor(220, 110, 0),
+    },
+    StreetClass {
+        name: "two-wheeler",
+        kitti: "Cyclist",
+        usual_m: [1.76, 0.6],
+        tint: RGBColor(150, 30, 180),
+    },
 ];
+
+impl StreetClass {
+    fn named(name: &str) -> Option<Self> {
+        STREET.into_iter().find(|class| class.name == name)
+    }
+}
 
 /// Detects and classifies objects in sweeps.
 pub struct Detector {
@@ -197,7 +230,7 @@ impl Detector {
                 None => found.n_other += 1,
                 Some(answer) => {
                     let cloud = positions(&scan.positions, cluster.points);
-                    found.objects.push(Object::new(number, &answer, &cloud));
+                    found.objects.push(Object::new(number, &answer, &cloud, cluster.ground_z_m));
                 }
             }
         }
@@ -239,42 +272,48 @@ pub struct Object {
     pub confidence: f64,
     /// The number of its points.
     pub n_points: usize,
-    /// The box around it.
+    /// The box around its points.
     pub place: OrientedBox,
+    /// The box of the whole object, by the usual size of its class; the same as `place` for other
+    /// classes than those of streets.
+    pub whole: OrientedBox,
 }
 
 impl Object {
-    /// The object in the cluster `number`, of the points `cloud`.
-    fn new(number: u32, answer: &Prediction, cloud: &[[f32; 3]]) -> Self {
+    /// The object in the cluster `number`, of the points `cloud`, on ground of this height.
+    fn new(number: u32, answer: &Prediction, cloud: &[[f32; 3]], ground_z_m: Option<f32>) -> Self {
+        let (class, place) = (answer.label.to_string(), OrientedBox::around(cloud));
+        let usual = StreetClass::named(&class);
         Self {
             cluster: number,
-            class: answer.label.to_string(),
+            whole: usual.map_or(place, |usual| place.completed(usual.usual_m, ground_z_m)),
+            class,
             class_number: answer.class,
             confidence: answer.confidence(),
             n_points: cloud.len(),
-            place: OrientedBox::around(cloud),
+            place,
         }
-    }
-
-    /// Its line in [`STREET`].
-    fn known(&self) -> Option<(&'static str, &'static str, RGBColor)> {
-        STREET.into_iter().find(|(class, ..)| *class == self.class)
     }
 
     /// The colour of its class.
     fn tint(&self) -> RGBColor {
         let of_number = tint(Label::Cluster(self.class_number as u32));
-        self.known().map_or(of_number, |(.., tint)| tint)
+        StreetClass::named(&self.class).map_or(of_number, |class| class.tint)
     }
 
     fn json(&self) -> Value {
-        let OrientedBox { centre_m, size_m, yaw_rad } = self.place;
+        let of = |place: &OrientedBox| {
+            let OrientedBox { centre_m, size_m, yaw_rad } = place;
+            json!({ "centre_m": centre_m, "size_m": size_m, "yaw_deg": yaw_rad.to_degrees() })
+        };
+        let [x, y, _] = self.place.centre_m;
         json!({
             "class": self.class,
             "confidence": self.confidence,
             "points": self.n_points,
-            "range_m": centre_m[0].hypot(centre_m[1]),
-            "box": { "centre_m": centre_m, "size_m": size_m, "yaw_deg": yaw_rad.to_degrees() },
+            "range_m": x.hypot(y),
+            "box": of(&self.place),
+            "whole_box": of(&self.whole),
         })
     }
 }

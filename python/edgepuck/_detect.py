@@ -33,6 +33,12 @@ class Detection:
     """The length, width and height of the box, metres, [3]."""
     yaw_deg: float
     """The rotation of the box about the z axis, counterclockwise from x, degrees."""
+    whole_centre: list[float]
+    """The centre of the box of the whole object, by the usual size of its class, metres, [3]."""
+    whole_size: list[float]
+    """The length, width and height of that box, metres, [3]."""
+    whole_yaw_deg: float
+    """The rotation of that box, degrees; front and rear are not told apart."""
 
 
 def detect(

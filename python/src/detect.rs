@@ -39,14 +39,16 @@ pub fn detect<'py>(
 }
 
 fn told<'py>(py: Python<'py>, object: &Object, indices: Vec<u32>) -> PyResult<Bound<'py, PyDict>> {
-    let OrientedBox { centre_m, size_m, yaw_rad } = object.place;
     let told = PyDict::new(py);
     told.set_item("label", &object.class)?;
     told.set_item("confidence", object.confidence)?;
     told.set_item("points", object.n_points)?;
     told.set_item("indices", indices.into_pyarray(py))?;
-    told.set_item("centre", centre_m)?;
-    told.set_item("size", size_m)?;
-    told.set_item("yaw_deg", yaw_rad.to_degrees())?;
+    for (prefix, of) in [("", object.place), ("whole_", object.whole)] {
+        let OrientedBox { centre_m, size_m, yaw_rad } = of;
+        told.set_item(format!("{prefix}centre"), centre_m)?;
+        told.set_item(format!("{prefix}size"), size_m)?;
+        told.set_item(format!("{prefix}yaw_deg"), yaw_rad.to_degrees())?;
+    }
     Ok(told)
 }

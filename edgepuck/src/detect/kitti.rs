@@ -9,7 +9,7 @@ use sim_gpu::glam;
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
-use super::{Object, STREET, corners};
+use super::{Object, StreetClass, corners};
 
 /// The most that products of a rotation's rows may be off: KITTI rounds to 7 digits, others to 3.
 const NOT_A_ROTATION: f64 = 0.01;
@@ -105,8 +105,8 @@ fn rotation(text: &str, key: &'static str, columns: usize) -> Result<DMat4, Flaw
 /// The line of an object: type, truncation, occlusion, alpha, left, top, right, bottom, height,
 /// width, length, x, y, z, rotation and score, in the frame of `camera` or else the sensor's.
 pub fn label(object: &Object, camera: Option<&Camera>) -> String {
-    let bounds = camera.and_then(|camera| camera.bounds(corners(&object.place)));
-    let about = line(&object.class, [-1.0, -1.0], bounds, &object.place, camera);
+    let bounds = camera.and_then(|camera| camera.bounds(corners(&object.whole)));
+    let about = line(&object.class, [-1.0, -1.0], bounds, &object.whole, camera);
     format!("{about} {:.4}\n", object.confidence)
 }
 
@@ -119,8 +119,8 @@ pub fn line(
     place: &OrientedBox,
     camera: Option<&Camera>,
 ) -> String {
-    let known = STREET.into_iter().find(|(known, ..)| *known == class);
-    let kind = known.map_or(class, |(_, kind, _)| kind).replace(char::is_whitespace, "_");
+    let kind = StreetClass::named(class).map_or(class, |known| known.kitti);
+    let kind = kind.replace(char::is_whitespace, "_");
     let [length, width, height] = place.size_m.map(f64::from);
     let yaw_rad = f64::from(place.yaw_rad);
     let base = DVec3::from(place.centre_m.map(f64::from)) - 0.5 * height * DVec3::Z;
@@ -152,7 +152,15 @@ mod tests {
     fn object(class: &str, centre_m: [f32; 3]) -> Object {
         let place = OrientedBox { centre_m, size_m: [4.0, 2.0, 1.0], yaw_rad: 0.0 };
         let (class, class_number) = (class.to_owned(), 0);
-        Object { cluster: 0, class, class_number, confidence: 0.875, n_points: 50, place }
+        Object {
+            cluster: 0,
+            class,
+            class_number,
+            confidence: 0.875,
+            n_points: 50,
+            place,
+            whole: place,
+        }
     }
 
     #[test]

@@ -1,10 +1,12 @@
 //! `cargo xtask bench frames`: what `edgepuck detect` finds in whole sweeps of real
 //! sensors whose objects are labelled.
 
+mod boxes;
 mod mounting;
 
 use crate::table::{Table, percent, publish};
 use anyhow::{Context, Result, bail};
+use boxes::BoxError;
 use clap::Args;
 use edgepuck_program::detect::{Detections, Detector, LEAST_CONFIDENCE, Object};
 use edgepuck_segment::Label;
@@ -89,6 +91,8 @@ struct Asked {
     range_m: f64,
     n_points: usize,
     outcome: String,
+    /// If it was named: of the box around its points, and of the whole.
+    errors: Option<[BoxError; 2]>,
 }
 
 /// A named cluster without a label of its name.
@@ -129,7 +133,9 @@ pub fn run(args: &FramesArgs) -> Result<()> {
         let alarms: Vec<_> = judged.iter().flat_map(Judged::false_alarms).collect();
         curve.push(point_of_curve(confidence, &asked, &alarms, &sources));
         if confidence == LEAST_CONFIDENCE {
-            tables = vec![summary(&asked, &alarms, &sources), misses(&asked), alarm_table(&alarms)];
+            let boxes = boxes::table(&asked);
+            let [misses, alarms_told] = [misses(&asked), alarm_table(&alarms)];
+            tables = vec![summary(&asked, &alarms, &sources), boxes, misses, alarms_told];
         }
     }
     tables.insert(1.min(tables.len()), curve);
@@ -208,11 +214,15 @@ impl Judged {
             let (Some(class), true) = (class, self.is_judged([x, y])) else { continue };
             let inside = self.points_in(one, 0.0);
             if inside.len() >= MIN_POINTS {
-                let outcome = self.outcome(one, class, &inside);
+                let (outcome, object) = self.outcome(one, class, &inside);
+                let of = |object: &Object| {
+                    [object.place, object.whole].map(|place| BoxError::of(&place, one))
+                };
+                let errors = object.map(of);
                 let n_points = inside.len();
                 let (frame, source) = (self.name.clone(), self.source);
                 let range_m = x.hypot(y);
-                asked.push(Asked { frame, source, class, range_m, n_points, outcome });
+                asked.push(Asked { frame, source, class, range_m, n_points, outcome, errors });
             }
         }
         asked
@@ -222,8 +232,14 @@ impl Judged {
         (0..self.points.len()).filter(|&i| one.contains(self.points[i], margin_m)).collect()
     }
 
-    /// The outcome of the object in `one`, with the points `inside`.
-    fn outcome(&self, one: &LabelledBox, class: &str, inside: &[usize]) -> String {
+    /// The outcome of the object in `one`, with the points `inside`, and what was found of it if that
+    /// is named rightly.
+    fn outcome(
+        &self,
+        one: &LabelledBox,
+        class: &str,
+        inside: &[usize],
+    ) -> (String, Option<&Object>) {
         let labels = &self.found.labels;
         let standing: Vec<_> =
             inside.iter().map(|&i| labels[i]).filter(|label| *label != Label::Ground).collect();
@@ -235,16 +251,16 @@ impl Judged {
             .collect();
         clusters.sort_unstable();
         let largest = clusters.chunk_by(|a, b| a == b).max_by_key(|chunk| chunk.len());
-        let Some(largest) = largest else { return NOT_CUT.to_owned() };
+        let Some(largest) = largest else { return (NOT_CUT.to_owned(), None) };
         let (within, all) = self.shared(largest[0], one);
         let holds = largest.len() as f64 >= SHARE * standing.len() as f64;
         if !holds || (within as f64) < SHARE * all as f64 {
-            return NOT_CUT.to_owned();
+            return (NOT_CUT.to_owned(), None);
         }
         match self.found.objects.iter().find(|object| object.cluster == largest[0]) {
-            None => "unknown".to_owned(),
-            Some(object) if object.class == class => NAMED.to_owned(),
-            Some(object) => format!("called {}", object.class),
+            None => ("unknown".to_owned(), None),
+            Some(object) if object.class == class => (NAMED.to_owned(), Some(object)),
+            Some(object) => (format!("called {}", object.class), None),
         }
     }
 
