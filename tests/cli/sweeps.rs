@@ -73,6 +73,17 @@ fn a_sweep_is_cut_and_its_clusters_are_named() {
         assert!((0.0..=1.0).contains(&object["confidence"].as_f64().unwrap()));
         let size: Vec<f64> = serde_json::from_value(object["box"]["size_m"].clone()).unwrap();
         assert!(size[0] >= size[1] && size[0] < 30.0, "{object}");
+        let whole: Vec<f64> =
+            serde_json::from_value(object["whole_box"]["size_m"].clone()).unwrap();
+        let usual = match object["class"].as_str().unwrap() {
+            "car" => [3.9, 1.6],
+            "person" => [0.8, 0.6],
+            "truck" => [6.93, 2.51],
+            "bus" => [10.5, 2.94],
+            _ => [1.76, 0.6],
+        };
+        assert!((0..2).all(|i| whole[i] >= usual[i] - 1e-6), "{object}");
+        assert!(whole[0] >= size[1] && whole[0] * whole[1] >= size[0] * size[1], "{object}");
     }
     assert!(folder.bytes("objects.png").starts_with(b"\x89PNG"));
 
@@ -84,7 +95,8 @@ fn a_sweep_is_cut_and_its_clusters_are_named() {
     for (line, object) in labels.lines().zip(confident.clone()) {
         let words: Vec<&str> = line.split(' ').collect();
         assert_eq!(words.len(), 16, "{line}");
-        let centre: Vec<f64> = serde_json::from_value(object["box"]["centre_m"].clone()).unwrap();
+        let centre: Vec<f64> =
+            serde_json::from_value(object["whole_box"]["centre_m"].clone()).unwrap();
         let x: f64 = words[11].parse().unwrap();
         assert!((x - centre[0]).abs() <= 0.005 + 1e-9, "{line}: {object}");
     }
