@@ -40,13 +40,14 @@ impl BrightnessArgs {
             let sweep = sweep.display();
             anyhow::bail!("{sweep}: point {i}: expected an intensity of 0 or more, found {found}");
         }
-        if self.white.is_none()
-            && let Some(most) = intensities.iter().copied().reduce(f32::max)
-            && most > 2.55
-        {
-            let sweep = sweep.display();
-            let cause =
-                format!("{sweep}: expected intensities around 0 to 1, found {most}: give --white");
+        let most = intensities.iter().copied().fold(0.0, f32::max);
+        let (sweep, expected) = (sweep.display(), "expected intensities around 0 to");
+        if self.white.is_none() && most > 2.55 {
+            let cause = format!("{sweep}: {expected} 1, found {most}: give --white");
+            return Err(Usage(cause).into());
+        }
+        if self.white.is_some() && most > 0.0 && white > 255.0 * most {
+            let cause = format!("{sweep}: {expected} {white} by --white, found {most} at most");
             return Err(Usage(cause).into());
         }
         Ok(intensities.iter().map(|intensity| intensity / white).collect())

@@ -101,6 +101,10 @@ fn what_cannot_be_weathered_is_refused() {
             ("weather cloud.xyz --out a.npz", "expected one of --rain, --snow, --fog and --haze"),
             ("weather cloud.xyz --rain 5 --out a.npz", "have no intensity: give --reflectivity"),
             ("weather cloud.csv --rain 5 --out a.npz", "around 0 to 1, found 255: give --white"),
+            (
+                "weather cloud.csv --rain 5 --white 65535 --out a.npz",
+                "cloud.csv: expected intensities around 0 to 65535 by --white, found 255 at most",
+            ),
             ("weather cloud.xyz --rain -1 --out a.npz", "rain_mm_h: expected a number within"),
             ("weather cloud.xyz --rain nan --out a.npz", "rain_mm_h: expected a number within"),
             ("weather cloud.xyz --fog 0 --out a.npz", "fog_visibility_m: expected a number within"),
