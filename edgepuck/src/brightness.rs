@@ -1,4 +1,5 @@
 use crate::Usage;
+use crate::flags::first_given;
 use formats::Scan;
 use sim_gpu::internals::config::within;
 use std::path::Path;
@@ -16,6 +17,12 @@ pub struct BrightnessArgs {
 }
 
 impl BrightnessArgs {
+    /// A flag that was given.
+    pub fn given(&self) -> Option<&'static str> {
+        let [white, reflectivity] = [self.white, self.reflectivity].map(|given| given.is_some());
+        first_given(&[(white, "--white"), (reflectivity, "--reflectivity")])
+    }
+
     pub fn check(&self) -> Result<(), Usage> {
         within("--reflectivity", self.reflectivity, 0.0..=1.0)
             .map_err(|error| Usage(error.to_string()))

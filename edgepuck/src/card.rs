@@ -1,4 +1,5 @@
 use crate::Outcome;
+use crate::flags::dataset_folder;
 use anyhow::Context;
 use edgepuck_dataset::{Publication, publish};
 use std::path::PathBuf;
@@ -37,11 +38,12 @@ pub struct CardArgs {
 
 pub fn run(args: &CardArgs) -> anyhow::Result<Outcome> {
     let CardArgs { folder, name, license, url, creator, published, overwrite } = args.clone();
+    let folder = dataset_folder(&folder);
     let full = folder.canonicalize().with_context(|| folder.display().to_string())?;
     let own_name = || full.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let name = name.unwrap_or_else(own_name);
     let publication = Publication { name, license, url, creator, published };
-    for file in publish(&folder, &publication, overwrite)? {
+    for file in publish(folder, &publication, overwrite)? {
         eprintln!("{}", file.display());
     }
     Ok(Outcome::Success)

@@ -1,7 +1,7 @@
 //! Flags of effects, for the commands that scan meshes.
 
 use crate::Usage;
-use crate::flags::first_given;
+use crate::flags::{first_given, of_flag};
 use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel, Quantum};
 use sim_gpu::internals::config::{self, InvalidValue};
 use std::path::PathBuf;
@@ -65,7 +65,7 @@ impl EffectFlags {
             intensity,
             ..Effects::default()
         };
-        effects.validate().map_err(|error| Usage(error.to_string()))?;
+        effects.validate().map_err(of_flag)?;
         Ok(effects)
     }
 

@@ -1,6 +1,8 @@
 //! Checks and parsers for flags of several commands.
 
 use crate::Usage;
+use sim_gpu::internals::config::InvalidValue;
+use std::path::Path;
 
 /// Checks that this program can simplify meshes, if that is `wanted`.
 pub fn need_simplification(wanted: bool) -> Result<(), Usage> {
@@ -8,9 +10,9 @@ pub fn need_simplification(wanted: bool) -> Result<(), Usage> {
         return Ok(());
     }
     Err(Usage(
-        "--simplify: this program was built without mesh simplification; released programs have \
-         it, and `cargo install --path edgepuck --features simplify` builds it, which takes a C++ \
-         compiler"
+        "--simplify: this program was built without mesh simplification, which the programs of \
+         the releases page have; in a checkout, `cargo install --path edgepuck --features \
+         simplify` builds it, with a C++ compiler"
             .to_owned(),
     ))
 }
@@ -18,6 +20,38 @@ pub fn need_simplification(wanted: bool) -> Result<(), Usage> {
 /// The first of these flags that was given.
 pub fn first_given(flags: &[(bool, &'static str)]) -> Option<&'static str> {
     flags.iter().find(|(is_given, _)| *is_given).map(|(_, flag)| *flag)
+}
+
+/// The beginnings of keys in files, and the flags for the same values.
+const FLAGS: [(&str, &str); 11] = [
+    ("views.distance", "--distance"),
+    ("views.elevation", "--elevation"),
+    ("views.azimuth_jitter", "--azimuth-jitter"),
+    ("effects.noise.sigma", "--noise"),
+    ("effects.noise.mean", "--noise-mean"),
+    ("effects.dropout", "--dropout"),
+    ("effects.quantise", "--quantise"),
+    ("effects.weather.rain", "--rain"),
+    ("effects.weather.snow", "--snow"),
+    ("effects.weather.fog", "--fog"),
+    ("effects.weather.haze", "--haze"),
+];
+
+/// The error of a value that came from a flag, which names the flag.
+pub fn of_flag(InvalidValue { key, cause }: InvalidValue) -> Usage {
+    let flag = FLAGS.iter().find(|(beginning, _)| key.starts_with(beginning));
+    Usage(format!("{}: {cause}", flag.map_or(&*key, |(_, flag)| flag)))
+}
+
+/// The folder of a dataset, which may be named by its manifest.
+pub fn dataset_folder(named: &Path) -> &Path {
+    let is_manifest = named.is_file()
+        && ["manifest.json", "dataset.json"].iter().any(|name| named.ends_with(name));
+    match named.parent().filter(|_| is_manifest) {
+        Some(here) if here.as_os_str().is_empty() => Path::new("."),
+        Some(folder) => folder,
+        None => named,
+    }
 }
 
 /// Parses a finite number.

@@ -89,6 +89,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let style = ProgressStyle::with_template("{bar:40} {pos}/{len} scenes, {per_sec}, {eta} left")?;
     let bar = ProgressBar::new(args.sweeps.into()).with_style(style);
     let mut n_points = 0;
+    let mut stand = vec![false; stage.recipe().object.len()];
     let packed = args.out.join("packed");
     // Saved sweeps are complete, one by one; of packed clusters, only all are.
     let begun = UnfinishedFolder::begin(&packed);
@@ -97,6 +98,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let counts = generate(&stage, &Settings::default(), args.sweeps, &packed, |done| {
         bar.inc(1);
         n_points += done.sweep.points().len();
+        done.scene.objects.iter().for_each(|object| stand[object.entry] = true);
         if done.scene.number == 0 {
             let LabelledScene { sweep, labels, .. } = done;
             let tints: Vec<_> = labels.iter().map(|&label| segment::tint(label)).collect();
@@ -128,6 +130,12 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     writeln!(out, "{:<16} {:>9} {:>9}", "class", "train", "test")?;
     for ((class, train), test) in stage.classes().iter().zip(&counts.train).zip(&counts.test) {
         writeln!(out, "{class:<16} {train:>9} {test:>9}")?;
+    }
+    for (i, object) in stage.recipe().object.iter().enumerate().filter(|(i, _)| !stand[*i]) {
+        eprintln!(
+            "warning: object[{i}]: no scene has a {}: does it fit there, and is its count above 0?",
+            object.class
+        );
     }
     if counts.test.iter().all(|n| *n == 0) {
         eprintln!("warning: no cluster is in the test part, which has every tenth of --sweeps");

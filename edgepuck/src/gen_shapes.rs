@@ -1,8 +1,9 @@
 //! `edgepuck gen-shapes`: writes procedural shapes as mesh files.
 
-use crate::Outcome;
+use crate::{Outcome, Usage};
 use anyhow::Context;
 use edgepuck_shapes as shapes;
+use formats::atomic::UnfinishedFolder;
 use formats::outputs::Overwrite;
 use std::path::{Path, PathBuf};
 
@@ -35,6 +36,9 @@ pub const TRAIN_PER_CLASS: u32 = 40;
 pub const TEST_PER_CLASS: u32 = 10;
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
+    if args.train == 0 && args.test == 0 {
+        return Err(Usage("--train and --test: expected a number above 0".to_owned()).into());
+    }
     let classes = shapes::ShapeClass::ALL.map(|class| args.out.join(class.name()));
     let is_shape = |file: &Path| {
         // CLASS/SPLIT/CLASS_NUMBER.off
@@ -45,8 +49,10 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
             && number.is_some_and(|number| number.parse::<u32>().is_ok())
     };
     args.overwrite.clear(classes.iter().map(PathBuf::as_path), is_shape)?;
+    let begun = classes.map(|class| UnfinishedFolder::begin(&class));
     shapes::write_tree(&args.out, args.seed, args.train, args.test)
         .context("cannot write the shapes")?;
+    begun.into_iter().for_each(UnfinishedFolder::finish);
     let classes = shapes::ShapeClass::ALL.len() as u32;
     let meshes = classes * (args.train + args.test);
     eprintln!("{meshes} meshes of {classes} classes: {}", args.out.display());

@@ -1,3 +1,4 @@
+use crate::flags::dataset_folder;
 use crate::{Outcome, gen_dataset};
 use edgepuck_dataset::merge;
 use std::path::PathBuf;
@@ -14,7 +15,8 @@ pub struct Args {
 }
 
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
-    let manifest = merge(&args.shards, &args.out)?;
+    let folders = args.shards.iter().map(|shard| dataset_folder(shard).to_path_buf());
+    let manifest = merge(&folders.collect::<Vec<_>>(), &args.out)?;
     eprintln!("{} meshes: {}", manifest.meshes.len(), args.out.display());
     if manifest.adapters.len() > 1 {
         eprintln!(

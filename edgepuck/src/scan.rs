@@ -170,7 +170,7 @@ fn scene(args: &Args) -> anyhow::Result<(Scene, String)> {
         return Ok((scene_of_meshes(args)?, args.inputs[0].display().to_string()));
     }
     let file = match &args.inputs[..] {
-        [] => write_default_scene()?,
+        [] => Path::new(DEFAULT_SCENE).join(edgepuck_assets::DEFAULT_SCENE[0].0),
         [scene] => scene.clone(),
         [_, ..] => {
             let other = args.inputs.iter().find(|file| !is_mesh(file));
@@ -194,6 +194,9 @@ fn scene(args: &Args) -> anyhow::Result<(Scene, String)> {
         let cause =
             format!("{flag} applies to scans of meshes: {what} is a scene, which states it");
         return Err(Usage(cause).into());
+    }
+    if args.inputs.is_empty() {
+        write_default_scene()?;
     }
     let mut scene = SceneFile::load(&file)?;
     scene.simplify = args.simplify.or(scene.simplify);
@@ -280,17 +283,16 @@ fn told(scene: &Scene, scan: &Scan) -> String {
 
 const DEFAULT_SCENE: &str = "data/default-scene";
 
-/// Writes the default scene and its mesh, unless they are there, and returns the scene's file.
-fn write_default_scene() -> anyhow::Result<PathBuf> {
-    let file = |path: &str| Path::new(DEFAULT_SCENE).join(path);
+/// Writes the default scene and its mesh, unless they are there.
+fn write_default_scene() -> anyhow::Result<()> {
     for (path, text) in edgepuck_assets::DEFAULT_SCENE {
-        if !file(path).exists() {
-            atomic::write_bytes(&file(path), text)?;
+        let file = Path::new(DEFAULT_SCENE).join(path);
+        if !file.exists() {
+            atomic::write_bytes(&file, text)?;
         }
     }
-    let scene = file(edgepuck_assets::DEFAULT_SCENE[0].0);
-    eprintln!("No scene was named: scanning {}.", scene.display());
-    Ok(scene)
+    eprintln!("No scene was named: scanning that of {DEFAULT_SCENE}.");
+    Ok(())
 }
 
 /// Gives the sensors the beam geometry of their packets, and the scans the attributes that packets

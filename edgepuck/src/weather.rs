@@ -1,4 +1,5 @@
 use crate::brightness::BrightnessArgs;
+use crate::flags::of_flag;
 use crate::points::SweepArgs;
 use crate::{Outcome, Usage};
 use formats::Scan;
@@ -42,7 +43,7 @@ pub struct WeatherArgs {
     /// Model of the fog's returns: `physical`, by the scattered power, or `hahner`, in proportion
     /// to the return of the surface behind the fog, as in the simulation of Hahner et al. (ICCV
     /// 2021)
-    #[arg(long, value_name = "MODEL", default_value = "physical")]
+    #[arg(long, value_name = "MODEL", default_value = "physical", requires = "fog")]
     fog_model: FogModel,
 
     /// Haze with this visibility, metres
@@ -63,21 +64,21 @@ pub struct WeatherArgs {
 }
 
 pub fn run(args: &WeatherArgs) -> anyhow::Result<Outcome> {
-    let usage = |error: &dyn std::fmt::Display| Usage(error.to_string());
     let format = ScanFormat::of_path(&args.out)?;
     if format == ScanFormat::Pcap {
         let cause = "--out: expected .npz, .ply, .csv or .pcd, as packets hold a sensor's ranges";
         return Err(Usage(cause.to_owned()).into());
     }
     let weather = args.weather();
-    weather.validate().map_err(|error| usage(&error))?;
+    weather.validate().map_err(of_flag)?;
     if weather.is_clear() {
-        return Err(Usage("expected one of --rain, --snow, --fog and --haze".to_owned()).into());
+        let cause = "expected one of --rain, --snow, --fog and --haze, above 0";
+        return Err(Usage(cause.to_owned()).into());
     }
     args.brightness.check()?;
     let sensor = SensorProfile::resolve(&args.profile)?;
     let asked = Effects { weather: Some(Box::new(weather.clone())), ..Effects::default() };
-    let effects = asked.for_sensor(&sensor).map_err(|error| usage(&error))?;
+    let effects = asked.for_sensor(&sensor).map_err(|error| Usage(error.to_string()))?;
     let limit = effects.detection.and_then(|detection| detection.limit);
     let limit = limit.expect("invariant: weather needs a detection limit");
 
@@ -92,6 +93,10 @@ pub fn run(args: &WeatherArgs) -> anyhow::Result<Outcome> {
     write_scan(&args.out, format, Hashing::None, &changed)?;
     report(&fates, &changed);
     eprintln!("{} points: {}", changed.len(), args.out.display());
+    if changed.is_empty() {
+        eprintln!("warning: no point is left: expected milder weather, or another --profile");
+        return Ok(Outcome::SomeRefused);
+    }
     Ok(Outcome::Success)
 }
 

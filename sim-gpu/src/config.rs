@@ -139,6 +139,7 @@ pub(crate) fn one_of(word: &str, known: &[&str]) -> String {
 
 /// `; did you mean "noise"?` if one of `known` is close to `word`, and nothing otherwise.
 pub(crate) fn did_you_mean<'a>(word: &str, known: impl Iterator<Item = &'a str>) -> String {
+    let word = &*word.to_lowercase();
     // As clap and git: at most a third of the word is wrong, or its unit is missing.
     let distance = |known: &&str| match known.strip_prefix(word) {
         Some(unit) if unit.starts_with('_') => 0,

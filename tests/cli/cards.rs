@@ -27,6 +27,10 @@ fn a_dataset_of_either_form_has_a_card_and_metadata() {
         assert_eq!(metadata["license"], "https://spdx.org/licenses/CC-BY-4.0.html");
         assert_eq!(metadata["distribution"][0]["contentUrl"], manifest);
         folder.succeeds(&format!("gen-dataset --verify {out}"));
+        // A dataset may be named by its manifest.
+        let said = folder.succeeds(&format!("card {out}/{manifest} {PUBLICATION} --overwrite"));
+        assert!(said.starts_with(&format!("{out}/README.md")), "{said}");
+        folder.succeeds(&format!("gen-dataset --verify {out}/{manifest}"));
     }
 }
 

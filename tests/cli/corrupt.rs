@@ -157,7 +157,7 @@ fn corruptions_of_one_s_own_and_what_is_refused() {
     let own = "[[sweep]]\nname = \"gone\"\nby = \"all is lost\"\n\
                severity = [{ dirty-window = { transmission = 0 } }]\n";
     folder.write("own.toml", own);
-    folder.succeeds("corrupt cloud.xyz --reflectivity 1 --plan own.toml --out out");
+    folder.exits(3, "corrupt cloud.xyz --reflectivity 1 --plan own.toml --out out");
     assert!(folder.scan("out/gone-1.npz").is_empty());
     folder.write("typo.toml", own.replace("transmission", "transmision"));
     folder.write("many.toml", own.replace("= 0 }", "= 2 }"));
@@ -191,6 +191,11 @@ fn corruptions_of_one_s_own_and_what_is_refused() {
             ),
             ("corrupt cloud.xyz", "its points have no intensity: give --reflectivity"),
             ("corrupt cloud.xyz --reflectivity 1 --only fgo", "expected some of fog, wet-ground"),
+            (
+                "corrupt cloud.xyz --views 2",
+                "--views applies to a folder of meshes only: cloud.xyz",
+            ),
+            ("corrupt empty --white 2", "--white applies to a sweep only: empty is none"),
             ("corrupt cloud.xyz --reflectivity 1 --severity 4", "expected 1 to 3, found 4"),
             (
                 "corrupt cloud.xyz --reflectivity 2",
@@ -198,5 +203,7 @@ fn corruptions_of_one_s_own_and_what_is_refused() {
             ),
         ],
     );
-    assert!(!folder.at("data").exists(), "nothing is left half-made");
+    let said = folder.exits(3, "corrupt cloud.xyz --only motion-blur");
+    assert!(said.contains("0 scans: data/corrupted\nwarning: nothing is left"), "{said}");
+    assert!(!folder.at("data/corrupted").exists(), "nothing is left half-made");
 }

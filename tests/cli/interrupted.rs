@@ -56,6 +56,7 @@ fn a_run_that_is_told_to_end_says_so_and_goes_on_later() {
 #[cfg(unix)]
 fn a_program_that_is_ended_leaves_nothing_unfinished() {
     for (words, kept) in [
+        ("gen-shapes --train 100000 --out d", &[][..]),
         ("gen-drive --seconds 3600 --out d/d.pcap", &[][..]),
         ("gen-scenes --sweeps 100000 --save 1 --out d", &["preview.png", "sweeps"]),
     ] {

@@ -35,7 +35,13 @@ fn scenes_are_scanned_cut_labelled_and_packed_alike_every_time() {
     assert_eq!(points, on_objects);
 
     // Every tenth sweep is in the test part. Training ends with a test, and says so at once.
-    folder.succeeds("gen-scenes yard --adapter cpu --sweeps 9 --save 0 --out few");
+    let yard = in_repository("assets/scenes/yard.toml");
+    let yard = std::fs::read_to_string(yard).unwrap();
+    let none = "\n[[object]]\nkind = \"car\"\nclass = \"car\"\ncount = [0, 0]\nplace = \"anywhere\"\n\
+                distance_m = [5, 9]\n";
+    folder.write("yard.toml", yard + none);
+    let said = folder.succeeds("gen-scenes yard.toml --adapter cpu --sweeps 9 --save 0 --out few");
+    assert!(said.contains(": no scene has a car: does it fit there, and is its count"), "{said}");
     folder.write("metric.toml", "points = 16\nnormalization = \"metric\"\n");
     let said = folder.exits(1, "train --data few/packed --recipe metric.toml --out m.safetensors");
     assert!(said.contains("its test part is empty") && !said.contains("epoch 1"), "{said}");
@@ -444,5 +450,11 @@ fn what_cannot_be_used_is_named_and_nothing_is_written() {
             ),
         ],
     );
+    folder.write(
+        "empty.ply",
+        "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\n\
+         property float y\nproperty float z\nend_header\n",
+    );
+    folder.refuses(3, &[("preview empty.ply --out out.png", "empty.ply: expected points to draw")]);
     assert!(!folder.at("out").exists(), "something was written");
 }

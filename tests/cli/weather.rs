@@ -99,15 +99,17 @@ fn what_cannot_be_weathered_is_refused() {
         2,
         &[
             ("weather cloud.xyz --out a.npz", "expected one of --rain, --snow, --fog and --haze"),
+            ("weather cloud.xyz --rain 0 --out a.npz", "--fog and --haze, above 0"),
+            ("weather cloud.xyz --rain 5 --fog-model hahner --out a.npz", "--fog <M>"),
             ("weather cloud.xyz --rain 5 --out a.npz", "have no intensity: give --reflectivity"),
             ("weather cloud.csv --rain 5 --out a.npz", "around 0 to 1, found 255: give --white"),
             (
                 "weather cloud.csv --rain 5 --white 65535 --out a.npz",
                 "cloud.csv: expected intensities around 0 to 65535 by --white, found 255 at most",
             ),
-            ("weather cloud.xyz --rain -1 --out a.npz", "rain_mm_h: expected a number within"),
-            ("weather cloud.xyz --rain nan --out a.npz", "rain_mm_h: expected a number within"),
-            ("weather cloud.xyz --fog 0 --out a.npz", "fog_visibility_m: expected a number within"),
+            ("weather cloud.xyz --rain -1 --out a.npz", "--rain: expected a number within"),
+            ("weather cloud.xyz --rain nan --out a.npz", "--rain: expected a number within"),
+            ("weather cloud.xyz --fog 0 --out a.npz", "--fog: expected a number within"),
             ("weather cloud.xyz --rain 5 --reflectivity 2 --out a.npz", "--reflectivity: expected"),
             ("weather cloud.xyz --rain 5 --out a.pcap", "--out: expected .npz, .ply, .csv or .pcd"),
             ("weather bright.bin --rain 5 --out a.npz", "around 0 to 1, found 200: give --white"),
@@ -125,6 +127,9 @@ fn what_cannot_be_weathered_is_refused() {
         ],
     );
     assert!(!folder.at("a.npz").exists() && !folder.at("a.pcap").exists());
+    // Black surfaces return nothing, and haze scatters nothing back.
+    let said = folder.exits(3, "weather cloud.xyz --haze 1000 --reflectivity 0 --out a.npz");
+    assert!(said.contains("0 points: a.npz") && said.contains("no point is left"), "{said}");
 }
 
 /// A sensor that states no detection limit.

@@ -53,6 +53,12 @@ fn read_hdf5(path: &Path, _: Split) -> Result<LabelledSet, Error> {
     Err(Error::Data { path: path.to_path_buf(), cause: cause.to_owned() })
 }
 
+/// Whether the farthest point is 1 from the origin.
+fn is_in_unit_sphere(cloud: &[[f32; 3]]) -> bool {
+    let radius = |point: &[f32; 3]| point.iter().map(|x| x * x).sum::<f32>().sqrt();
+    (cloud.iter().map(radius).fold(0.0, f32::max) - 1.0).abs() < 1e-3
+}
+
 impl Clouds {
     /// The digest of all points, labels and classes.
     #[must_use]
@@ -79,7 +85,8 @@ impl Clouds {
     }
 
     /// Reads as [`Clouds::read`] does, for a network of this `normalization`. Clouds for a network
-    /// that takes metres stay unchanged, because training and infer-cpu move each of them.
+    /// that takes metres stay unchanged, because training and infer-cpu move each of them, and are
+    /// refused if all are in the unit sphere.
     pub fn read_for(
         normalization: Normalization,
         path: &Path,
@@ -111,6 +118,13 @@ impl Clouds {
         let mut clouds = Self::checked(set, path)?;
         if !normalization.is_metric() {
             clouds.normalize();
+        } else if (0..clouds.len()).all(|i| is_in_unit_sphere(clouds.set.cloud(i))) {
+            let cause = format!(
+                "expected clouds in metres, as a network with normalization = \"{normalization}\" \
+                 takes them, found clouds in the unit sphere, as gen-dataset packs them: set \
+                 normalization = \"unit-sphere\", or give clusters of gen-scenes"
+            );
+            return Err(Error::Data { path: path.to_path_buf(), cause });
         }
         Ok(clouds)
     }
@@ -145,6 +159,11 @@ impl Clouds {
             Some(classes) => classes,
             None => (0..most).map(|class| format!("class {class}")).collect(),
         };
+        let is_again = |&i: &usize| classes[..i].contains(&classes[i]);
+        if let Some(i) = (0..classes.len()).find(is_again) {
+            let name = &classes[i];
+            return refuse(format!("expected a name for each class, found two classes `{name}`"));
+        }
         Ok(Self { set, classes })
     }
 

@@ -73,8 +73,16 @@ pub fn run(args: &CorruptArgs) -> anyhow::Result<Outcome> {
         std::io::stdout().write_all(listed(&plan).as_bytes())?;
         return Ok(Outcome::Success);
     }
-    args.overwrite.check_folder(&args.out)?;
     let sweep = args.sweep.clone().expect("invariant: required without --list");
+    let (given, other) = match sweep.is_dir() {
+        true => (args.brightness.given(), "a sweep"),
+        false => (args.objects.given(), "a folder of meshes"),
+    };
+    if let Some(flag) = given {
+        let cause = format!("{flag} applies to {other} only: {} is none", sweep.display());
+        return Err(Usage(cause).into());
+    }
+    args.overwrite.check_folder(&args.out)?;
     let input = SweepArgs { sweep, place: args.place.clone() };
     let sensor = Sensor::resolve(&args.profile)?;
     if input.sweep.is_dir() {
@@ -111,6 +119,15 @@ struct Written<'a> {
     /// Number of points of the sweep, or of clouds before the corruption.
     of: usize,
     by: &'a str,
+}
+
+/// The outcome; prints a warning if nothing is left of the input.
+fn ended(written: &[Written<'_>]) -> Outcome {
+    if written.iter().any(|written| written.count > 0) {
+        return Outcome::Success;
+    }
+    eprintln!("warning: nothing is left: expected other corruptions by --only, or milder ones");
+    Outcome::SomeRefused
 }
 
 /// Writes `corruptions.csv`.

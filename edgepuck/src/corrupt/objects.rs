@@ -1,6 +1,7 @@
 use super::plan::{Plan, chosen};
-use super::{CorruptArgs, Written, usage, write_list};
+use super::{CorruptArgs, Written, ended, usage, write_list};
 use crate::Outcome;
+use crate::flags::first_given;
 use crate::gen_dataset::{listed, print_notes, report_failures};
 use anyhow::Context;
 use edgepuck_dataset::{Corrupted, CorruptedSet, ObjectCorruption, Progress, Up, Views};
@@ -12,23 +13,33 @@ use std::path::Path;
 /// Flags for meshes.
 #[derive(clap::Args)]
 pub(super) struct ObjectArgs {
-    /// For meshes: number of views of each mesh, evenly around it
-    #[arg(long, default_value_t = 4, value_name = "N")]
-    #[arg(value_parser = clap::value_parser!(u32).range(1..=1000))]
-    views: u32,
+    /// For meshes: number of views of each mesh, evenly around it [default: 4]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    views: Option<u32>,
 
-    /// For meshes: distance of the sensor, metres; a mesh has a radius of 1 m
-    #[arg(long, default_value_t = 3.0, value_name = "M", value_parser = crate::flags::positive)]
-    distance: f64,
+    /// For meshes: distance of the sensor, metres; a mesh has a radius of 1 m [default: 3]
+    #[arg(long, value_name = "M", value_parser = crate::flags::positive)]
+    distance: Option<f64>,
 
-    /// For meshes: number of points of each cloud
-    #[arg(long, default_value_t = 1024, value_name = "N")]
-    #[arg(value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    points: u32,
+    /// For meshes: number of points of each cloud [default: 1024]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    points: Option<u32>,
 
     /// For meshes: the upward axis [default: y for OBJ, z for others]
     #[arg(long, value_name = "AXIS")]
     up: Option<Up>,
+}
+
+impl ObjectArgs {
+    /// A flag that was given.
+    pub(super) fn given(&self) -> Option<&'static str> {
+        first_given(&[
+            (self.views.is_some(), "--views"),
+            (self.distance.is_some(), "--distance"),
+            (self.points.is_some(), "--points"),
+            (self.up.is_some(), "--up"),
+        ])
+    }
 }
 
 /// Writes a packed set for each corruption and severity, and one of clean scans.
@@ -39,8 +50,9 @@ pub(super) fn run(
     sensor: &Sensor,
 ) -> anyhow::Result<Outcome> {
     let chosen = chosen(&plan.object, &args.only, &args.severity)?;
-    let ObjectArgs { views: count, distance: distance_m, points, up } = args.objects;
-    let views = Views { count, distance_m, ..Views::ROTATING };
+    let ObjectArgs { views, distance, points, up } = args.objects;
+    let (count, distance_m) = (views.unwrap_or(4), distance.unwrap_or(3.0));
+    let (points, views) = (points.unwrap_or(1024), Views { count, distance_m, ..Views::ROTATING });
     views.validate().map_err(usage)?;
     let meshes = listed(folder, args.seed)?;
     let tested = meshes.iter().filter(|entry| entry.split == Split::Test).count();
@@ -77,5 +89,8 @@ pub(super) fn run(
         .collect();
     write_list(&lines, out)?;
     eprintln!("{} sets of {tested} meshes: {}", lines.len(), out.display());
-    Ok(if written.failures.is_empty() { Outcome::Success } else { Outcome::SomeRefused })
+    if !written.failures.is_empty() {
+        return Ok(Outcome::SomeRefused);
+    }
+    Ok(ended(&lines))
 }

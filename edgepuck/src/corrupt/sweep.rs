@@ -1,5 +1,5 @@
 use super::plan::{Plan, chosen};
-use super::{CorruptArgs, Written, usage, write_list};
+use super::{CorruptArgs, Written, ended, usage, write_list};
 use crate::Outcome;
 use crate::points::SweepArgs;
 use edgepuck_segment::{Label, Segmenter, Settings, Sweep, doubtful_axes};
@@ -71,7 +71,9 @@ pub(super) fn run(
         let (corruption, by, count, of) = (&*entry.name, &*entry.by, found.len(), scan.len());
         written.push(Written { file, corruption, severity, count, of, by });
     }
-    write_list(&written, &args.out)?;
+    if !written.is_empty() {
+        write_list(&written, &args.out)?;
+    }
     begun.into_iter().for_each(UnfinishedFolder::finish);
     if too_weak_before > 0 {
         eprintln!(
@@ -80,7 +82,7 @@ pub(super) fn run(
         );
     }
     eprintln!("{} scans: {}", written.len(), args.out.display());
-    Ok(Outcome::Success)
+    Ok(ended(&written))
 }
 
 /// Whether the corruption depends on the power of returns.

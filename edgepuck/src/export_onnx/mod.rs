@@ -15,7 +15,7 @@ use infer_cpu::model_file;
 use prost::Message;
 
 use crate::{Outcome, Usage};
-use formats::outputs::Overwrite;
+use formats::outputs::{Overwrite, need_extension};
 use graph::{Graph, Size};
 use pointnet::{Net, NetInputs};
 use proto::{ModelProto, OperatorSetIdProto, StringStringEntryProto, data_type};
@@ -74,6 +74,7 @@ pub struct ExportOnnxArgs {
 }
 
 pub fn run(args: &ExportOnnxArgs) -> anyhow::Result<Outcome> {
+    need_extension("--out", &args.out, &["onnx"])?;
     args.overwrite.check([&*args.out])?;
     let path = &args.model;
     let (card, net) = model_file::read(path)?;

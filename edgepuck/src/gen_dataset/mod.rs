@@ -120,6 +120,11 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let progress = Progress::default();
     let config = args.settings.config()?;
     flags::need_simplification(config.simplify.is_some())?;
+    check_layouts(&config, &[])?;
+    let are_tars = config.layouts.contains(&Layout::Webdataset);
+    if let Some(flag) = args.tars.given().filter(|_| !are_tars) {
+        return Err(usage(format!("{flag} applies to tars only: add --layout webdataset")));
+    }
     let (meshes_folder, default_out) = match &args.meshes {
         Some(folder) => (folder.clone(), default_out(folder)),
         None => (write_default_shapes(config.seed)?, PathBuf::from(DEFAULT_OUT)),
@@ -143,7 +148,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
         culling: args.caster.culling(),
         ..Plan::new(&out, &config, &meshes)
     };
-    let made = if config.layouts.contains(&Layout::Webdataset) {
+    let made = if are_tars {
         tars::run(&args.tars, &plan, &caster, &progress)
     } else {
         make_files(&plan, &caster, &progress, args.verbose)
@@ -253,7 +258,7 @@ fn report_empty_packed(manifest: &Manifest) -> bool {
 
 /// Verifies the dataset in `folder` and prints its problems, one a line.
 fn check(folder: &Path) -> anyhow::Result<Outcome> {
-    let report = verify(folder)?;
+    let report = verify(flags::dataset_folder(folder))?;
     let by = match report.hash {
         Hashing::None => "read, without hashes to compare",
         Hashing::Sha256 | Hashing::Blake3 => "checked",

@@ -1,5 +1,6 @@
 use super::usage;
 use crate::effect_flags::EffectFlags;
+use crate::flags::of_flag;
 use edgepuck_dataset::{
     ColourSource, DatasetConfig, Hashing, Layout, Normalize, Returns, ScanFormat, SetConfig,
     Simplify, Unit, Up, Variant, Viewpoints, Views,
@@ -221,7 +222,7 @@ impl Settings {
                 if let Some(jitter_deg) = self.azimuth_jitter {
                     views.azimuth_jitter_deg = jitter_deg;
                 }
-                views.validate().map_err(usage)?;
+                views.validate().map_err(of_flag)?;
                 Viewpoints::Views(views)
             }
         };

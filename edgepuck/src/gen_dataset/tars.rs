@@ -1,6 +1,7 @@
 //! `gen-dataset --layout webdataset`: makes tars and hands each over when it is complete.
 
 use super::{report_failures, summary};
+use crate::flags::first_given;
 use crate::{Outcome, shell, signals};
 use edgepuck_dataset::{Cut, HandOver, Plan, Progress, Sample, TarRecord, Tars, make_tars};
 use sim_gpu::Caster;
@@ -11,6 +12,8 @@ use std::time::Duration;
 /// Pauses before a command is tried again, seconds.
 const PAUSES_S: [u64; 3] = [1, 4, 16];
 
+const TAR_CLOUDS: u32 = 65_536;
+
 #[derive(clap::Args)]
 #[command(next_help_heading = "Tars (--layout webdataset)")]
 pub struct TarArgs {
@@ -20,7 +23,7 @@ pub struct TarArgs {
     sample: Sample,
 
     /// Number of clouds or scans in each tar; by default a tar of clouds of 1,024 points takes 800 MB
-    #[arg(long, default_value_t = 65_536, value_name = "N",
+    #[arg(long, default_value_t = TAR_CLOUDS, value_name = "N",
           value_parser = clap::value_parser!(u32).range(1..))]
     tar_clouds: u32,
 
@@ -29,6 +32,17 @@ pub struct TarArgs {
     /// already. A command that fails is tried four times
     #[arg(long, value_name = "COMMAND")]
     on_shard: Option<String>,
+}
+
+impl TarArgs {
+    /// A flag that was given.
+    pub fn given(&self) -> Option<&'static str> {
+        first_given(&[
+            (self.sample != Sample::default(), "--sample"),
+            (self.tar_clouds != TAR_CLOUDS, "--tar-clouds"),
+            (self.on_shard.is_some(), "--on-shard"),
+        ])
+    }
 }
 
 pub fn run(

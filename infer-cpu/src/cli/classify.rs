@@ -110,8 +110,8 @@ pub struct ClassifyArgs {
     #[arg(long)]
     vote_rotations: bool,
 
-    /// Up axis of the clouds: x, y or z
-    #[arg(long, default_value = "z")]
+    /// Up axis of the clouds, about which --vote-rotations rotates them: x, y or z
+    #[arg(long, default_value = "z", requires = "vote_rotations")]
     up: UpAxis,
 
     /// Sampler that chooses the points that the network sees: all, first, random, fps, voxel, cpl

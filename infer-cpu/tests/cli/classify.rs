@@ -179,6 +179,10 @@ fn what_makes_no_sense_is_a_usage_error() {
     let folder = Folder::with_cloud(9);
     for (flags, start) in [
         ("", "error: the following required arguments"),
+        (
+            "--up y c.xyz",
+            "error: the following required arguments were not provided:\n  --vote-rot",
+        ),
         ("--sampler fsp c.xyz", "error: invalid value 'fsp' for '--sampler"),
         ("--precision f8 c.xyz", "error: invalid value 'f8' for '--precision"),
         ("--sampler fps --points 0 c.xyz", "error: expected a sampler that keeps 1 point"),

@@ -352,7 +352,15 @@ fn what_cannot_be_listened_to_is_named() {
         1,
         &format!("error: UDP {address}: {in_use}"),
     );
-    refused("--udp 2368 --multicast 10.0.0.1", 1, "error: UDP 0.0.0.0:2368: ");
+    let cause = "error: invalid value '10.0.0.1' for '--multicast <IP>': expected a group from 224";
+    refused("--udp 2368 --multicast 10.0.0.1", 2, cause);
+    for words in [
+        "--udp 2368 --realtime",
+        "--pcap drive.pcap --multicast 239.0.0.1",
+        "--pcap drive.pcap --interface 127.0.0.1",
+    ] {
+        refused(words, 2, "error: the argument '--");
+    }
 }
 
 /// A whole frame has 16 bytes of times and lengths, and 1248 of its own.

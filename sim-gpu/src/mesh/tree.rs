@@ -79,8 +79,8 @@ pub enum TreeError {
 ///
 /// A mesh `CLASS/{train,test}/NAME.ext` keeps its split, and so does any mesh with such a folder
 /// between `root` and its class or its own folder. Where folders of splits stand alone beside each
-/// other, the names may be in any case, and `val`, `valid` and `validation` are of the training
-/// set. The class of a mesh is its folder. But if
+/// other, the names may be in any case or `training` and `testing`, and `dev`, `val`, `valid` and
+/// `validation` are of the training set. The class of a mesh is its folder. But if
 /// folders deeper than those below `root` have one mesh each, as `CLASS/ID/models/model.obj`, then
 /// the class is the folder below `root` (CLASS), and the name that of the next folder (ID).
 ///
@@ -144,6 +144,12 @@ pub fn doubts(root: &Path, entries: &[MeshEntry]) -> Vec<String> {
             doubts.push(format!("no mesh is in the {split} split; {way}"));
         } else if !lack.is_empty() && !is_alone {
             doubts.push(format!("no {split} mesh of {}; {way}", some_of(&lack)));
+        }
+    }
+    let mut in_lower_case = BTreeMap::new();
+    for class in splits.keys() {
+        if let Some(other) = in_lower_case.insert(class.to_lowercase(), class) {
+            doubts.push(format!("the classes {other} and {class} differ in case only"));
         }
     }
     let is_deep = |entry: &MeshEntry| {
@@ -285,14 +291,16 @@ fn is_dataset(folder: &Path) -> bool {
 
 /// The split of a folder of this name, in any case. A validation set is for training.
 fn split_called(name: &str) -> Option<Split> {
-    match is_validation(name) {
-        true => Some(Split::Train),
-        false => name.to_lowercase().parse().ok(),
+    match name.to_lowercase().as_str() {
+        "training" => Some(Split::Train),
+        "testing" => Some(Split::Test),
+        _ if is_validation(name) => Some(Split::Train),
+        name => name.parse().ok(),
     }
 }
 
 fn is_validation(name: &str) -> bool {
-    ["val", "valid", "validation"].iter().any(|word| name.eq_ignore_ascii_case(word))
+    ["dev", "val", "valid", "validation"].iter().any(|word| name.eq_ignore_ascii_case(word))
 }
 
 /// Where folders with names of splits, in any case and with those of validation, are splits: where
@@ -690,6 +698,7 @@ mod tests {
         assert_eq!(split("test/car/2.off", &others), "car test 2");
         assert_eq!(split("VAL/car/3.off", &["train/car/1.off"]), "car train 3");
         assert_eq!(split("car/Test/2.off", &["car/valid/1.off", "bus/Train/1.off"]), "car test 2");
+        assert_eq!(split("car/testing/2.off", &["car/Training/1.off"]), "car test 2");
         assert!(
             split("toys/Train/2.off", &["toys/Train/1.off", "toys/Bus/1.off"])
                 .starts_with("Train ")
@@ -733,8 +742,12 @@ mod tests {
         let lack = "split the meshes otherwise";
         let held = "2 meshes in folders for validation are in the train split: training holds out \
                     its own clouds for validation";
-        let cases: [(&[&str], &[&str]); 9] = [
+        let cases: [(&[&str], &[&str]); 10] = [
             (&sound, &[]),
+            (
+                &["A/train/1.off", "A/test/2.off", "a/train/3.off", "a/test/4.off"],
+                &["the classes A and a differ in case only"],
+            ),
             (&sound[..1], &["no mesh is in the test split", lack]),
             (&sound[1..3], &["each of the 2 classes has one mesh"]),
             (&sound[..3], &["no test mesh of b", lack]),

@@ -83,9 +83,22 @@ fn a_network_of_clusters_is_trained_and_answers_unknown() {
     let wrong: usize =
         csv.lines().filter(|line| line.split(',').nth(1) == Some("all")).map(missed).sum();
     assert!(svg.contains(&format!("{wrong} objects named wrongly")), "{wrong}: {svg:.500}");
-    let ran = train(folder.path(), "eval --model m.safetensors --data test.npz --known plane");
-    assert!(stderr(&ran).contains("--known: expected some of car, person, wall, found plane"));
-    assert_eq!(ran.status.code(), Some(2));
+    std::fs::write(folder.path().join("map.toml"), "cra = \"car\"").unwrap();
+    for (words, code, cause) in [
+        ("--known plane", 2, "--known: expected some of car, person, wall, found plane"),
+        (
+            "--min-points 100000",
+            1,
+            "expected objects, found none that --min-points and --map leave",
+        ),
+        ("--map map.toml", 1, "map.toml: aliases: expected a label of the data (car, p"),
+        ("--data test.npz", 2, "--data: expected each file once, found test.npz twice"),
+    ] {
+        let words = format!("eval --model m.safetensors --data test.npz {words}");
+        let ran = train(folder.path(), &words);
+        assert!(stderr(&ran).contains(cause), "{words}: {}", stderr(&ran));
+        assert_eq!(ran.status.code(), Some(code), "{words}");
+    }
 }
 
 /// The objects of a line of the table that are not hit.

@@ -4,6 +4,7 @@ mod clusters;
 #[cfg(unix)]
 mod killed;
 
+use formats::cloud::normalize_unit_sphere;
 use formats::hash::Hashing;
 use formats::packed::PackedWriter;
 use formats::rng::StreamKey;
@@ -105,6 +106,11 @@ fn what_cannot_be_learnt_from_is_an_error_that_names_it() {
     npz("one.npz", &of_one, &CLASSES[..1]);
     npz("few.npz", &clouds(9), &CLASSES);
     npz("empty.npz", &[], &CLASSES);
+    npz("twice.npz", &clouds(12), &["ball", "disc", "ball"]);
+    let mut in_sphere = clouds(12);
+    in_sphere.iter_mut().for_each(|(points, _)| normalize_unit_sphere(points));
+    npz("sphere.npz", &in_sphere, &CLASSES);
+    std::fs::write(folder.path().join("metric.toml"), "normalization = \"metric\"").unwrap();
     std::fs::create_dir_all(folder.path().join("set/packed")).unwrap();
     npz("set/packed/a-train.npz", &clouds(9), &CLASSES);
     npz("set/packed/b-train.npz", &clouds(9), &CLASSES);
@@ -124,6 +130,12 @@ fn what_cannot_be_learnt_from_is_an_error_that_names_it() {
         ("--data empty.npz", "empty.npz: expected clouds, found none: its train part is empty"),
         ("--data set", "modelnet40_shape_names.txt; found set/packed/a, set/packed/b: name one"),
         ("--data nowhere", "nowhere: expected a packed NPZ"),
+        ("--data twice.npz", "twice.npz: expected a name for each class, found two classes `ball`"),
+        (
+            "--data sphere.npz --recipe metric.toml",
+            "sphere.npz: expected clouds in metres, as a network with normalization = \"metric\" takes \
+             them, found clouds in the unit sphere",
+        ),
         (
             "--data . --points 33",
             ".: expected clouds of 33 points or more, found 32: give at most 32",
@@ -154,7 +166,7 @@ fn what_cannot_be_learnt_from_is_an_error_that_names_it() {
 fn a_wrong_command_line_gives_2_and_a_failure_1() {
     let folder = folder();
     std::fs::create_dir(folder.path().join("folder.safetensors")).unwrap();
-    for file in ["mine.safetensors", "mine.xyz"] {
+    for file in ["mine.safetensors", "mine.csv", "mine.svg", "mine.xyz"] {
         std::fs::write(folder.path().join(file), "0 0 0").unwrap();
     }
     for (words, code) in [
@@ -168,8 +180,13 @@ fn a_wrong_command_line_gives_2_and_a_failure_1() {
         ("train --data . --out m.pth", 2),
         ("train --data . --out folder.safetensors", 2),
         ("train --data . --out mine.safetensors", 2),
-        ("eval --model edge-64 --data . --csv mine.safetensors", 2),
-        ("explain --model edge-64 --cloud c.xyz --svg mine.safetensors", 2),
+        ("eval --model edge-64 --data . --csv mine.csv", 2),
+        ("eval --model edge-64 --data . --csv c.txt", 2),
+        ("eval --model edge-64 --data . --svg c.png", 2),
+        ("eval --model edge-64 --data test.npz --data ./test.npz", 2),
+        ("explain --model edge-64 --cloud c.xyz --svg mine.svg", 2),
+        ("explain --model edge-64 --cloud c.xyz --svg c.png", 2),
+        ("export-onnx edge-64 --out m.txt", 2),
         ("sample --sampler all mine.xyz mine.xyz", 2),
     ] {
         let ran = train(folder.path(), words);

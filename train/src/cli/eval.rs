@@ -2,6 +2,8 @@ use std::collections::BTreeMap;
 use std::iter::repeat_n;
 use std::path::{Path, PathBuf};
 
+use anyhow::ensure;
+
 use crate::accuracy_report;
 use crate::clouds::Clouds;
 use crate::evaluate::confusion;
@@ -9,7 +11,7 @@ use crate::object_report::{self, Labels, Object, Table, Truth, classified};
 use crate::run::MOST_POINTS;
 use formats::atomic;
 use formats::labelled::LabelledSet;
-use formats::outputs::Overwrite;
+use formats::outputs::{Overwrite, need_extension};
 use formats::split::Split;
 use infer_cpu::{Classifier, ModelCard, Options, Precision};
 
@@ -70,7 +72,16 @@ struct ObjectArgs {
 }
 
 pub fn run(args: &EvalArgs) -> anyhow::Result<()> {
+    for (flag, file, extension) in [("--csv", &args.csv, "csv"), ("--svg", &args.svg, "svg")] {
+        file.iter().try_for_each(|file| need_extension(flag, file, &[extension]))?;
+    }
     args.overwrite.check(args.csv.iter().chain(&args.svg).map(PathBuf::as_path))?;
+    let full = |path: &PathBuf| path.canonicalize().unwrap_or_else(|_| path.clone());
+    let data: Vec<PathBuf> = args.data.iter().map(full).collect();
+    if let Some(i) = (0..data.len()).find(|&i| data[..i].contains(&data[i])) {
+        let twice = args.data[i].display();
+        return Err(Usage(format!("--data: expected each file once, found {twice} twice")).into());
+    }
     let (card, names) = {
         let classifier = Classifier::load(&args.model, &options(args))?;
         let names: Vec<String> = classifier.classes().iter().map(ToString::to_string).collect();
@@ -137,7 +148,8 @@ fn report_objects(
 ) -> anyhow::Result<()> {
     let mut labels = Labels::new(names, &unknown(args, card, names)?);
     if let Some(path) = &args.objects.map {
-        labels = labels.with_aliases(path)?;
+        let of_data = clouds.iter().flat_map(|clouds| &clouds.classes).map(String::as_str);
+        labels = labels.with_aliases(path, &of_data.collect())?;
     }
     let least = args.objects.min_points.unwrap_or(0);
     let (mut objects, mut sets) = (Vec::new(), Vec::new());
@@ -147,6 +159,10 @@ fn report_objects(
         sets.push((clouds.set, found.len()));
         objects.extend(found);
     }
+    ensure!(
+        !objects.is_empty(),
+        "expected objects, found none that --min-points and --map leave in the data"
+    );
     let table = Table::new(&objects, &labels, args.objects.tracks);
     super::print(&format!("{table}\n{}", summary(&objects, &labels, &table)))?;
     if let Some(path) = &args.csv {

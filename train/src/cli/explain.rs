@@ -8,7 +8,7 @@ use formats::Scan;
 use formats::atomic;
 use formats::cloud_file::{Unlike, judge_object, read_viewpoint};
 use formats::outcome::say;
-use formats::outputs::Overwrite;
+use formats::outputs::{Overwrite, need_extension};
 use infer_cpu::sampler::{Resize, SamplerKind, SamplerSpec};
 use infer_cpu::{Classifier, Normalization, Options};
 
@@ -49,6 +49,7 @@ const DRAWS: u32 = 1000;
 
 pub fn run(args: &ExplainArgs) -> anyhow::Result<()> {
     check(args)?;
+    args.svg.iter().try_for_each(|file| need_extension("--svg", file, &["svg"]))?;
     args.overwrite.check(args.svg.iter().map(PathBuf::as_path))?;
     let cloud = read_finite(&args.cloud)?;
     let file = || args.cloud.display().to_string();

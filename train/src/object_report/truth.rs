@@ -1,14 +1,15 @@
 //! The right answer to each label of a data set.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use formats::FormatError;
+use infer_cpu::UNKNOWN;
 
 use crate::error::Error;
 
-/// Labels of data sets, with the classes of networks for them. A label that is a class of the model
-/// is not replaced.
+/// Labels of data sets, with the classes of networks for them. Of a model that has a class of the
+/// label's name, that class is right.
 const ALIASES: [(&str, &str); 6] = [
     ("pedestrian", "person"),
     ("4wd", "car"),
@@ -42,20 +43,38 @@ impl Labels {
     /// For a model with these `classes`. All classes except those in `unknown` are known.
     #[must_use]
     pub fn new(classes: &[String], unknown: &[String]) -> Self {
-        let aliases = ALIASES.map(|(label, class)| (label.to_owned(), class.to_owned()));
+        let others = ALIASES.iter().filter(|(label, _)| classes.iter().all(|class| class != label));
         Self {
             is_known: classes.iter().map(|class| !unknown.contains(class)).collect(),
             classes: classes.to_vec(),
-            aliases: aliases.into(),
+            aliases: others.map(|&(label, class)| (label.to_owned(), class.to_owned())).collect(),
         }
     }
 
-    /// Adds the aliases in the TOML file at `path`, which replace built-in ones: `pedestrian =
-    /// "person"`, or `rider = ""` to leave objects out.
-    pub fn with_aliases(mut self, path: &Path) -> Result<Self, Error> {
+    /// Adds the aliases in the TOML file at `path`, of labels among those `of_data`, which replace
+    /// built-in ones and classes of the same name: `pedestrian = "person"`, or `rider = ""` to leave
+    /// objects out.
+    pub fn with_aliases(mut self, path: &Path, of_data: &BTreeSet<&str>) -> Result<Self, Error> {
         let text = std::fs::read_to_string(path).map_err(|source| FormatError::io(path, source))?;
         let aliases: BTreeMap<String, String> = toml::from_str(&text)
             .map_err(|error| FormatError::malformed(path, "aliases", error.to_string().trim()))?;
+        let wrong = aliases.iter().find_map(|(label, class)| {
+            if !of_data.contains(&**label) {
+                let labels = of_data.iter().copied().collect::<Vec<_>>().join(", ");
+                return Some(format!("expected a label of the data ({labels}), found `{label}`"));
+            }
+            let is_there = [LEFT_OUT, UNKNOWN].contains(&&**class) || self.class(class).is_some();
+            let classes = self.classes.join(", ");
+            (!is_there).then(|| {
+                format!(
+                    "{label}: expected a class of the model ({classes}), {UNKNOWN}, or \"\" to leave \
+                     such objects out, found `{class}`"
+                )
+            })
+        });
+        if let Some(cause) = wrong {
+            return Err(FormatError::malformed(path, "aliases", cause).into());
+        }
         self.aliases.extend(aliases);
         Ok(self)
     }
@@ -72,24 +91,28 @@ impl Labels {
         &self.classes
     }
 
-    /// The right answer to an object with this `label`: the class of that name, the class of its
-    /// alias, or `unknown` if the model has neither. `None` if the object is left out.
+    /// The right answer to an object with this `label`: the class of its alias or of that name, or
+    /// `unknown` if the model has no such class. `None` if the object is left out.
     #[must_use]
     pub fn truth(&self, label: &str) -> Option<Truth> {
-        let alias = self.aliases.get(label).map(String::as_str);
-        if alias == Some(LEFT_OUT) {
+        let name = self.named(label);
+        if name == LEFT_OUT {
             return None;
         }
-        let class = self.class(label).or_else(|| self.class(alias?));
+        let class = self.class(name);
         let known = class.filter(|&class| self.is_known[class]);
         Some(known.map_or(Truth::Negative, Truth::Known))
     }
 
-    /// Whether neither this label nor its alias is a class of the model.
+    /// Whether no class of the model is that of this label.
     #[must_use]
     pub fn lacks(&self, label: &str) -> bool {
-        let alias = self.aliases.get(label);
-        self.class(label).or_else(|| self.class(alias?)).is_none()
+        self.class(self.named(label)).is_none()
+    }
+
+    /// The alias of `label`, or `label` itself.
+    fn named<'a>(&'a self, label: &'a str) -> &'a str {
+        self.aliases.get(label).map_or(label, String::as_str)
     }
 
     fn class(&self, name: &str) -> Option<usize> {
@@ -116,12 +139,26 @@ mod tests {
 
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("aliases.toml");
-        std::fs::write(&path, "cyclist = \"person\"\nvan = \"\"\n").unwrap();
-        let labels = labels.with_aliases(&path).unwrap();
-        assert_eq!(labels.truth("cyclist"), Some(Truth::Known(1)));
-        assert_eq!(labels.truth("van"), None);
-        std::fs::write(&path, "van = 3").unwrap();
-        let error = labels.with_aliases(&path).unwrap_err().to_string();
-        assert!(error.contains("aliases.toml: aliases: "), "{error}");
+        let of_data = BTreeSet::from(["car", "cyclist", "van"]);
+        let with = |text: &str| {
+            std::fs::write(&path, text).unwrap();
+            labels.clone().with_aliases(&path, &of_data)
+        };
+        let changed = with("cyclist = \"person\"\nvan = \"\"\ncar = \"person\"\n").unwrap();
+        assert_eq!(changed.truth("cyclist"), Some(Truth::Known(1)));
+        assert_eq!(changed.truth("van"), None);
+        assert_eq!(changed.truth("car"), Some(Truth::Known(1)));
+        assert_eq!(with("car = \"unknown\"").unwrap().truth("car"), Some(Truth::Negative));
+        for (text, cause) in [
+            ("van = 3", ""),
+            ("vam = \"car\"", "expected a label of the data (car, cyclist, van), found `vam`"),
+            (
+                "van = \"cra\"",
+                "van: expected a class of the model (car, person, tree), unknown, or",
+            ),
+        ] {
+            let error = with(text).unwrap_err().to_string();
+            assert!(error.contains(&format!("aliases.toml: aliases: {cause}")), "{error}");
+        }
     }
 }

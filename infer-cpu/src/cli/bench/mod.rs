@@ -49,7 +49,7 @@ pub struct BenchArgs {
     t_nets: Vec<TNets>,
 
     /// Numbers of threads to measure
-    #[arg(long, value_delimiter = ',', default_value = "1,2,4")]
+    #[arg(long, value_delimiter = ',', value_parser = at_least_one, default_value = "1,2,4")]
     threads: Vec<usize>,
 
     /// Kernels to use: scalar, avx2, avx512, neon, neon_f16, neon_dot [default: the fastest]

@@ -71,7 +71,7 @@ pub struct LiveArgs {
 
     /// Take packets of the capture at the times at which the sensor sent them, instead of as fast as
     /// possible
-    #[arg(long, requires = "pcap")]
+    #[arg(long, conflicts_with = "udp")]
     realtime: bool,
 
     /// Print JSON lines; the default, unless --stats or --mcap is given
@@ -93,11 +93,11 @@ pub struct LiveArgs {
     from: Option<IpAddr>,
 
     /// Join a multicast group
-    #[arg(long, value_name = "IP", requires = "udp")]
+    #[arg(long, value_name = "IP", conflicts_with = "pcap", value_parser = group)]
     multicast: Option<Ipv4Addr>,
 
     /// Listen on the network interface that has this address only [default: on all]
-    #[arg(long, value_name = "IP", requires = "udp", default_value = "0.0.0.0")]
+    #[arg(long, value_name = "IP", conflicts_with = "pcap", default_value = "0.0.0.0")]
     interface: Ipv4Addr,
 
     /// Metadata file (JSON) of the sensor, if it is an Ouster OS0, OS1 or OS2
@@ -135,6 +135,12 @@ pub struct LiveArgs {
 fn rate(word: &str) -> Result<f64, String> {
     let rate = word.parse().ok().filter(|rate: &f64| rate.abs() <= 1000.0);
     rate.ok_or_else(|| format!("expected a number from -1000 to 1000, found {word:?}"))
+}
+
+/// Parses the address of a multicast group (RFC 5771).
+fn group(word: &str) -> Result<Ipv4Addr, String> {
+    let group = word.parse().ok().filter(Ipv4Addr::is_multicast);
+    group.ok_or_else(|| "expected a group from 224.0.0.0 to 239.255.255.255".to_owned())
 }
 
 /// Runs the pipeline until the packets end or a signal comes.
