@@ -1,18 +1,16 @@
-use crate::Usage;
-use crate::flags::first_given;
+use crate::{Usage, flags};
 use formats::Scan;
-use sim_gpu::internals::config::within;
 use std::path::Path;
 
 /// Flags about the meaning of a file's intensities.
 #[derive(clap::Args)]
 pub struct BrightnessArgs {
     /// Intensity of a white surface that faces the sensor [default: 1, which is 65535 in LAS]
-    #[arg(long, value_name = "I", value_parser = crate::flags::positive)]
+    #[arg(long, value_name = "I", value_parser = flags::positive)]
     white: Option<f64>,
 
     /// Reflectivity of all points, from 0 (black) to 1 (white), in place of their intensities
-    #[arg(long, value_name = "R", conflicts_with = "white")]
+    #[arg(long, value_name = "R", conflicts_with = "white", value_parser = flags::probability)]
     reflectivity: Option<f64>,
 }
 
@@ -20,12 +18,7 @@ impl BrightnessArgs {
     /// A flag that was given.
     pub fn given(&self) -> Option<&'static str> {
         let [white, reflectivity] = [self.white, self.reflectivity].map(|given| given.is_some());
-        first_given(&[(white, "--white"), (reflectivity, "--reflectivity")])
-    }
-
-    pub fn check(&self) -> Result<(), Usage> {
-        within("--reflectivity", self.reflectivity, 0.0..=1.0)
-            .map_err(|error| Usage(error.to_string()))
+        flags::first_given(&[(white, "--white"), (reflectivity, "--reflectivity")])
     }
 
     /// The brightness of each point of `scan`: the share of the light that it returns in clear air.

@@ -75,7 +75,6 @@ pub fn run(args: &WeatherArgs) -> anyhow::Result<Outcome> {
         let cause = "expected one of --rain, --snow, --fog and --haze, above 0";
         return Err(Usage(cause.to_owned()).into());
     }
-    args.brightness.check()?;
     let sensor = SensorProfile::resolve(&args.profile)?;
     let asked = Effects { weather: Some(Box::new(weather.clone())), ..Effects::default() };
     let effects = asked.for_sensor(&sensor).map_err(|error| Usage(error.to_string()))?;

@@ -110,7 +110,7 @@ fn commands_that_cannot_be_are_usage_errors() {
             ("gen-dataset meshes --format stl", "stl"),
             ("gen-dataset meshes --points 0", "--points"),
             ("gen-dataset meshes --hash md5", "sha256, blake3, none"),
-            ("gen-dataset meshes --reflectivity 1.5", "--reflectivity: expected a number within"),
+            ("gen-dataset meshes --reflectivity 1.5", "<R>': expected a number from 0 to 1"),
             ("gen-dataset meshes --effects a.toml --noise 0.02", "--effects"),
             ("gen-dataset meshes --format pcap", "sensor \"generic-static\": rotating: missing"),
             ("gen-dataset meshes --sensor vlp16 --format pcap", "VLP-32C only"),

@@ -197,10 +197,7 @@ fn corruptions_of_one_s_own_and_what_is_refused() {
             ),
             ("corrupt empty --white 2", "--white applies to a sweep only: empty is none"),
             ("corrupt cloud.xyz --reflectivity 1 --severity 4", "expected 1 to 3, found 4"),
-            (
-                "corrupt cloud.xyz --reflectivity 2",
-                "--reflectivity: expected a number within 0..=1",
-            ),
+            ("corrupt cloud.xyz --reflectivity 2", "<R>': expected a number from 0 to 1"),
         ],
     );
     let said = folder.exits(3, "corrupt cloud.xyz --only motion-blur");

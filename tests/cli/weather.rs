@@ -110,7 +110,10 @@ fn what_cannot_be_weathered_is_refused() {
             ("weather cloud.xyz --rain -1 --out a.npz", "--rain: expected a number within"),
             ("weather cloud.xyz --rain nan --out a.npz", "--rain: expected a number within"),
             ("weather cloud.xyz --fog 0 --out a.npz", "--fog: expected a number within"),
-            ("weather cloud.xyz --rain 5 --reflectivity 2 --out a.npz", "--reflectivity: expected"),
+            (
+                "weather cloud.xyz --rain 5 --reflectivity 2 --out a.npz",
+                "--reflectivity <R>': expected",
+            ),
             ("weather cloud.xyz --rain 5 --out a.pcap", "--out: expected .npz, .ply, .csv or .pcd"),
             ("weather bright.bin --rain 5 --out a.npz", "around 0 to 1, found 200: give --white"),
             (

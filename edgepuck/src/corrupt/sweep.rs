@@ -23,7 +23,6 @@ pub(super) fn run(
     sensor: &SensorProfile,
 ) -> anyhow::Result<Outcome> {
     let chosen = chosen(&plan.sweep, &args.only, &args.severity)?;
-    args.brightness.check()?;
     let any = |is: fn(&Corruption) -> bool| chosen.iter().any(|(_, _, corruption)| is(corruption));
     let scan = input.read_whole()?;
     let brightness = match args.brightness.brightness_of(&scan, &input.sweep) {

@@ -1,6 +1,6 @@
 use super::usage;
 use crate::effect_flags::EffectFlags;
-use crate::flags::of_flag;
+use crate::flags::{of_flag, probability};
 use edgepuck_dataset::{
     ColourSource, DatasetConfig, Hashing, Layout, Normalize, Returns, ScanFormat, SetConfig,
     Simplify, Unit, Up, Variant, Viewpoints, Views,
@@ -8,7 +8,6 @@ use edgepuck_dataset::{
 use formats::scan::Attribute;
 use sim_gpu::Sensor;
 use sim_gpu::effects::Effects;
-use sim_gpu::internals::config::within;
 use sim_gpu::internals::packets;
 use sim_gpu::internals::pose::load_poses;
 use sim_gpu::internals::sensor::{Layout as BeamLayout, SensorProfile};
@@ -54,7 +53,7 @@ pub struct Settings {
     effects: EffectFlags,
 
     /// Diffuse reflectivity of the meshes, from 0 (black) to 1 (white)
-    #[arg(long, default_value_t = 1.0, value_name = "R")]
+    #[arg(long, default_value_t = 1.0, value_name = "R", value_parser = probability)]
     reflectivity: f64,
 
     /// Take reflectivities from the colours of the meshes, which must be OBJ files: of the
@@ -155,7 +154,6 @@ impl Settings {
             let cause = "--units applies to --normalize none: other meshes are scaled anyway";
             return Err(usage(cause));
         }
-        within("--reflectivity", self.reflectivity, 0.0..=1.0).map_err(usage)?;
         let mut returns = Returns::default();
         if formats.contains(&ScanFormat::Pcap) {
             returns = cast_packet_geometry(&mut sets, &mut effects, self.returns)?;

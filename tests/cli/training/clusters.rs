@@ -91,7 +91,7 @@ fn a_network_of_clusters_is_trained_and_answers_unknown() {
             1,
             "expected objects, found none that --min-points and --map leave",
         ),
-        ("--map map.toml", 1, "map.toml: aliases: expected a label of the data (car, p"),
+        ("--map map.toml", 1, "map.toml: cra: expected a label of the data (car, p"),
         ("--data test.npz", 2, "--data: expected each file once, found test.npz twice"),
     ] {
         let words = format!("eval --model m.safetensors --data test.npz {words}");

@@ -58,22 +58,20 @@ impl Labels {
         let text = std::fs::read_to_string(path).map_err(|source| FormatError::io(path, source))?;
         let aliases: BTreeMap<String, String> = toml::from_str(&text)
             .map_err(|error| FormatError::malformed(path, "aliases", error.to_string().trim()))?;
-        let wrong = aliases.iter().find_map(|(label, class)| {
-            if !of_data.contains(&**label) {
-                let labels = of_data.iter().copied().collect::<Vec<_>>().join(", ");
-                return Some(format!("expected a label of the data ({labels}), found `{label}`"));
-            }
-            let is_there = [LEFT_OUT, UNKNOWN].contains(&&**class) || self.class(class).is_some();
-            let classes = self.classes.join(", ");
-            (!is_there).then(|| {
-                format!(
-                    "{label}: expected a class of the model ({classes}), {UNKNOWN}, or \"\" to leave \
-                     such objects out, found `{class}`"
+        for (label, class) in &aliases {
+            let (expected, among, found) = if !of_data.contains(&**label) {
+                (
+                    "a label of the data",
+                    of_data.iter().copied().collect::<Vec<_>>().join(", "),
+                    label,
                 )
-            })
-        });
-        if let Some(cause) = wrong {
-            return Err(FormatError::malformed(path, "aliases", cause).into());
+            } else if class != LEFT_OUT && class != UNKNOWN && self.class(class).is_none() {
+                ("unknown, \"\" or a class of the model", self.classes.join(", "), class)
+            } else {
+                continue;
+            };
+            let cause = format!("expected {expected} ({among}), found `{found}`");
+            return Err(FormatError::malformed(path, label, cause).into());
         }
         self.aliases.extend(aliases);
         Ok(self)
@@ -150,15 +148,15 @@ mod tests {
         assert_eq!(changed.truth("car"), Some(Truth::Known(1)));
         assert_eq!(with("car = \"unknown\"").unwrap().truth("car"), Some(Truth::Negative));
         for (text, cause) in [
-            ("van = 3", ""),
-            ("vam = \"car\"", "expected a label of the data (car, cyclist, van), found `vam`"),
+            ("van = 3", "aliases: "),
+            ("vam = \"car\"", "vam: expected a label of the data (car, cyclist, van), found `vam`"),
             (
                 "van = \"cra\"",
-                "van: expected a class of the model (car, person, tree), unknown, or",
+                "van: expected unknown, \"\" or a class of the model (car, person, tr",
             ),
         ] {
             let error = with(text).unwrap_err().to_string();
-            assert!(error.contains(&format!("aliases.toml: aliases: {cause}")), "{error}");
+            assert!(error.contains(&format!("aliases.toml: {cause}")), "{error}");
         }
     }
 }
