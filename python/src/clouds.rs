@@ -105,7 +105,7 @@ impl Clouds {
 fn argument_error(error: &anyhow::Error) -> String {
     let text = formats::outcome::joined_causes(error);
     let cause = text.split("\n\n").next().unwrap_or_default();
-    cause.trim_start_matches("error: ").trim_end().replace("'--", "'")
+    cause.trim_start_matches("error: ").trim_start_matches("--").trim_end().replace("'--", "'")
 }
 
 impl Clouds {

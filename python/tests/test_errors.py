@@ -147,7 +147,7 @@ def test_a_scan_that_cannot_be_made_is_refused(cube: tuple, wanted: dict, messag
     [
         ({"sensor": "vlp99"}, "vlp99"),
         ({"distance": (5, 2)}, "at least 5"),
-        ({"noise": -1}, "sigma"),
+        ({"noise": -1}, "noise: expected a number"),
         ({"split": "dev"}, "dev"),
         ({"points": 0}, "points"),
         ({"views": 0}, "views"),
