@@ -44,7 +44,7 @@ pub fn run(args: &CardArgs) -> anyhow::Result<Outcome> {
     let name = name.unwrap_or_else(own_name);
     let publication = Publication { name, license, url, creator, published };
     for file in publish(folder, &publication, overwrite)? {
-        eprintln!("{}", file.display());
+        formats::say!("{}", file.display());
     }
     Ok(Outcome::Success)
 }

@@ -23,10 +23,10 @@ impl CasterArgs {
     pub fn caster(&self) -> anyhow::Result<Caster> {
         let caster = Caster::named(&self.adapter).context("cannot open the adapter")?;
         match caster.why_no_gpu() {
-            Some(why) if self.adapter == "auto" => eprintln!("Casting on the CPU: {why}."),
+            Some(why) if self.adapter == "auto" => formats::say!("Casting on the CPU: {why}."),
             _ => {
-                caster.skipped().iter().for_each(|why| eprintln!("Skipped an adapter: {why}."));
-                eprintln!("Casting on {}.", caster.name());
+                caster.skipped().iter().for_each(|why| formats::say!("Skipped an adapter: {why}."));
+                formats::say!("Casting on {}.", caster.name());
             }
         }
         Ok(caster)

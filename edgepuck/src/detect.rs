@@ -87,7 +87,7 @@ pub(crate) fn run(args: &DetectArgs) -> anyhow::Result<Outcome> {
         }))?
     } else {
         if camera.is_none() {
-            eprintln!(
+            formats::say!(
                 "the labels are in the sensor's frame: KITTI's tools expect those of --calib"
             );
         }
@@ -115,7 +115,7 @@ pub(crate) fn run(args: &DetectArgs) -> anyhow::Result<Outcome> {
         })
         .collect();
     preview::draw_from_above(&scan, &tints, &outlines, &args.input.title(), &picture)?;
-    eprintln!(
+    formats::say!(
         "{} points in {elapsed_ms:.1} ms: {} objects, {n_other} other clusters: {}",
         scan.len(),
         objects.len(),
@@ -200,7 +200,7 @@ impl Detector {
     pub fn open(model: &Path, options: &Options, min_points: usize) -> anyhow::Result<Self> {
         let classifier = Classifier::load(model, options)?;
         if let Some(warning) = classifier.unsuited_to_clusters() {
-            eprintln!("warning: {}: {warning}", model.display());
+            formats::say!("warning: {}: {warning}", model.display());
         }
         let mut settings = Settings::default();
         settings.min_points = min_points;

@@ -71,12 +71,12 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let mut recipe = read_recipe(&args.recipe)?;
     recipe.use_sensors(std::slice::from_ref(&args.sensor));
     let stage = Stage::new(recipe, &args.recipe, args.meshes.as_deref(), args.seed)?;
-    stage.warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
+    stage.warnings().iter().for_each(|warning| formats::say!("warning: {warning}"));
     let what = || format!("{} with the recipe {}", args.sensor, args.recipe.display());
     let mut drive = Drive::new(&stage, args.speed).with_context(what)?;
     let started = Instant::now();
     let n_points = write(&mut drive, args.seconds, &args.out)?;
-    eprintln!(
+    formats::say!(
         "{} s, {n_points} points: {}, in {:.1} s",
         args.seconds,
         args.out.display(),

@@ -84,7 +84,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let caster = args.caster.caster()?;
     let stage = Stage::with_caster(recipe, &args.recipe, meshes, args.seed, &caster)?;
     let stage = stage.with_culling(args.caster.culling());
-    stage.warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
+    stage.warnings().iter().for_each(|warning| formats::say!("warning: {warning}"));
     let started = Instant::now();
     let style = ProgressStyle::with_template("{bar:40} {pos}/{len} scenes, {per_sec}, {eta} left")?;
     let bar = ProgressBar::new(args.sweeps.into()).with_style(style);
@@ -120,7 +120,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     begun.finish();
     bar.finish_and_clear();
     let seconds = started.elapsed().as_secs_f64();
-    eprintln!(
+    formats::say!(
         "{} sweeps of {} points on average in {seconds:.1} s ({:.1} a second)",
         args.sweeps,
         n_points / args.sweeps as usize,
@@ -132,15 +132,15 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
         writeln!(out, "{class:<16} {train:>9} {test:>9}")?;
     }
     for (i, object) in stage.recipe().object.iter().enumerate().filter(|(i, _)| !stand[*i]) {
-        eprintln!(
+        formats::say!(
             "warning: object[{i}]: no scene has a {}: does it fit there, and is its count above 0?",
             object.class
         );
     }
     if counts.test.iter().all(|n| *n == 0) {
-        eprintln!("warning: no cluster is in the test part, which has every tenth of --sweeps");
+        formats::say!("warning: no cluster is in the test part, which has every tenth of --sweeps");
     }
-    eprintln!(
+    formats::say!(
         "Clusters: {}. Picture: {}.",
         packed.display(),
         args.out.join("preview.png").display()

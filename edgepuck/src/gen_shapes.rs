@@ -55,6 +55,6 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     begun.into_iter().for_each(UnfinishedFolder::finish);
     let classes = shapes::ShapeClass::ALL.len() as u32;
     let meshes = classes * (args.train + args.test);
-    eprintln!("{meshes} meshes of {classes} classes: {}", args.out.display());
+    formats::say!("{meshes} meshes of {classes} classes: {}", args.out.display());
     Ok(Outcome::Success)
 }

@@ -17,9 +17,9 @@ pub struct Args {
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let folders = args.shards.iter().map(|shard| dataset_folder(shard).to_path_buf());
     let manifest = merge(&folders.collect::<Vec<_>>(), &args.out)?;
-    eprintln!("{} meshes: {}", manifest.meshes.len(), args.out.display());
+    formats::say!("{} meshes: {}", manifest.meshes.len(), args.out.display());
     if manifest.adapters.len() > 1 {
-        eprintln!(
+        formats::say!(
             "The shards were cast on different adapters ({}): the clean scans equal those of one \
              run, but the noise differs in its last digits.",
             manifest.adapters.join(", ")

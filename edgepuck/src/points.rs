@@ -104,14 +104,14 @@ impl PointsArgs {
             None => velodyne::read_turn(file, &mut senders)?,
         };
         if let Some(warning) = senders.warning() {
-            eprintln!("warning: {}: {warning}", file.display());
+            formats::say!("warning: {}: {warning}", file.display());
         }
         if counts.missing > 0 {
             let (file, n) = (file.display(), counts.missing);
-            eprintln!("warning: {file}: {n} packets of the turn are probably missing");
+            formats::say!("warning: {file}: {n} packets of the turn are probably missing");
         }
         if counts.first_unread.is_some() {
-            eprintln!("warning: {}: {} UDP packets{counts}", file.display(), counts.packets);
+            formats::say!("warning: {}: {} UDP packets{counts}", file.display(), counts.packets);
         }
         Ok(scan)
     }
@@ -145,7 +145,7 @@ impl SweepArgs {
     /// Prints what is doubtful in the sweep.
     pub fn warn(&self, doubt: Option<String>) {
         if let Some(doubt) = doubt {
-            eprintln!("warning: {}: {doubt}", self.sweep.display());
+            formats::say!("warning: {}: {doubt}", self.sweep.display());
         }
     }
 

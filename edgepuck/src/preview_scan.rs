@@ -33,14 +33,14 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     args.overwrite.check([&*args.out])?;
     let clean = args.points.read(&args.scan)?;
     if clean.is_empty() {
-        eprintln!("{}: expected points to draw, found none", args.scan.display());
+        formats::say!("{}: expected points to draw, found none", args.scan.display());
         return Ok(Outcome::SomeRefused);
     }
     let noisy = args.noisy.clone().or_else(|| noisy_twin(&args.scan));
     let noisy = noisy.map(|file| args.points.read(&file)).transpose()?;
     let title = args.scan.file_stem().unwrap_or_default().to_string_lossy();
     preview::draw(&clean, noisy.as_ref(), &title, &args.out)?;
-    eprintln!("{} points: {}", clean.len(), args.out.display());
+    formats::say!("{} points: {}", clean.len(), args.out.display());
     Ok(Outcome::Success)
 }
 

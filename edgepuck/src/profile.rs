@@ -42,7 +42,7 @@ pub fn run(args: &ProfileArgs) -> anyhow::Result<Outcome> {
     let pattern = sensor.pattern();
     out.write_all(described(&sensor, &pattern).as_bytes())?;
     for oddity in oddities(&sensor, &pattern) {
-        eprintln!("warning: {oddity}");
+        formats::say!("warning: {oddity}");
     }
     if let Some(file) = &args.beams {
         atomic::write_bytes(file, beams(&pattern))?;

@@ -56,6 +56,6 @@ pub fn run(args: &SampleSurfacesArgs) -> anyhow::Result<Outcome> {
     let failures = write_surfaces(&args.out, &config, &meshes, &progress)?;
     print_notes(&progress.notes());
     report_failures(&failures);
-    eprintln!("{} meshes: {}", meshes.len() - failures.len(), args.out.display());
+    formats::say!("{} meshes: {}", meshes.len() - failures.len(), args.out.display());
     Ok(if failures.is_empty() { Outcome::Success } else { Outcome::SomeRefused })
 }

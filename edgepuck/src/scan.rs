@@ -118,7 +118,7 @@ impl MeshArgs {
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let format = ScanFormat::of_path(&args.out)?;
     let (mut scene, what) = scene(args)?;
-    scene.warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
+    scene.warnings().iter().for_each(|warning| formats::say!("warning: {warning}"));
     let mut returns = Returns::default();
     if format == ScanFormat::Pcap {
         returns = cast_packet_geometry(&mut scene, args.returns).with_context(|| what.clone())?;
@@ -145,7 +145,9 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     for ((scan, mounted), file) in scans.iter().zip(&scene.sensors).zip(&files) {
         let sensor = &mounted.name;
         if scan.cast_on_cpu {
-            eprintln!("{sensor}: one mesh exceeds the GPU's largest buffer, so the CPU cast it");
+            formats::say!(
+                "{sensor}: one mesh exceeds the GPU's largest buffer, so the CPU cast it"
+            );
         }
         match format {
             ScanFormat::Pcap => {
@@ -154,10 +156,12 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
             }
             _ => scan.save(file)?,
         }
-        eprintln!("{sensor}: {}: {}", told(&scene, scan), file.display());
+        formats::say!("{sensor}: {}: {}", told(&scene, scan), file.display());
     }
     if scans.iter().all(|scan| scan.is_empty()) {
-        eprintln!("warning: no beam returned a point: expected an object in the sensor's range");
+        formats::say!(
+            "warning: no beam returned a point: expected an object in the sensor's range"
+        );
         return Ok(Outcome::SomeRefused);
     }
     Ok(Outcome::Success)
@@ -224,7 +228,7 @@ fn scene_of_meshes(args: &Args) -> anyhow::Result<Scene> {
         let [least, most] = mesh.bounds_m().map(DVec3::from_array);
         (low, high) = (low.min(least), high.max(most));
         if let Some(doubt) = mesh.doubtful_size(unit) {
-            eprintln!("warning: {}: {doubt}; --units names another unit", file.display());
+            formats::say!("warning: {}: {doubt}; --units names another unit", file.display());
         }
         let id = scene.add(mesh, Pose::IDENTITY);
         scene[id].name = file.file_stem().map(|stem| stem.to_string_lossy().into_owned());
@@ -239,7 +243,7 @@ fn scene_of_meshes(args: &Args) -> anyhow::Result<Scene> {
     for (file, instance) in args.inputs.iter().zip(scene.instances()) {
         if instance.mesh.surrounds(&[pose.position_m]) {
             let file = file.display();
-            eprintln!(
+            formats::say!(
                 "warning: {file}: the sensor stands inside its bounding box: expected a larger --distance, or another of --units"
             );
         }
@@ -258,7 +262,7 @@ fn tell_objects(scene: &Scene) {
             .simplified
             .map(|s| format!(", {} triangles left, within {:.2e} m", s.triangles, s.bound_m))
             .unwrap_or_default();
-        eprintln!("object {number}: {name}{label}{simplified}");
+        formats::say!("object {number}: {name}{label}{simplified}");
     }
 }
 
@@ -291,7 +295,7 @@ fn write_default_scene() -> anyhow::Result<()> {
             atomic::write_bytes(&file, text)?;
         }
     }
-    eprintln!("No scene was named: scanning that of {DEFAULT_SCENE}.");
+    formats::say!("No scene was named: scanning that of {DEFAULT_SCENE}.");
     Ok(())
 }
 

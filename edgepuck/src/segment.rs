@@ -57,7 +57,7 @@ pub fn run(args: &SegmentArgs) -> anyhow::Result<Outcome> {
     )?;
     begun.into_iter().for_each(UnfinishedFolder::finish);
     let ground = segmentation.labels().iter().filter(|label| **label == Label::Ground).count();
-    eprintln!(
+    formats::say!(
         "{} points in {elapsed_ms:.1} ms: {} clusters, {:.0} % ground: {}",
         scan.len(),
         segmentation.clusters().len(),

@@ -91,9 +91,9 @@ pub fn run(args: &WeatherArgs) -> anyhow::Result<Outcome> {
     args.brightness.restore(&mut changed);
     write_scan(&args.out, format, Hashing::None, &changed)?;
     report(&fates, &changed);
-    eprintln!("{} points: {}", changed.len(), args.out.display());
+    formats::say!("{} points: {}", changed.len(), args.out.display());
     if changed.is_empty() {
-        eprintln!("warning: no point is left: expected milder weather, or another --profile");
+        formats::say!("warning: no point is left: expected milder weather, or another --profile");
         return Ok(Outcome::SomeRefused);
     }
     Ok(Outcome::Success)
@@ -116,7 +116,7 @@ impl WeatherArgs {
 fn report(fates: &Fates, changed: &Scan) {
     let all = fates.kept + fates.scattered + fates.lost + fates.passed_over;
     let line = |what: &str, count: usize| {
-        eprintln!("{what:<12}{count:>10}  {:5.1} %", 100.0 * count as f64 / all.max(1) as f64);
+        formats::say!("{what:<12}{count:>10}  {:5.1} %", 100.0 * count as f64 / all.max(1) as f64);
     };
     line("kept", fates.kept);
     for medium in Medium::ALL.into_iter().filter(|medium| *medium != Medium::Surface) {
@@ -129,7 +129,7 @@ fn report(fates: &Fates, changed: &Scan) {
     line("lost", fates.lost);
     if fates.too_weak_before > 0 {
         line("  before", fates.too_weak_before);
-        eprintln!("  (too weak for the profile's detection limit in clear air, too)");
+        formats::say!("  (too weak for the profile's detection limit in clear air, too)");
     }
     if fates.passed_over > 0 {
         line("no point", fates.passed_over);

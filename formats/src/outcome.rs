@@ -104,6 +104,12 @@ pub fn say(line: impl Display) {
     let _ = writeln!(io::stderr(), "{line}");
 }
 
+/// As `eprintln!`, but ignores errors of a closed standard error: the work goes on.
+#[macro_export]
+macro_rules! say {
+    ($($words:tt)*) => { $crate::outcome::say(format_args!($($words)*)) };
+}
+
 fn is_broken_pipe(error: &anyhow::Error) -> bool {
     let mut causes = error.chain().filter_map(|cause| cause.downcast_ref::<io::Error>());
     causes.any(|cause| cause.kind() == ErrorKind::BrokenPipe)

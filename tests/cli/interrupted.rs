@@ -52,6 +52,22 @@ fn a_run_that_is_told_to_end_says_so_and_goes_on_later() {
     assert!(codes.contains(&Some(75)), "{codes:?}");
 }
 
+/// As after `2>&1 | head -1`.
+#[test]
+fn a_reader_of_messages_that_leaves_does_not_end_the_work() {
+    let folder = Folder::with_meshes();
+    for (words, file) in [
+        ("gen-dataset meshes --out set --adapter cpu", "set/manifest.json"),
+        ("gen-scenes yard --sweeps 10 --save 1 --adapter cpu --out yard", "yard/packed/train.npz"),
+        ("detect yard/sweeps/000000.npz --out objects.json", "objects.json"),
+    ] {
+        let mut child = folder.edgepuck(words).stderr(Stdio::piped()).spawn().unwrap();
+        drop(child.stderr.take());
+        assert_eq!(child.wait().unwrap().code(), Some(0), "{words}");
+        assert!(folder.at(file).exists(), "{words}");
+    }
+}
+
 #[test]
 #[cfg(unix)]
 fn a_program_that_is_ended_leaves_nothing_unfinished() {

@@ -126,7 +126,7 @@ fn ended(written: &[Written<'_>]) -> Outcome {
     if written.iter().any(|written| written.count > 0) {
         return Outcome::Success;
     }
-    eprintln!("warning: nothing is left: expected other corruptions by --only, or milder ones");
+    formats::say!("warning: nothing is left: expected other corruptions by --only, or milder ones");
     Outcome::SomeRefused
 }
 

@@ -81,14 +81,14 @@ pub(super) fn run(
     let lines: Vec<Written<'_>> = named
         .map(|(((corruption, severity, by), set), &count)| {
             if count < of {
-                eprintln!("{}: {} of {of} views have no point", set.name, of - count);
+                formats::say!("{}: {} of {of} views have no point", set.name, of - count);
             }
             let file = format!("{}-test.npz", set.name);
             Written { file, corruption, severity, count, of, by }
         })
         .collect();
     write_list(&lines, out)?;
-    eprintln!("{} sets of {tested} meshes: {}", lines.len(), out.display());
+    formats::say!("{} sets of {tested} meshes: {}", lines.len(), out.display());
     if !written.failures.is_empty() {
         return Ok(Outcome::SomeRefused);
     }

@@ -54,7 +54,7 @@ pub(super) fn run(
                 Corruption::Motion { .. } => "times",
                 _ => "rings",
             };
-            eprintln!("{name}: left out, since the points of the sweep have no {lacks}");
+            formats::say!("{name}: left out, since the points of the sweep have no {lacks}");
             continue;
         };
         if is_dark {
@@ -63,7 +63,7 @@ pub(super) fn run(
         args.brightness.restore(&mut found);
         let file = format!("{name}.npz");
         write_scan(&args.out.join(&file), ScanFormat::Npz, Hashing::None, &found)?;
-        eprintln!("{name:<20} {:>9} of {} points", found.len(), scan.len());
+        formats::say!("{name:<20} {:>9} of {} points", found.len(), scan.len());
         if takes_light(corruption) {
             too_weak_before = too_weak_before.max(recorded.too_weak_before());
         }
@@ -75,12 +75,12 @@ pub(super) fn run(
     }
     begun.into_iter().for_each(UnfinishedFolder::finish);
     if too_weak_before > 0 {
-        eprintln!(
+        formats::say!(
             "warning: {too_weak_before} of the points are below the profile's detection limit as \
              they were recorded: see --profile, --white and --reflectivity"
         );
     }
-    eprintln!("{} scans: {}", written.len(), args.out.display());
+    formats::say!("{} scans: {}", written.len(), args.out.display());
     Ok(ended(&written))
 }
 

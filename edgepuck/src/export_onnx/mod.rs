@@ -91,7 +91,7 @@ pub fn run(args: &ExportOnnxArgs) -> anyhow::Result<Outcome> {
         values.iter().map(|value| value.name.clone()).collect::<Vec<_>>().join(", ")
     };
     let (from, to) = (names(&graph.input), names(&graph.output));
-    eprintln!("{}: {from} -> {to}, opset {OPSET}, {size} bytes", args.out.display());
+    formats::say!("{}: {from} -> {to}, opset {OPSET}, {size} bytes", args.out.display());
     Ok(Outcome::Success)
 }
 

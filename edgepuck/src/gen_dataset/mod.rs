@@ -155,7 +155,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     };
     made.or_else(|error| match error.downcast_ref() {
         Some(DatasetError::Interrupted { .. }) => {
-            eprintln!("{}: {error}", out.display());
+            formats::say!("{}: {error}", out.display());
             Ok(Outcome::Interrupted)
         }
         _ => Err(error),
@@ -175,7 +175,7 @@ fn make_files(
         report_failures(&manifest.failures);
         summary::print(plan.out, &manifest, progress, started.elapsed(), verbose);
     } else {
-        eprintln!("{}: the dataset is already complete.", plan.out.display());
+        formats::say!("{}: the dataset is already complete.", plan.out.display());
     }
     end(plan.out, &manifest)
 }
@@ -184,7 +184,7 @@ fn make_files(
 pub fn listed(folder: &Path, seed: u64) -> anyhow::Result<Vec<MeshEntry>> {
     let meshes = discover(folder, seed)?;
     for doubt in doubts(folder, &meshes) {
-        eprintln!("warning: {}: {doubt}", folder.display());
+        formats::say!("warning: {}: {doubt}", folder.display());
     }
     Ok(meshes)
 }
@@ -192,15 +192,17 @@ pub fn listed(folder: &Path, seed: u64) -> anyhow::Result<Vec<MeshEntry>> {
 /// Prints the meshes that failed, with the causes.
 pub fn report_failures(failures: &[MeshFailure]) {
     for failure in failures {
-        eprintln!("failed: {failure}");
+        formats::say!("failed: {failure}");
     }
 }
 
 /// Draws the example picture, which is missing after an interruption, and prints its path.
 pub(crate) fn end(out: &Path, manifest: &Manifest) -> anyhow::Result<Outcome> {
     match example::draw(out, manifest).context("cannot draw the example")? {
-        Some(picture) => eprintln!("Open this picture to see an example: {}", picture.display()),
-        None => eprintln!("No scan holds a point, so no example picture was drawn."),
+        Some(picture) => {
+            formats::say!("Open this picture to see an example: {}", picture.display())
+        }
+        None => formats::say!("No scan holds a point, so no example picture was drawn."),
     }
     let has_clouds = report_empty_sets(manifest) && report_empty_packed(manifest);
     Ok(match manifest.failures.is_empty() && has_clouds {
@@ -232,7 +234,7 @@ fn report_empty_sets(manifest: &Manifest) -> bool {
                 tally.out_of_range, range.min_m, range.max_m
             ),
         };
-        eprintln!(
+        formats::say!(
             "No scan of {} holds a point: {reason}. --distance, --normalize and --units change this.",
             set.name
         );
@@ -247,7 +249,7 @@ fn report_empty_packed(manifest: &Manifest) -> bool {
     let empty: Vec<_> = manifest.packed.iter().filter(is_empty).collect();
     for PackedRecord { file, left_out, .. } in &empty {
         let most = left_out.iter().map(|scan| scan.points).max().unwrap_or_default();
-        eprintln!(
+        formats::say!(
             "{file} holds no cloud: expected scans of {} points, found {most} at most. --min-points, \
              --distance and --sensor change this.",
             manifest.config.min_points
@@ -268,14 +270,17 @@ fn check(folder: &Path) -> anyhow::Result<Outcome> {
         writeln!(out, "{problem}")?;
     }
     let (files, problems) = (report.files, report.problems.len());
-    eprintln!("{}: {files} files {by}, {problems} problems.", folder.display());
+    formats::say!("{}: {files} files {by}, {problems} problems.", folder.display());
     Ok(if report.is_sound() { Outcome::Success } else { Outcome::SomeFailed })
 }
 
 fn write_default_shapes(seed: u64) -> anyhow::Result<PathBuf> {
     // Each seed has its own folder, so that meshes of different runs do not mix.
     let folder = PathBuf::from(format!("{DEFAULT_SHAPES}-{seed}"));
-    eprintln!("No meshes were named: writing built-in procedural shapes to {}.", folder.display());
+    formats::say!(
+        "No meshes were named: writing built-in procedural shapes to {}.",
+        folder.display()
+    );
     shapes::write_tree(&folder, seed, gen_shapes::TRAIN_PER_CLASS, gen_shapes::TEST_PER_CLASS)
         .context("cannot write the shapes")?;
     Ok(folder)

@@ -7,7 +7,7 @@ use std::time::Duration;
 pub fn print(out: &Path, manifest: &Manifest, progress: &Progress, total: Duration, verbose: bool) {
     print_notes(&progress.notes());
     let seconds = total.as_secs_f64();
-    eprintln!(
+    formats::say!(
         "{} meshes, {} failed; {} scans, {} points in {seconds:.1} s ({:.1} meshes/s)",
         manifest.meshes.len(),
         manifest.failures.len(),
@@ -23,27 +23,27 @@ pub fn print(out: &Path, manifest: &Manifest, progress: &Progress, total: Durati
         (before + mesh.triangles, after + simplified.triangles)
     });
     if manifest.config.simplify.is_some() {
-        eprintln!("simplified: {after} triangles cast at for {before} in the files");
+        formats::say!("simplified: {after} triangles cast at for {before} in the files");
     }
     for packed in &manifest.packed {
         let left_out = match packed.left_out.len() {
             0 => "0 left out".to_owned(),
             n => format!("{n} left out for fewer than {} points", manifest.config.min_points),
         };
-        eprintln!("{}: {} clouds, {left_out}", packed.file, packed.clouds);
+        formats::say!("{}: {} clouds, {left_out}", packed.file, packed.clouds);
     }
     if !manifest.failures.is_empty() {
-        eprintln!("Meshes that failed are listed in {}", layout::failures(out).display());
+        formats::say!("Meshes that failed are listed in {}", layout::failures(out).display());
     }
-    eprintln!("Dataset: {}", out.display());
+    formats::say!("Dataset: {}", out.display());
 }
 
 /// Prints the first notes, and how many more there are.
 pub fn print_notes(notes: &[String]) {
     const MOST: usize = 10;
-    notes.iter().take(MOST).for_each(|note| eprintln!("{note}"));
+    notes.iter().take(MOST).for_each(|note| formats::say!("{note}"));
     if notes.len() > MOST {
-        eprintln!("... and {} more such notes", notes.len() - MOST);
+        formats::say!("... and {} more such notes", notes.len() - MOST);
     }
 }
 
@@ -51,7 +51,7 @@ pub fn print_notes(notes: &[String]) {
 fn print_costs(progress: &Progress) {
     let count = |counter: &AtomicU64| counter.load(Relaxed);
     let (cast, culled) = (count(&progress.rays_cast), count(&progress.rays_culled));
-    eprintln!(
+    formats::say!(
         "{cast} rays cast, {culled} left out because they cannot hit a mesh, {} decided in double \
          precision",
         count(&progress.rays_decided_in_f64)
@@ -60,5 +60,5 @@ fn print_costs(progress: &Progress) {
         .iter()
         .map(|&stage| format!("{} {:.1}", stage.name(), progress.spent(stage).as_secs_f64()))
         .collect();
-    eprintln!("seconds over all threads: {}", stages.join(", "));
+    formats::say!("seconds over all threads: {}", stages.join(", "));
 }

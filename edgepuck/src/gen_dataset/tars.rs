@@ -56,7 +56,7 @@ pub fn run(
     let tars = Tars {
         cut: Cut { sample: args.sample, clouds_per_tar: args.tar_clouds },
         on_made: &|TarRecord { file, clouds, bytes, .. }| {
-            eprintln!("{file}: {clouds} clouds, {} MiB", bytes >> 20);
+            formats::say!("{file}: {clouds} clouds, {} MiB", bytes >> 20);
         },
         hand_over: hand_over.as_ref().map(|hand_over| hand_over as HandOver),
     };
@@ -70,7 +70,7 @@ pub fn run(
     let clouds: u64 = made.tars.iter().map(|tar| tar.clouds).sum();
     let bytes: u64 = made.tars.iter().map(|tar| tar.bytes).sum();
     let (tars, mib, out) = (made.tars.len(), bytes >> 20, plan.out.display());
-    eprintln!("{tars} tars, {clouds} clouds, {mib} MiB: {out}");
+    formats::say!("{tars} tars, {clouds} clouds, {mib} MiB: {out}");
     Ok(if failures.is_empty() { Outcome::Success } else { Outcome::SomeRefused })
 }
 
@@ -88,7 +88,7 @@ fn hand_over(command: &str, tar: &Path, stop: &AtomicBool) -> Result<(), String>
             Err(error) => format!("the shell: {error}"),
         };
         let Some(&pause_s) = pauses_s.next() else { return Err(cause) };
-        eprintln!("{cause}; trying again in {pause_s} s");
+        formats::say!("{cause}; trying again in {pause_s} s");
         for _ in 0..10 * pause_s {
             if stop.load(SeqCst) {
                 return Err(cause);

@@ -66,7 +66,7 @@ impl CardArgs {
             _ if self.accuracy.is_some() => self.accuracy.clone(),
             Ok(stated) => stated.clone().or(card.accuracy),
             Err(kind) => {
-                eprintln!("{}: its accuracy is a {kind}; --accuracy states it", path.display());
+                formats::say!("{}: its accuracy is a {kind}; --accuracy states it", path.display());
                 card.accuracy
             }
         };
@@ -90,7 +90,9 @@ impl CardArgs {
             let fits = table.default_classes.len() == n_logits;
             if !fits {
                 let checkpoint = checkpoint.display();
-                eprintln!("{checkpoint}: {n_logits} classes without names; --classes names them");
+                formats::say!(
+                    "{checkpoint}: {n_logits} classes without names; --classes names them"
+                );
             }
             return Ok(if fits { table.default_classes.clone() } else { Vec::new() });
         };

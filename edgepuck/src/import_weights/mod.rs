@@ -59,7 +59,7 @@ pub fn run(args: &ImportWeightsArgs) -> anyhow::Result<Outcome> {
     let ranges = check(args, &names, &tensors, &metadata)?;
     metadata.extend(ranges);
     write_weights(&args.out, &tensors, &metadata)?;
-    eprintln!("{widths}, named as by {}: {}", table.name, args.out.display());
+    formats::say!("{widths}, named as by {}: {}", table.name, args.out.display());
     Ok(Outcome::Success)
 }
 

@@ -125,7 +125,7 @@ fn report_clouds(
     let found = confusion(&args.model, &clouds, &options(args))?;
     let mut pairs = names.iter().zip(&clouds.classes).enumerate();
     if let Some((class, (model, data))) = pairs.find(|(_, (model, data))| model != data) {
-        eprintln!(
+        formats::say!(
             "warning: class {class} is called `{model}` by the model and `{data}` by the data"
         );
     }

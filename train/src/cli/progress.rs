@@ -11,7 +11,7 @@ pub fn shown() -> impl FnMut(Progress<'_>) {
     let mut bar = ProgressBar::hidden();
     move |progress| match progress {
         Progress::Resumed { epoch, epochs } => {
-            eprintln!("resuming after epoch {epoch} of {epochs}");
+            formats::say!("resuming after epoch {epoch} of {epochs}");
         }
         Progress::Step { epoch, epochs, step, steps, summary } => {
             if step == 1 {
@@ -25,6 +25,6 @@ pub fn shown() -> impl FnMut(Progress<'_>) {
                 bar.finish_and_clear();
             }
         }
-        Progress::Epoch(row) => eprintln!("{row}"),
+        Progress::Epoch(row) => formats::say!("{row}"),
     }
 }

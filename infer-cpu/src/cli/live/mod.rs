@@ -167,7 +167,7 @@ pub fn run(args: &LiveArgs) -> anyhow::Result<Outcome> {
             }
             Tick::Quiet if heard.elapsed() >= SILENCE && !is_silent => {
                 is_silent = true;
-                eprintln!("warning: {}", args.silence());
+                formats::say!("warning: {}", args.silence());
             }
             Tick::Quiet => {}
             Tick::End => {
@@ -185,8 +185,8 @@ pub fn run(args: &LiveArgs) -> anyhow::Result<Outcome> {
         }
         for flaw in pipeline.new_flaws() {
             match flaw {
-                Flaw::Times { .. } => eprintln!("warning: {flaw}"),
-                _ => eprintln!(
+                Flaw::Times { .. } => formats::say!("warning: {flaw}"),
+                _ => formats::say!(
                     "warning: ignored a packet, and will ignore others with the same flaw: {flaw}"
                 ),
             }
@@ -203,12 +203,12 @@ pub fn run(args: &LiveArgs) -> anyhow::Result<Outcome> {
     }
     read.error.take().map_or(Ok(()), Err)?;
     if !args.stats && read.capture.first_unread.is_some() {
-        eprintln!("warning: {}{} UDP packets{}", args.capture(), read.n_packets, read.capture);
+        formats::say!("warning: {}{} UDP packets{}", args.capture(), read.n_packets, read.capture);
     }
     let Counts { packets, lost, .. } = *pipeline.counts();
     if !args.stats && lost > 0 {
         let of = packets + lost;
-        eprintln!("warning: {}{lost} of {of} packets are probably missing", args.capture());
+        formats::say!("warning: {}{lost} of {of} packets are probably missing", args.capture());
     }
     if packets == 0 {
         let cause = format!(
@@ -223,7 +223,7 @@ pub fn run(args: &LiveArgs) -> anyhow::Result<Outcome> {
         if args.udp.is_none() {
             return Err(Usage(cause).into());
         }
-        eprintln!("warning: {cause}");
+        formats::say!("warning: {cause}");
     }
     Ok(Outcome::Success)
 }
@@ -235,7 +235,7 @@ impl LiveArgs {
         let options = Options { precision: self.precision, threads, ..Options::default() };
         let classifier = Classifier::load(&model, &options).map_err(of_setup)?;
         if let Some(warning) = classifier.unsuited_to_clusters() {
-            eprintln!("warning: {}: {warning}", model.display());
+            formats::say!("warning: {}: {warning}", model.display());
         }
         Ok(Pipeline::new(classifier, live)?)
     }
@@ -262,7 +262,7 @@ impl LiveArgs {
     fn warn_of_poses(&self, options: &LiveOptions) {
         let doubts = options.ego_motion.as_ref().map(EgoMotion::doubts).unwrap_or_default();
         for (doubt, file) in doubts.iter().zip(self.poses.iter().cycle()) {
-            eprintln!("warning: {}: {doubt}", file.display());
+            formats::say!("warning: {}: {doubt}", file.display());
         }
     }
 

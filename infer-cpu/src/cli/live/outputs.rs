@@ -40,7 +40,9 @@ impl Outputs {
         if let Err(failure) = recorder.packet(pipeline) {
             if self.lines.is_some() {
                 let cause = &failure.source;
-                eprintln!("warning: the recording ends, the lines continue: {failure}: {cause}");
+                formats::say!(
+                    "warning: the recording ends, the lines continue: {failure}: {cause}"
+                );
             }
             (self.recorder, self.recorder_failure) = (None, Some(failure));
         }

@@ -71,7 +71,7 @@ impl Sensor {
             && !self.has_warned
             && let Some(warning) = self.senders.warning()
         {
-            eprintln!("warning: {warning}");
+            formats::say!("warning: {warning}");
             self.has_warned = true;
         }
         is_used
@@ -115,7 +115,7 @@ impl Source {
         is_over: &Arc<AtomicBool>,
     ) -> anyhow::Result<Self> {
         let socket = bind(address, multicast).with_context(|| format!("UDP {address}"))?;
-        eprintln!("listening on UDP {}", socket.local_addr()?);
+        formats::say!("listening on UDP {}", socket.local_addr()?);
         let (fill, filled) = sync_channel(RING);
         let (empty, empties) = sync_channel(RING);
         for _ in 0..RING {
