@@ -1,6 +1,5 @@
 //! `edgepuck detect`: detects and classifies the objects of a sweep.
 
-pub(crate) mod kitti;
 mod rule;
 
 use std::path::{Path, PathBuf};
@@ -8,19 +7,18 @@ use std::time::Instant;
 
 use edgepuck_segment::{Hierarchy, Label, Node, OrientedBox, Segmenter, Settings, Sweep};
 use formats::{Scan, atomic};
-use glam::{DQuat, DVec3};
 use infer_cpu::{Classifier, ClassifierTeam, Options, Precision, Prediction};
 use plotters::style::RGBColor;
 use serde_json::{Value, json};
-use sim_gpu::glam;
 
 use crate::flags::probability;
+use crate::kitti::{Camera, corners, line};
 use crate::points::SweepArgs;
 use crate::preview::panel::Outline;
 use crate::segment::tint;
+use crate::street::StreetClass;
 use crate::{Outcome, Usage, preview};
 use formats::outputs::{Overwrite, need_extension};
-use kitti::{Camera, label};
 use rule::{MARGIN_OF_WHOLES, Rule, WIDEST_M};
 
 /// The least confidence of an object, chosen by the false alarms on labelled sweeps
@@ -122,48 +120,6 @@ pub(crate) fn run(args: &DetectArgs) -> anyhow::Result<Outcome> {
         args.out.display()
     );
     Ok(Outcome::Success)
-}
-
-/// A class of streets.
-#[derive(Clone, Copy)]
-struct StreetClass {
-    name: &'static str,
-    /// KITTI's type for it.
-    kitti: &'static str,
-    /// The usual length and width, metres: the anchors of OpenPCDet's configurations for KITTI
-    /// (pointpillar.yaml), and for trucks and buses those for nuScenes (cbgs_pp_multihead.yaml).
-    usual_m: [f32; 2],
-    /// Its colour in pictures.
-    tint: RGBColor,
-}
-
-const STREET: [StreetClass; 5] = [
-    StreetClass { name: "bus", kitti: "Misc", usual_m: [10.5, 2.94], tint: RGBColor(0, 90, 210) },
-    StreetClass { name: "car", kitti: "Car", usual_m: [3.9, 1.6], tint: RGBColor(210, 20, 40) },
-    StreetClass {
-        name: "person",
-        kitti: "Pedestrian",
-        usual_m: [0.8, 0.6],
-        tint: RGBColor(0, 140, 60),
-    },
-    StreetClass {
-        name: "truck",
-        kitti: "Truck",
-        usual_m: [6.93, 2.51],
-        tint: RGBColor(220, 110, 0),
-    },
-    StreetClass {
-        name: "two-wheeler",
-        kitti: "Cyclist",
-        usual_m: [1.76, 0.6],
-        tint: RGBColor(150, 30, 180),
-    },
-];
-
-impl StreetClass {
-    fn named(name: &str) -> Option<Self> {
-        STREET.into_iter().find(|class| class.name == name)
-    }
 }
 
 /// Detects and classifies objects in sweeps.
@@ -318,15 +274,9 @@ impl Object {
     }
 }
 
-/// The corners of a box around the base and then around the top, metres.
-pub(crate) fn corners(place: &OrientedBox) -> [DVec3; 8] {
-    let OrientedBox { centre_m, size_m, yaw_rad } = *place;
-    let turned = DQuat::from_rotation_z(yaw_rad.into());
-    let [ahead, aside, up] =
-        [0, 1, 2].map(|axis| turned * DVec3::AXES[axis] * f64::from(size_m[axis]) * 0.5);
-    let at = |level: f64, [x, y]: [f64; 2]| {
-        DVec3::from(centre_m.map(f64::from)) + x * ahead + y * aside + level * up
-    };
-    let around = [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]];
-    [0, 1, 2, 3, 4, 5, 6, 7].map(|i| at(if i < 4 { -1.0 } else { 1.0 }, around[i % 4]))
+/// The line of an object in KITTI's labels of results, with its score.
+fn label(object: &Object, camera: Option<&Camera>) -> String {
+    let bounds = camera.and_then(|camera| camera.bounds(corners(&object.whole)));
+    let about = line(&object.class, [-1.0, -1.0], bounds, &object.whole, camera);
+    format!("{about} {:.4}\n", object.confidence)
 }

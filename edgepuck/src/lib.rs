@@ -21,6 +21,8 @@ pub mod gen_scenes;
 pub mod gen_shapes;
 #[cfg(feature = "models")]
 mod import_weights;
+#[cfg_attr(not(feature = "models"), allow(dead_code, reason = "`detect` uses the rest"))]
+mod kitti;
 mod merge_dataset;
 pub mod points;
 mod preview;
@@ -32,6 +34,8 @@ mod segment;
 mod shell;
 mod signals;
 pub mod significant_digits;
+#[cfg_attr(not(feature = "models"), allow(dead_code, reason = "`detect` uses the rest"))]
+mod street;
 mod weather;
 
 pub use formats::outcome::{self, Outcome, Usage};

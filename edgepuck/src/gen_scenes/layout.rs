@@ -15,8 +15,7 @@ use glam::DVec3;
 use sim_gpu::glam;
 
 use super::sweep_file::semantic_labels;
-use crate::detect::corners;
-use crate::detect::kitti::{Camera, line};
+use crate::kitti::{Camera, corners, line};
 
 formats::named! {
     /// A layout of data sets of sweeps.

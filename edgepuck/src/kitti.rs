@@ -4,12 +4,12 @@ use anyhow::Context;
 use edgepuck_segment::OrientedBox;
 use formats::FormatError;
 use formats::foreign::read_text;
-use glam::{DMat3, DMat4, DVec3};
+use glam::{DMat3, DMat4, DQuat, DVec3};
 use sim_gpu::glam;
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
-use super::{Object, StreetClass, corners};
+use crate::street::StreetClass;
 
 /// The most that products of a rotation's rows may be off: KITTI rounds to 7 digits, others to 3.
 const NOT_A_ROTATION: f64 = 0.01;
@@ -102,16 +102,9 @@ fn rotation(text: &str, key: &'static str, columns: usize) -> Result<DMat4, Flaw
     Ok(found)
 }
 
-/// The line of an object: type, truncation, occlusion, alpha, left, top, right, bottom, height,
-/// width, length, x, y, z, rotation and score, in the frame of `camera` or else the sensor's.
-pub fn label(object: &Object, camera: Option<&Camera>) -> String {
-    let bounds = camera.and_then(|camera| camera.bounds(corners(&object.whole)));
-    let about = line(&object.class, [-1.0, -1.0], bounds, &object.whole, camera);
-    format!("{about} {:.4}\n", object.confidence)
-}
-
-/// The same line without the score: `truncated` is 0 to 1, `occluded` 0 to 3, and `bounds` are in the
-/// picture, pixels.
+/// The line of an object but for its score: type, truncation, occlusion, alpha, left, top, right, bottom,
+/// height, width, length, x, y, z and rotation, in the frame of `camera` or else the sensor's.
+/// `truncated` is 0 to 1, `occluded` 0 to 3, and `bounds` are in the picture, pixels.
 pub fn line(
     class: &str,
     [truncated, occluded]: [f64; 2],
@@ -141,6 +134,19 @@ pub fn line(
     )
 }
 
+/// The corners of a box around the base and then around the top, metres.
+pub fn corners(place: &OrientedBox) -> [DVec3; 8] {
+    let OrientedBox { centre_m, size_m, yaw_rad } = *place;
+    let turned = DQuat::from_rotation_z(yaw_rad.into());
+    let [ahead, aside, up] =
+        [0, 1, 2].map(|axis| turned * DVec3::AXES[axis] * f64::from(size_m[axis]) * 0.5);
+    let at = |level: f64, [x, y]: [f64; 2]| {
+        DVec3::from(centre_m.map(f64::from)) + x * ahead + y * aside + level * up
+    };
+    let around = [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]];
+    [0, 1, 2, 3, 4, 5, 6, 7].map(|i| at(if i < 4 { -1.0 } else { 1.0 }, around[i % 4]))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -149,18 +155,10 @@ mod tests {
     const CALIBRATION: &str = "P2: 700 0 600 0 0 700 180 0 0 0 1 0\n\
         R0_rect: 1 0 0 0 1 0 0 0 1\nTr_velo_to_cam: 0 -1 0 0 0 0 -1 0 1 0 0 0\n";
 
-    fn object(class: &str, centre_m: [f32; 3]) -> Object {
+    fn label(class: &str, centre_m: [f32; 3], camera: Option<&Camera>) -> String {
         let place = OrientedBox { centre_m, size_m: [4.0, 2.0, 1.0], yaw_rad: 0.0 };
-        let (class, class_number) = (class.to_owned(), 0);
-        Object {
-            cluster: 0,
-            class,
-            class_number,
-            confidence: 0.875,
-            n_points: 50,
-            place,
-            whole: place,
-        }
+        let bounds = camera.and_then(|camera| camera.bounds(corners(&place)));
+        line(class, [-1.0, -1.0], bounds, &place, camera)
     }
 
     #[test]
@@ -169,22 +167,21 @@ mod tests {
         let file = folder.path().join("calib.txt");
         std::fs::write(&file, CALIBRATION).unwrap();
         let camera = Camera::read(&file).unwrap();
-        let ahead = object("car", [10.0, 0.0, 0.0]);
+        let ahead = ("car", [10.0, 0.0, 0.0]);
         assert_eq!(
-            label(&ahead, None),
-            "Car -1 -1 -10.00 -1.00 -1.00 -1.00 -1.00 1.00 2.00 4.00 10.00 0.00 -0.50 0.00 0.8750\n"
+            label(ahead.0, ahead.1, None),
+            "Car -1 -1 -10.00 -1.00 -1.00 -1.00 -1.00 1.00 2.00 4.00 10.00 0.00 -0.50 0.00"
         );
         // The near face is 8 m away: 700 / 8 pixels a metre. A car that drives away has a rotation
         // of -pi / 2.
         assert_eq!(
-            label(&ahead, Some(&camera)),
-            "Car -1 -1 -1.57 512.50 136.25 687.50 223.75 1.00 2.00 4.00 0.00 0.50 10.00 -1.57 0.8750\n"
+            label(ahead.0, ahead.1, Some(&camera)),
+            "Car -1 -1 -1.57 512.50 136.25 687.50 223.75 1.00 2.00 4.00 0.00 0.50 10.00 -1.57"
         );
         // Behind the camera there is no picture, and -pi / 2 - pi is pi / 2.
         assert_eq!(
-            label(&object("garden chair", [-10.0, 0.0, 0.0]), Some(&camera)),
-            "garden_chair -1 -1 1.57 -1.00 -1.00 -1.00 -1.00 1.00 2.00 4.00 0.00 0.50 -10.00 -1.57 \
-             0.8750\n"
+            label("garden chair", [-10.0, 0.0, 0.0], Some(&camera)),
+            "garden_chair -1 -1 1.57 -1.00 -1.00 -1.00 -1.00 1.00 2.00 4.00 0.00 0.50 -10.00 -1.57"
         );
         for (valid, other, expected) in [
             ("180", "x", "P2: expected a line of 12 finite numbers, found 6"),
