@@ -156,7 +156,7 @@ fn is_written(file: &Path) -> bool {
         "npz" if ["train", "test"].contains(&&*stem) => true,
         "txt" if ["train", "val", "calib", "poses", "times"].contains(&&*stem) => true,
         "npz" | "npy" | "json" | "bin" | "label" | "pcd" | "las" | "txt" => {
-            stem.len() == 6 && stem.parse::<u32>().is_ok()
+            stem.len() >= 6 && stem.parse::<u32>().is_ok()
         }
         _ => false,
     }

@@ -177,6 +177,10 @@ fn read_npz(path: &Path) -> Result<Scan, FormatError> {
         let of = &mut npz;
         match scan.slot(attribute) {
             ColumnSlot::F32(slot) => *slot = Some(read_column(of, attribute, 1, n, single)?),
+            // Other numbers are intensities.
+            ColumnSlot::U8(slot) if attribute == Attribute::Reflectivity => {
+                *slot = read_column(of, attribute, 1, n, whole).ok();
+            }
             ColumnSlot::U8(slot) => *slot = Some(read_column(of, attribute, 1, n, whole)?),
             ColumnSlot::U16(slot) => *slot = Some(read_column(of, attribute, 1, n, whole)?),
             ColumnSlot::U32(slot) => *slot = Some(read_column(of, attribute, 1, n, whole)?),

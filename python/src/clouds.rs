@@ -105,7 +105,11 @@ impl Clouds {
 fn argument_error(error: &anyhow::Error) -> String {
     let text = formats::outcome::joined_causes(error);
     let cause = text.split("\n\n").next().unwrap_or_default();
-    cause.trim_start_matches("error: ").trim_start_matches("--").trim_end().replace("'--", "'")
+    let cause = cause.trim_start_matches("error: ").trim_end().replace("'--", "'");
+    match cause.strip_prefix("--").and_then(|cause| cause.split_once(':')) {
+        Some((flag, cause)) => format!("{}:{cause}", flag.replace('-', "_")),
+        None => cause,
+    }
 }
 
 impl Clouds {

@@ -193,9 +193,9 @@ fn corruptions_of_one_s_own_and_what_is_refused() {
             ("corrupt cloud.xyz --reflectivity 1 --only fgo", "expected some of fog, wet-ground"),
             (
                 "corrupt cloud.xyz --views 2",
-                "--views applies to a folder of meshes only: cloud.xyz",
+                "--views applies to a folder of meshes only, and cloud.xyz",
             ),
-            ("corrupt empty --white 2", "--white applies to a sweep only: empty is none"),
+            ("corrupt empty --white 2", "--white applies to a sweep only, and empty is a folder"),
             ("corrupt cloud.xyz --reflectivity 1 --severity 4", "expected 1 to 3, found 4"),
             ("corrupt cloud.xyz --reflectivity 2", "<R>': expected a number from 0 to 1"),
         ],

@@ -115,7 +115,7 @@ fn a_folder_in_use_is_refused_unless_told_otherwise() {
     assert!(folder.at("out/mine.txt").exists(), "what is not ours stays");
     // Advice that would not help is not given.
     for (file, what) in [
-        ("a/manifest.json", "no manifest of a dataset (expected value at line 1 column 1)"),
+        ("a/manifest.json", "damaged, or of another program (expected value at line 1 column 1)"),
         ("b/packed/c", "another folder"),
         ("d/journal/e", "another folder"),
     ] {

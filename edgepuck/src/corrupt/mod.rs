@@ -74,12 +74,12 @@ pub fn run(args: &CorruptArgs) -> anyhow::Result<Outcome> {
         return Ok(Outcome::Success);
     }
     let sweep = args.sweep.clone().expect("invariant: required without --list");
-    let (given, other) = match sweep.is_dir() {
-        true => (args.brightness.given(), "a sweep"),
-        false => (args.objects.given(), "a folder of meshes"),
+    let (given, other, found) = match sweep.is_dir() {
+        true => (args.brightness.given(), "a sweep", "a folder"),
+        false => (args.objects.given(), "a folder of meshes", "a file"),
     };
-    if let Some(flag) = given {
-        let cause = format!("{flag} applies to {other} only: {} is none", sweep.display());
+    if let Some(flag) = given.filter(|_| sweep.exists()) {
+        let cause = format!("{flag} applies to {other} only, and {} is {found}", sweep.display());
         return Err(Usage(cause).into());
     }
     args.overwrite.check_folder(&args.out)?;

@@ -34,7 +34,7 @@ impl Unit {
     /// The intensities of these numbers, if they are any.
     pub fn intensities(self, mut values: Vec<f32>) -> Option<Vec<f32>> {
         let most = values.iter().copied().fold(0.0, f32::max);
-        let is_byte = |x: &f32| x.fract() == 0.0 && (0.0..256.0).contains(x);
+        let is_byte = |x: &f32| x.is_nan() || x.fract() == 0.0 && (0.0..256.0).contains(x);
         let white = match self {
             Self::Percent if most > 1.0 && values.iter().all(is_byte) => 100.0,
             #[cfg(feature = "las")]

@@ -32,11 +32,16 @@ pub(super) fn read(reader: impl Read + Seek, name: &Path) -> Result<Cloud, Forma
         && let Some((key, unit)) = intensity::find(key)
     {
         let n = cloud.points.len();
+        // An `i` of another shape is no column of points.
+        let is_short = key.len() == 1;
         let values = npz.entry(key, |header, _, elements| {
-            crate::npy::check_columns(&header, 1, n)?;
-            crate::npy::read_numbers(elements, &header, |x| x as f32)
+            match crate::npy::check_columns(&header, 1, n) {
+                Err(_) if is_short => return Ok(None),
+                found => found?,
+            }
+            crate::npy::read_numbers(elements, &header, |x| x as f32).map(Some)
         })?;
-        cloud.intensities = unit.intensities(values);
+        cloud.intensities = values.and_then(|values| unit.intensities(values));
     }
     Ok(cloud)
 }

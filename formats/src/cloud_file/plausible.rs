@@ -56,15 +56,16 @@ pub fn judge_sweep(
 ) -> Result<Option<String>, (String, String)> {
     let (mut nearest, mut farthest) = (f64::INFINITY, 0.0);
     let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for (i, point) in points.into_iter().enumerate() {
+    let points: Vec<[f64; 3]> = points.into_iter().collect();
+    for (i, &point) in points.iter().enumerate() {
         let finite = point.iter().filter(|x| x.is_finite()).count();
         if !matches!(finite, 0 | 3) || point.iter().any(|x| x.is_finite() && x.abs() > FARTHEST_M) {
-            let cause = match point.iter().find(|x| !x.is_finite()) {
-                Some(x) => format!(
-                    "expected three finite numbers, or none for a lost return, found {point:?}, of \
-                     which {x} is no place: remove the point"
+            let cause = match point.iter().all(|x| x.is_finite()) {
+                false => format!(
+                    "expected three finite numbers, or none for a lost return, found {point:?}: remove \
+                     the point"
                 ),
-                None => format!("expected metres from the sensor, found {point:?}: {remedy}"),
+                true => format!("expected metres from the sensor, found {point:?}: {remedy}"),
             };
             return Err((format!("point {i}"), cause));
         }
@@ -83,7 +84,7 @@ pub fn judge_sweep(
         ("farthest", farthest, "0.5 m to 2 km; are the points in metres?")
     } else if nearest > NEAREST_M && (0..2).any(|i| low[i] > 0.0 || high[i] < 0.0) {
         ("nearest", nearest, "at most 50 m; is the origin the position of the sensor?")
-    } else if let Some(unit) = unit_of_angles(low, high) {
+    } else if let Some(unit) = unit_of_angles(&points, low, high) {
         return Ok(Some(format!(
             "the columns are within the bounds of a range, an azimuth and an elevation in {unit}: \
              expected x, y and z in metres"
@@ -94,9 +95,21 @@ pub fn judge_sweep(
     Ok(Some(format!("the {what} point is {found:.3} m from the sensor: expected {expected}")))
 }
 
-/// The unit of angles, if the columns between `low` and `high` are probably a range and two angles: none
-/// is beyond its bounds, and one fills a turn.
-fn unit_of_angles(low: [f64; 3], high: [f64; 3]) -> Option<&'static str> {
+/// The unit of angles, if the columns of `points`, between `low` and `high`, are probably a range and two
+/// angles: none is beyond its bounds, and one fills a turn, also for the nearest tenth of the points. To
+/// the sides, a sensor that looks ahead sees less far of what is near.
+fn unit_of_angles(points: &[[f64; 3]], low: [f64; 3], high: [f64; 3]) -> Option<&'static str> {
+    let fill = |turn: f64, range: usize, azimuth: usize| {
+        let mut near: Vec<&[f64; 3]> =
+            points.iter().filter(|point| length(**point) > 0.0).collect();
+        near.sort_unstable_by(|a, b| a[range].total_cmp(&b[range]));
+        near.truncate(near.len().div_ceil(10));
+        let (low, high) =
+            near.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), at| {
+                (low.min(at[azimuth]), high.max(at[azimuth]))
+            });
+        high - low >= 0.7 * turn
+    };
     let are_angles = |turn: f64, [range, azimuth, elevation]: [usize; 3]| {
         let extent = high[azimuth] - low[azimuth];
         low[range] >= 0.0
@@ -104,6 +117,7 @@ fn unit_of_angles(low: [f64; 3], high: [f64; 3]) -> Option<&'static str> {
             && (low[azimuth] >= 0.0 || low[azimuth] >= -turn / 2.0 && high[azimuth] <= turn / 2.0)
             && low[elevation] >= -turn / 4.0
             && high[elevation] <= turn / 4.0
+            && fill(turn, range, azimuth)
     };
     let orders = [[0, 1, 2], [0, 2, 1], [2, 0, 1], [2, 1, 0]];
     let units = [("radians", std::f64::consts::TAU), ("degrees", 360.0)];
@@ -247,10 +261,14 @@ mod tests {
             assert!(found.contains(expected), "{found}");
         }
         for (turn, unit) in [(360.0, "degrees"), (std::f64::consts::TAU, "radians")] {
-            let spun = (0..100).map(|n| turn * f64::from(n) / 100.0);
-            let spun: Vec<_> = spun.map(|azimuth| [4.0 + azimuth, azimuth, -turn / 24.0]).collect();
+            let turns = || (0..400).map(|n| turn * f64::from(n % 20) / 20.0);
+            let spun = (0..).zip(turns());
+            let spun = spun.map(|(n, azimuth)| [4.0 + f64::from(n / 20), azimuth, -turn / 24.0]);
             let told = judge_sweep(spun, "").unwrap().unwrap();
             assert!(told.contains(&format!("elevation in {unit}: expected x, y")), "{told}");
+            // The same bounds, seen by a sensor that looks ahead.
+            let ahead = turns().map(|y| y - turn / 2.0).map(|y| [y.abs(), y, -1.0]);
+            assert_eq!(judge_sweep(ahead, ""), Ok(None));
         }
         let below_a_drone = [[-60.0, -40.0, -79.0], [55.0, 62.0, -80.0], [1.0, 2.0, -79.5]];
         assert_eq!(judge_sweep(below_a_drone, ""), Ok(None));

@@ -62,15 +62,16 @@ pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Cloud, Form
         if is_complete {
             return Err(line.error(format!("expected {found} points by the count, found more")));
         }
-        are_decimal_commas = are_decimal_commas && has_decimal_commas(content);
         match &layout {
             Some(layout) => {
+                are_decimal_commas = are_decimal_commas && has_decimal_commas(content);
                 layout.read(&line, content, &mut row)?;
                 rows.push(&row);
             }
             None => {
                 let (first, is_header) = Layout::from_first_line(&line, content, &comment)?;
                 if !is_header {
+                    are_decimal_commas = has_decimal_commas(content);
                     first.read(&line, content, &mut row)?;
                     rows.push(&row);
                 }

@@ -42,6 +42,10 @@ pub fn read_scan(path: &Path) -> Result<Scan, FormatError> {
             |cause: String| FormatError::malformed(path, format!("property {attribute}"), cause);
         match scan.slot(attribute) {
             ColumnSlot::F32(slot) => *slot = Some(rows.column(first).map(|x| x as f32).collect()),
+            // Other numbers are intensities.
+            ColumnSlot::U8(slot) if attribute == Attribute::Reflectivity => {
+                *slot = rows.whole(first).ok();
+            }
             ColumnSlot::U8(slot) => *slot = Some(rows.whole(first).map_err(wrong)?),
             ColumnSlot::U16(slot) => *slot = Some(rows.whole(first).map_err(wrong)?),
             ColumnSlot::U32(slot) => *slot = Some(rows.whole(first).map_err(wrong)?),

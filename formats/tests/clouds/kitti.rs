@@ -63,13 +63,10 @@ fn what_only_its_name_makes_kittis_must_make_sense() {
     let finite = "expected three finite numbers, or none for a lost return, found";
     let millimetres = format!(": are they in millimetres? Scale them, or {remedy}");
     for (wrong, cause) in [
-        (
-            [1.0, f32::NAN, 3.0, 0.0],
-            format!("{finite} [1.0, NaN, 3.0], of which NaN is no place: remove the point"),
-        ),
+        ([1.0, f32::NAN, 3.0, 0.0], format!("{finite} [1.0, NaN, 3.0]: remove the point")),
         (
             [1.0, f32::NEG_INFINITY, 3.0, 0.0],
-            format!("{finite} [1.0, -inf, 3.0], of which -inf is no place: remove the point"),
+            format!("{finite} [1.0, -inf, 3.0]: remove the point"),
         ),
         (
             [0.0, 1e5, 0.0, 0.0],

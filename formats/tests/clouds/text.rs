@@ -70,6 +70,7 @@ fn decimal_commas_between_commas_are_told() {
     let cause = "columns: expected x, y and z, found pairs of whole numbers, probably with decimal \
                  commas: write decimal points, or semicolons between the columns";
     assert_eq!(error("a.csv", rows("1,250,-3,500,2,750\n")), cause);
+    assert_eq!(error("a.csv", "x,y,z\n".to_owned() + &rows("1,250,-3,500,2,750\n")), cause);
     // Colours, or a point alone.
     for text in [rows("1,250,-3,50,2,7\n"), rows("1,250,-3,-50,2,70\n"), "1,25,3,50,2,75\n".into()]
     {

@@ -94,7 +94,7 @@ fn refuse_occupied(out: &Path, terms: &Terms) -> Result<(), DatasetError> {
         Ok(_) => return occupied("a dataset"),
         Err(DatasetError::NoManifest { .. }) => {}
         Err(DatasetError::Malformed { path, cause }) => {
-            let what = format!("no manifest of a dataset ({cause})");
+            let what = format!("damaged, or of another program ({cause})");
             return Err(DatasetError::InTheWay { path, what });
         }
         Err(cause) => return Err(cause),

@@ -53,7 +53,8 @@ impl Stage {
         let of_object = |object: usize| {
             let placed = &scene.objects[object];
             let size_m = self.size_m(scene, object);
-            let base_m = placed.position - scene.pose.position_m;
+            let moved_m = scene.velocity_m_s * sweep.mean_time_s(object as u32 + 1);
+            let base_m = placed.position - scene.pose.position_m - moved_m;
             let heading = level_from_world * DQuat::from_rotation_z(placed.yaw_rad) * DVec3::X;
             let n_points = counts[object + 1];
             let alone = self.points_alone(scene, object)?;
@@ -76,6 +77,8 @@ impl Stage {
         self.add_object(&mut world, &scene.objects[object], scene.glass_returned);
         let stream = self.stream(scene, object as u32 + 1);
         let placed = world.placed(|_, _| Some(stream));
-        Ok(self.scan_placed(&world, &placed, scene)?.points().len() as u32)
+        let alone = self.scan_placed(&world, &placed, scene)?;
+        // Others are in the air.
+        Ok(alone.surfaces().iter().filter(|&&surface| surface == 0).count() as u32)
     }
 }

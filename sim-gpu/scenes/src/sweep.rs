@@ -149,6 +149,14 @@ impl Sweep {
         self.scan.object.as_deref().expect("invariant: a sweep is scanned with objects")
     }
 
+    /// The mean time of the points on `surface`, seconds since the start of the scan; 0 if it has none.
+    pub(crate) fn mean_time_s(&self, surface: u32) -> f64 {
+        let times = self.scan.time_s.as_deref().unwrap_or_default();
+        let own = times.iter().zip(self.surfaces()).filter(|(_, of)| **of == surface);
+        let (n, sum) = own.fold((0u32, 0.0), |(n, sum), (time, _)| (n + 1, sum + f64::from(*time)));
+        sum / f64::from(n.max(1))
+    }
+
     /// The number of points on the ground, on each object of `scene`, and, last, in the air.
     /// `scene` must be the scene of this sweep.
     #[must_use]
