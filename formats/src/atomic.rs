@@ -24,6 +24,9 @@ const SUFFIX: &str = ".tmp";
 /// Bytes of the buffer, which holds most scans.
 const BUFFER: usize = 64 << 10;
 
+/// How often a process that ends tries to remove a folder: more often than it has threads.
+const REMOVALS: usize = 1000;
+
 /// The files and folders of this process that are not complete yet.
 static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
@@ -36,8 +39,11 @@ fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
 pub fn abandon() {
     let unfinished = unfinished();
     for path in unfinished.iter() {
+        let remove =
+            || if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
+        // Other threads may be renaming their last files into a folder, and can begin no others.
         // What cannot be removed stays: the process ends anyway.
-        let _ = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
+        let _ = (0..REMOVALS).any(|_| remove().is_ok());
     }
     std::mem::forget(unfinished);
 }
