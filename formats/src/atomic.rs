@@ -254,6 +254,8 @@ pub(crate) fn write_lines(
 }
 
 pub(crate) fn make_folder_of(path: &Path) -> Result<&Path, FormatError> {
+    // After `abandon`, this waits for the end of the process: what was removed stays away.
+    let _known = unfinished();
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
