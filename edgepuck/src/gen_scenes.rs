@@ -111,7 +111,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
             )?;
         }
         if let Some(set) = &mut set {
-            set.add(&stage, done, edgepuck_scenes::is_test(done.scene.number))?;
+            set.add(&stage, done)?;
         }
         if done.scene.number < args.save { save(&stage, done, args) } else { Ok(()) }
     })?;

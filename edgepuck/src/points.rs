@@ -156,7 +156,7 @@ impl SweepArgs {
     }
 
     /// The points from the sensor, metres.
-    fn relative<'a>(&self, scan: &'a Scan) -> impl Iterator<Item = [f64; 3]> + use<'a> {
+    fn relative<'a>(&self, scan: &'a Scan) -> impl Iterator<Item = [f64; 3]> + Clone + use<'a> {
         points_from(scan, self.sensor_m(scan))
     }
 
@@ -167,7 +167,7 @@ impl SweepArgs {
 }
 
 /// The points of `scan` from a place, metres.
-fn points_from(scan: &Scan, place_m: [f64; 3]) -> impl Iterator<Item = [f64; 3]> {
+fn points_from(scan: &Scan, place_m: [f64; 3]) -> impl Iterator<Item = [f64; 3]> + Clone {
     let origin = scan.origin;
     scan.positions.iter().map(move |point| {
         [0, 1, 2].map(|axis| f64::from(point[axis]) + origin[axis] - place_m[axis])

@@ -24,10 +24,9 @@ const SUFFIX: &str = ".tmp";
 /// Bytes of the buffer, which holds most scans.
 const BUFFER: usize = 64 << 10;
 
-/// How often a process that ends tries to remove a folder: more often than it has threads.
-const REMOVALS: usize = 1000;
-
-/// The files and folders of this process that are not complete yet.
+/// The files and folders of this process that are not complete yet. Who makes, renames or removes them
+/// holds the lock: after [`abandon`], all others wait for the end of the process, and what was removed
+/// stays away.
 static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
@@ -39,11 +38,8 @@ fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
 pub fn abandon() {
     let unfinished = unfinished();
     for path in unfinished.iter() {
-        let remove =
-            || if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
-        // Other threads may be renaming their last files into a folder, and can begin no others.
         // What cannot be removed stays: the process ends anyway.
-        let _ = (0..REMOVALS).any(|_| remove().is_ok());
+        let _ = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
     }
     std::mem::forget(unfinished);
 }
@@ -148,13 +144,6 @@ struct Temporary {
 /// The path of a file that is known as unfinished.
 struct Known(PathBuf);
 
-impl Known {
-    fn begin(path: &Path) -> Self {
-        unfinished().insert(path.to_path_buf());
-        Self(path.to_path_buf())
-    }
-}
-
 impl Drop for Known {
     fn drop(&mut self) {
         unfinished().remove(&self.0);
@@ -167,8 +156,10 @@ impl Temporary {
         let mut builder = tempfile::Builder::new();
         let mut known = None;
         let made = builder.prefix(PREFIX).suffix(SUFFIX).make_in(make_folder_of(path)?, |path| {
-            // Before the file is there: after `abandon`, this waits for the end of the process.
-            known = Some(Known::begin(path));
+            // The name before this one was taken: it is forgotten before the lock is held.
+            known = Some(Known(path.to_path_buf()));
+            let mut unfinished = unfinished();
+            unfinished.insert(path.to_path_buf());
             File::options().write(true).create_new(true).open(path)
         });
         let (file, made) = made.map_err(|source| FormatError::io(path, source))?.into_parts();
@@ -178,7 +169,9 @@ impl Temporary {
 
     fn persist(self, path: &Path) -> io::Result<()> {
         let Self { path: temporary, known } = self;
+        let unfinished = unfinished();
         let persisted = temporary.persist(path).map_err(|error| error.error);
+        drop(unfinished);
         drop(known);
         persisted
     }
@@ -254,8 +247,7 @@ pub(crate) fn write_lines(
 }
 
 pub(crate) fn make_folder_of(path: &Path) -> Result<&Path, FormatError> {
-    // After `abandon`, this waits for the end of the process: what was removed stays away.
-    let _known = unfinished();
+    let _unfinished = unfinished();
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),

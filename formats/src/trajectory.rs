@@ -55,21 +55,27 @@ fn read(path: &Path, period_s: f64) -> Result<Vec<KeyedPose>, FormatError> {
     Ok(poses)
 }
 
+/// What is wrong with a word that is not a finite number.
+fn not_a_number(word: &str) -> String {
+    if word.contains([',', ';']) {
+        return format!("expected numbers with blanks between them, found {word:?}");
+    }
+    let hint = if word.parse::<f64>().is_ok() {
+        ": it must be finite"
+    } else if word.starts_with(|c: char| c.is_alphabetic() || c == '_') {
+        ": begin lines of names with `#`"
+    } else {
+        ""
+    };
+    format!("expected a number, found {word:?}{hint}")
+}
+
 fn pose_of(line: &str, at_s: f64) -> Result<KeyedPose, String> {
     let numbers: Vec<f64> = line
         .split_whitespace()
         .map(|word| word.parse().ok().filter(|x: &f64| x.is_finite()).ok_or(word))
         .collect::<Result<_, _>>()
-        .map_err(|word| match word.contains([',', ';']) {
-            true => format!("expected numbers with blanks between them, found {word:?}"),
-            false if word.parse::<f64>().is_ok() => {
-                format!("expected a number, found {word:?}: it must be finite")
-            }
-            false if word.starts_with(|c: char| c.is_alphabetic() || c == '_') => {
-                format!("expected a number, found {word:?}: begin lines of names with `#`")
-            }
-            false => format!("expected a number, found {word:?}"),
-        })?;
+        .map_err(not_a_number)?;
     let (time_s, position_m, quaternion) = match numbers[..] {
         [time_s, x, y, z, qx, qy, qz, qw] => (time_s, [x, y, z], [qx, qy, qz, qw]),
         [a, b, c, x, d, e, f, y, g, h, i, z] => {

@@ -27,42 +27,45 @@ fn profile_lists_the_sensors_and_describes_each() {
 #[test]
 fn a_profile_is_checked_and_what_looks_odd_of_it_is_said() {
     let folder = Folder::new();
-    // Elevations in radians, a duplicate beam, and a limit that no surface reaches.
-    folder.write(
-        "odd.toml",
-        "name = \"odd\"\nrange = { max_m = 100 }\ndetection = { reflectivity = 1, range_m = 50 }\n\
+    let profiles = [
+        // Elevations in radians, a duplicate beam, and a limit that no surface reaches.
+        (
+            "odd.toml",
+            "name = \"odd\"\nrange = { max_m = 100 }\ndetection = { reflectivity = 1, range_m = 50 }\n\
          [rotating]\nrpm = 600\nsequence_us = 50\nbeam = [\n\
          { azimuth_offset_deg = 0, elevation_deg = 0.1, firing_us = 0 },\n\
          { azimuth_offset_deg = 0, elevation_deg = -0.2, firing_us = 0 },\n\
          { azimuth_offset_deg = 0, elevation_deg = 0.1, firing_us = 5 }]\n",
-    );
-    let said = folder.succeeds("profile odd.toml");
-    for part in [
-        "are they in radians?",
-        "even a white surface is lost beyond 50.0 m",
-        "rotating.beam[2] points as rotating.beam[0] does",
-    ] {
-        assert!(said.contains(part), "{part}: {said}");
-    }
-    // Millimetres, revolutions a second, nanoseconds and milliradians.
-    folder.write(
-        "units.toml",
-        "name = \"units\"\nrange = { min_m = 500, max_m = 50000, quantum_m = 4 }\n\
+            &[
+                "are they in radians?",
+                "even a white surface is lost beyond 50.0 m",
+                "rotating.beam[2] points as rotating.beam[0] does",
+            ][..],
+        ),
+        // Millimetres, revolutions a second, nanoseconds and milliradians.
+        (
+            "units.toml",
+            "name = \"units\"\nrange = { min_m = 500, max_m = 50000, quantum_m = 4 }\n\
          noise = { typical_sigma_m = 30 }\nfootprint = { divergence_deg = [3, 1.5], separation_m = 1 }\n\
          [rotating]\nrpm = 10\nsequence_us = 1000000\nbeam = [\n\
          { azimuth_offset_deg = 0, elevation_deg = 10, firing_us = 0 }]\n",
-    );
-    let said = folder.succeeds("profile units.toml");
-    for part in [
-        "range.min_m = 500: is it in metres?",
-        "range.quantum_m = 4: is it in metres?",
-        "noise.typical_sigma_m = 30: is it in metres?",
-        "footprint.divergence_deg = 3: is it in degrees?",
-        "rotating.rpm = 10: is it in revolutions a minute?",
-        "rotating.sequence_us = 1000000: is it in microseconds?",
-        "a scan has only 6 rays",
-    ] {
-        assert!(said.contains(part), "{part}: {said}");
+            &[
+                "range.min_m = 500: is it in metres?",
+                "range.quantum_m = 4: is it in metres?",
+                "noise.typical_sigma_m = 30: is it in metres?",
+                "footprint.divergence_deg = 3: is it in degrees?",
+                "rotating.rpm = 10: is it in revolutions a minute?",
+                "rotating.sequence_us = 1000000: is it in microseconds?",
+                "a scan has only 6 rays",
+            ],
+        ),
+    ];
+    for (file, text, parts) in profiles {
+        folder.write(file, text);
+        let said = folder.succeeds(&format!("profile {file}"));
+        for part in parts {
+            assert!(said.contains(part), "{part}: {said}");
+        }
     }
     folder.write(
         "wrong.toml",

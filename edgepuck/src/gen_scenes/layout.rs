@@ -6,7 +6,7 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use edgepuck_scenes::{LabelledScene, ObjectBox, Stage};
+use edgepuck_scenes::{LabelledScene, ObjectBox, SceneError, Stage, is_test};
 use edgepuck_segment::OrientedBox;
 use formats::hash::Hashing;
 use formats::scan::Column;
@@ -61,13 +61,9 @@ impl Writer {
         Self { layout, folder, splits: Default::default(), camera }
     }
 
-    /// Writes a sweep, for validation if it `is_test`.
-    pub fn add(
-        &mut self,
-        stage: &Stage,
-        done: &LabelledScene,
-        is_test: bool,
-    ) -> anyhow::Result<()> {
+    /// Writes a sweep.
+    pub fn add(&mut self, stage: &Stage, done: &LabelledScene) -> anyhow::Result<()> {
+        let is_test = is_test(done.scene.number);
         let split = &mut self.splits[usize::from(is_test)];
         // Sequences have sweeps without gaps in their numbers.
         let name = match self.layout {
@@ -98,19 +94,14 @@ impl Writer {
             }
             Layout::Kitti => {
                 write(&format!("training/velodyne/{name}.bin"), b"", &columns)?;
-                let boxes = stage.boxes(&done.scene, &done.sweep)?;
-                let class = |of: &ObjectBox| class_of(stage, done, of);
-                let lines: String =
-                    boxes.iter().filter_map(|of| self.kitti_line(class(of), of)).collect();
+                let lines = lines(stage, done, |class, of| self.kitti_line(class, of))?;
                 self.text(&format!("training/label_2/{name}.txt"), &lines)?;
                 self.text(&format!("training/calib/{name}.txt"), CALIBRATION)?;
             }
             Layout::OpenPcdet => {
                 let header = rows::npy_header(positions.len(), 4);
                 write(&format!("points/{name}.npy"), &header, &columns)?;
-                let boxes = stage.boxes(&done.scene, &done.sweep)?;
-                let lines: String =
-                    boxes.iter().map(|of| openpcdet_line(class_of(stage, done, of), of)).collect();
+                let lines = lines(stage, done, |class, of| Some(openpcdet_line(class, of)))?;
                 self.text(&format!("labels/{name}.txt"), &lines)?;
             }
         }
@@ -172,8 +163,15 @@ fn sequence(is_test: bool) -> &'static str {
     if is_test { "sequences/08" } else { "sequences/00" }
 }
 
-fn class_of<'a>(stage: &'a Stage, done: &LabelledScene, of: &ObjectBox) -> &'a str {
-    &stage.recipe().object[done.scene.objects[of.object].entry].class
+/// The lines that `line` makes of the classes and the boxes of a sweep's objects.
+fn lines(
+    stage: &Stage,
+    done: &LabelledScene,
+    line: impl Fn(&str, &ObjectBox) -> Option<String>,
+) -> Result<String, SceneError> {
+    let class = |of: &ObjectBox| &*stage.recipe().object[done.scene.objects[of.object].entry].class;
+    let boxes = stage.boxes(&done.scene, &done.sweep)?;
+    Ok(boxes.iter().filter_map(|of| line(class(of), of)).collect())
 }
 
 /// KITTI's state of occlusion: 0 is all visible, 1 partly hidden, 2 largely hidden. KITTI's people

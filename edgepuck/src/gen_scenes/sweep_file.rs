@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use anyhow::ensure;
+use anyhow::{Context, ensure};
 use edgepuck_scenes::{DrawnScene, LabelledScene, Stage};
 use formats::hash::Hashing;
 use formats::rows;
@@ -72,11 +72,10 @@ pub fn write(
 ) -> anyhow::Result<()> {
     let (scan, number) = (&done.sweep.scan, done.scene.number);
     let file = |end: &str| sweeps.join(format!("{number:06}.{end}"));
-    let (n_objects, n_classes) = (done.scene.objects.len(), classes(stage).len());
+    let n_classes = classes(stage).len();
     let is_narrow = format == SweepFormat::Las;
     ensure!(!is_narrow || n_classes <= 256, "las: expected at most 254 classes, found {n_classes}");
-    ensure!(n_objects < 1 << 16, "{format}: expected at most 65535 objects, found {n_objects}");
-    let of_points = of_points(stage, done);
+    let of_points = of_points(stage, done).with_context(|| format.to_string())?;
     let column = |of: fn(&Surface) -> u32| of_points.iter().map(of).collect::<Vec<u32>>();
     let intensity = scan.intensity.as_deref().expect("invariant: sweeps have intensities");
     let mut columns = vec![
@@ -92,7 +91,7 @@ pub fn write(
         }
         SweepFormat::SemanticKitti => {
             let of_pair = |folder, end| sweeps.join(format!("{folder}/{number:06}.{end}"));
-            let labels = semantic_labels(stage, done)?;
+            let labels = column(semantic_label);
             write(&of_pair("velodyne", "bin"), "", &columns)?;
             write(&of_pair("labels", "label"), "", &[(vec!["label"], Column::U32(&labels))])?;
         }
@@ -123,20 +122,21 @@ pub fn write(
 
 /// SemanticKITTI's label of each point: its class, and its object in the high half.
 pub fn semantic_labels(stage: &Stage, done: &LabelledScene) -> anyhow::Result<Vec<u32>> {
-    let n_objects = done.scene.objects.len();
-    ensure!(
-        n_objects < 1 << 16,
-        "semantickitti: expected at most 65535 objects, found {n_objects}"
-    );
-    let label = |s: &Surface| u32::from(s.object) << 16 | u32::from(s.codes.0);
-    Ok(of_points(stage, done).iter().map(label).collect())
+    let of_points = of_points(stage, done).context("semantickitti")?;
+    Ok(of_points.iter().map(semantic_label).collect())
+}
+
+fn semantic_label(of: &Surface) -> u32 {
+    u32::from(of.object) << 16 | u32::from(of.codes.0)
 }
 
 /// What each point lies on.
-fn of_points(stage: &Stage, done: &LabelledScene) -> Vec<Surface> {
+fn of_points(stage: &Stage, done: &LabelledScene) -> anyhow::Result<Vec<Surface>> {
+    let n_objects = done.scene.objects.len();
+    ensure!(n_objects < 1 << 16, "expected at most 65535 objects, found {n_objects}");
     let surfaces = surfaces(stage, &done.scene);
     let air = surfaces.len() - 1;
-    done.sweep.surfaces().iter().map(|&i| surfaces[air.min(i as usize)]).collect()
+    Ok(done.sweep.surfaces().iter().map(|&i| surfaces[air.min(i as usize)]).collect())
 }
 
 /// The air, last, the ground, first, and the objects of `scene` between them.

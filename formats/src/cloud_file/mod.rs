@@ -45,6 +45,7 @@ use crate::atomic;
 use crate::error::FormatError;
 use crate::foreign::or_foreign_file;
 use crate::records;
+use crate::scan::Scan;
 pub use format::CloudFormat;
 #[cfg(feature = "las")]
 pub use las_write::{LasPoint, write_las};
@@ -77,7 +78,8 @@ pub fn read_cloud(path: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
 }
 
 /// Whether the NPZ or PLY file at `path` holds a sensor's measurements beside the positions: ranges,
-/// or the numbers of beams or rings. A pipe, which can be read once, is none.
+/// or the numbers of beams or rings. A pipe is never one, since it can be read only
+/// once.
 #[must_use]
 pub fn is_scan(path: &Path) -> bool {
     has_any(path, &["range", "beam", "ring"])
@@ -191,6 +193,19 @@ pub fn read_viewpoint(
         (file, CloudFormat::Ply) => ply::read_pose(&mut BufReader::new(file), path),
         _ => Ok(None),
     }
+}
+
+/// Reads where the sensor stood, in the frame of the points: the position of [`read_viewpoint`]'s pose,
+/// or the origin.
+///
+/// # Errors
+/// As [`read_cloud`].
+pub fn read_sensor_position(
+    path: &Path,
+    format: Option<CloudFormat>,
+) -> Result<[f64; 3], FormatError> {
+    let pose = read_viewpoint(path, format)?;
+    Ok(Scan { pose, ..Scan::default() }.sensor_position_m())
 }
 
 fn open(path: &Path, format: Option<CloudFormat>) -> Result<(File, CloudFormat), FormatError> {

@@ -32,7 +32,7 @@ pub(super) fn read(reader: impl Read + Seek, name: &Path) -> Result<Cloud, Forma
         && let Some((key, unit)) = intensity::find(key)
     {
         let n = cloud.points.len();
-        // An `i` of another shape is no column of points.
+        // Anything may be called `i`: only an array with a number for each point has intensities.
         let is_short = key.len() == 1;
         let values = npz.entry(key, |header, _, elements| {
             match crate::npy::check_columns(&header, 1, n) {

@@ -37,7 +37,7 @@ const BINS_A_DEGREE: usize = 20;
 /// # Errors
 /// As [`judge_sweep`].
 pub fn check_sweep(
-    points: impl IntoIterator<Item = [f64; 3]>,
+    points: impl IntoIterator<Item = [f64; 3], IntoIter: Clone>,
     path: &Path,
     remedy: &str,
 ) -> Result<Option<String>, FormatError> {
@@ -51,13 +51,13 @@ pub fn check_sweep(
 /// The first point that has one or two finite coordinates, or one beyond 10 km, with the cause and
 /// the `remedy`; no point with a position.
 pub fn judge_sweep(
-    points: impl IntoIterator<Item = [f64; 3]>,
+    points: impl IntoIterator<Item = [f64; 3], IntoIter: Clone>,
     remedy: &str,
 ) -> Result<Option<String>, (String, String)> {
     let (mut nearest, mut farthest) = (f64::INFINITY, 0.0);
     let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    let points: Vec<[f64; 3]> = points.into_iter().collect();
-    for (i, &point) in points.iter().enumerate() {
+    let points = points.into_iter();
+    for (i, point) in points.clone().enumerate() {
         let finite = point.iter().filter(|x| x.is_finite()).count();
         if !matches!(finite, 0 | 3) || point.iter().any(|x| x.is_finite() && x.abs() > FARTHEST_M) {
             let cause = match point.iter().all(|x| x.is_finite()) {
@@ -84,7 +84,7 @@ pub fn judge_sweep(
         ("farthest", farthest, "0.5 m to 2 km; are the points in metres?")
     } else if nearest > NEAREST_M && (0..2).any(|i| low[i] > 0.0 || high[i] < 0.0) {
         ("nearest", nearest, "at most 50 m; is the origin the position of the sensor?")
-    } else if let Some(unit) = unit_of_angles(&points, low, high) {
+    } else if let Some(unit) = unit_of_angles(points, low, high) {
         return Ok(Some(format!(
             "the columns are within the bounds of a range, an azimuth and an elevation in {unit}: \
              expected x, y and z in metres"
@@ -98,10 +98,13 @@ pub fn judge_sweep(
 /// The unit of angles, if the columns of `points`, between `low` and `high`, are probably a range and two
 /// angles: none is beyond its bounds, and one fills a turn, also for the nearest tenth of the points. To
 /// the sides, a sensor that looks ahead sees less far of what is near.
-fn unit_of_angles(points: &[[f64; 3]], low: [f64; 3], high: [f64; 3]) -> Option<&'static str> {
+fn unit_of_angles(
+    points: impl Iterator<Item = [f64; 3]> + Clone,
+    low: [f64; 3],
+    high: [f64; 3],
+) -> Option<&'static str> {
     let fill = |turn: f64, range: usize, azimuth: usize| {
-        let mut near: Vec<&[f64; 3]> =
-            points.iter().filter(|point| length(**point) > 0.0).collect();
+        let mut near: Vec<_> = points.clone().filter(|point| length(*point) > 0.0).collect();
         near.sort_unstable_by(|a, b| a[range].total_cmp(&b[range]));
         near.truncate(near.len().div_ceil(10));
         let (low, high) =

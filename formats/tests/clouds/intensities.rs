@@ -60,7 +60,7 @@ fn columns_of_intensities_are_known_by_their_names() {
     );
 }
 
-/// LAS 1.4 R15, 2.6.2: intensities are normalised to 16 bits, and 0 where there are none.
+/// LAS 1.4 R15, 2.6.2: the largest intensity is 65535, and 0 says that there is none.
 #[test]
 fn what_is_written_is_read() {
     let folder = tempfile::tempdir().unwrap();

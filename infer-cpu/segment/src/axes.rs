@@ -23,22 +23,22 @@ const FEWEST_SECTORS: u32 = 7;
 /// sensor across another axis, below which more ground is found.
 #[must_use]
 pub fn doubtful_axes(points: &[[f32; 3]]) -> Option<String> {
-    let squared = |point: &[f32; 3]| -> f64 { point.iter().map(|x| f64::from(*x).powi(2)).sum() };
-    let is_return = |point: &&[f32; 3]| squared(point) > 0.0 && squared(point).is_finite();
-    let points: Vec<[f32; 3]> = points.iter().filter(is_return).copied().collect();
+    let square = |point: &[f32; 3]| -> f64 { point.iter().map(|x| f64::from(*x).powi(2)).sum() };
+    let returns = || points.iter().filter(|point| square(point) > 0.0 && square(point).is_finite());
     let (mut squares, mut below) = ([0.0; 3], [0i64; 3]);
-    for point in &points {
+    for point in returns() {
         for axis in 0..3 {
-            squares[axis] += f64::from(point[axis]).powi(2) / squared(point);
+            squares[axis] += f64::from(point[axis]).powi(2) / square(point);
             below[axis] += if point[axis] > 0.0 { -1 } else { 1 };
         }
     }
     let up = (0..3).rev().min_by(|&a, &b| squares[a].total_cmp(&squares[b]))?;
     let sign = if below[up] < 0 { -1.0 } else { 1.0 };
     let is_far = |point: &&[f32; 3]| point[0].hypot(point[1]) > INDOORS_M;
-    if up == 2 && (sign > 0.0 || 100 * points.iter().filter(is_far).count() < points.len()) {
+    if up == 2 && (sign > 0.0 || 100 * returns().filter(is_far).count() < returns().count()) {
         return None;
     }
+    let points: Vec<[f32; 3]> = returns().copied().collect();
     let turned = |&point: &[f32; 3]| {
         let [ahead, aside] = [(up + 1) % 3, (up + 2) % 3].map(|axis| point[axis]);
         [ahead, sign * aside, sign * point[up]]

@@ -10,10 +10,10 @@ use crate::network::open;
 use crate::sampler::{SamplerKind, SamplerSpec};
 use crate::{Classifier, Options, Precision, UpAxis};
 use anyhow::Context;
-use formats::cloud_file::{CloudFormat, Unlike, judge_object, read_cloud_as, read_viewpoint};
+use formats::FormatError;
+use formats::cloud_file::{CloudFormat, Unlike, judge_object, read_cloud_as, read_sensor_position};
 use formats::model_card::{ModelCard, Normalization};
 use formats::outcome::{joined_causes, say};
-use formats::{FormatError, Scan};
 
 use super::default_model::{Kind, Kinds, SCANS};
 use super::input;
@@ -195,11 +195,10 @@ impl Session<'_> {
     ) -> anyhow::Result<()> {
         let judged = read.map_err(anyhow::Error::from).and_then(|points| {
             let named = || name.display().to_string();
-            let pose = match input::is_standard_input(name) {
-                true => None,
-                false => read_viewpoint(name, self.args.format)?,
+            let sensor_m = match input::is_standard_input(name) {
+                true => [0.0; 3],
+                false => read_sensor_position(name, self.args.format)?,
             };
-            let sensor_m = Scan { pose, ..Scan::default() }.sensor_position_m();
             let unlike = judge_object(&points, sensor_m).map_err(anyhow::Error::msg);
             let unlike = unlike.with_context(named)?;
             Ok((points, unlike))

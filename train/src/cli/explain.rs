@@ -4,9 +4,8 @@ use crate::explanation_drawing;
 use crate::lime::{Explanation, Lime, explain};
 use crate::random_baseline::RandomBaseline;
 use anyhow::{Context, Error};
-use formats::Scan;
 use formats::atomic;
-use formats::cloud_file::{Unlike, judge_object, read_viewpoint};
+use formats::cloud_file::{Unlike, judge_object, read_sensor_position};
 use formats::outcome::say;
 use formats::outputs::{Overwrite, need_extension};
 use infer_cpu::sampler::{Resize, SamplerKind, SamplerSpec};
@@ -53,8 +52,7 @@ pub fn run(args: &ExplainArgs) -> anyhow::Result<()> {
     args.overwrite.check(args.svg.iter().map(PathBuf::as_path))?;
     let cloud = read_finite(&args.cloud)?;
     let file = || args.cloud.display().to_string();
-    let pose = read_viewpoint(&args.cloud, None)?;
-    let sensor_m = Scan { pose, ..Scan::default() }.sensor_position_m();
+    let sensor_m = read_sensor_position(&args.cloud, None)?;
     let unlike = judge_object(&cloud, sensor_m).map_err(Error::msg).with_context(file)?;
     if unlike == Some(Unlike::Sweep) {
         say(format!("warning: {} {}", file(), Unlike::Sweep));
