@@ -6,8 +6,7 @@ use std::path::{Path, PathBuf};
 
 use edgepuck_segment::doubtful_axes;
 use formats::cloud_file::{
-    Cloud, CloudFormat, check_sweep, coarse_coordinates, must_be_scan, read_viewpoint,
-    read_with_intensities,
+    Cloud, CloudFormat, check_sweep, coarse_coordinates, must_be_scan, read_cloud_as,
 };
 use formats::scan_file::read_scan;
 use formats::{FormatError, Scan, Senders, ouster, pcap, velodyne};
@@ -71,10 +70,19 @@ impl PointsArgs {
             );
             return Err(FormatError::malformed(file, "name", cause));
         }
-        if self.metadata.is_some() || (self.format.is_none() && pcap::is_capture(file)) {
+        let is_capture = pcap::is_capture(file);
+        if is_capture && (self.metadata.is_some() || self.format.is_none()) {
             return self.read_capture(file);
         }
-        let Cloud { points, intensities } = read_with_intensities(file, self.format)?;
+        for (flag, is_given) in
+            [("--metadata", self.metadata.is_some()), ("--from", self.from.is_some())]
+        {
+            if is_given && file.is_file() {
+                let cause = "applies to captures of packets (.pcap or .pcapng), without --format";
+                return Err(FormatError::malformed(file, flag, cause));
+            }
+        }
+        let Cloud { points, intensities, rings, pose } = read_cloud_as(file, self.format)?;
         let Scan { origin, positions, .. } = Scan::of_points(&points);
         let scan = match read_scan(file) {
             Ok(scan) => Some(scan).filter(|scan| scan.len() == points.len()),
@@ -86,10 +94,7 @@ impl PointsArgs {
         let mut scan = match scan {
             Some(scan) if is_near(&scan) => scan,
             Some(scan) => Scan { origin, positions, ..scan },
-            None => {
-                let pose = read_viewpoint(file, self.format)?;
-                Scan { origin, positions, pose, ..Scan::default() }
-            }
+            None => Scan { origin, positions, pose, ring: rings, ..Scan::default() },
         };
         if scan.reflectivity.is_none() {
             scan.intensity = scan.intensity.or(intensities);

@@ -230,6 +230,9 @@ fn scene_of_meshes(args: &Args) -> anyhow::Result<Scene> {
         if let Some(doubt) = mesh.doubtful_size(unit) {
             formats::say!("warning: {}: {doubt}; --units names another unit", file.display());
         }
+        if let Some(doubt) = mesh.doubtful_effects(&scene.effects) {
+            formats::say!("warning: {}: {doubt}", file.display());
+        }
         let id = scene.add(mesh, Pose::IDENTITY);
         scene[id].name = file.file_stem().map(|stem| stem.to_string_lossy().into_owned());
     }

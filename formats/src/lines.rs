@@ -42,14 +42,27 @@ impl<'a, R: BufRead> Lines<'a, R> {
 
     /// The next line that is not blank. Errors say that `found` of `n` lines were found.
     pub fn next_of(&mut self, found: u64, n: u64) -> Result<Line<'_>, FormatError> {
-        loop {
-            if !self.advance()? {
-                return Err(self.line().error(format!("the file ends after {found} of {n}")));
-            }
+        match self.advance_over_blanks()? {
+            true => Ok(self.line()),
+            false => Err(self.line().error(format!("the file ends after {found} of {n}"))),
+        }
+    }
+
+    /// Checks that only blank lines are left after the `n` that a header states.
+    pub fn check_end(&mut self, n: u64) -> Result<(), FormatError> {
+        match self.advance_over_blanks()? {
+            true => Err(self.line().error(format!("expected {n} lines by the header, found more"))),
+            false => Ok(()),
+        }
+    }
+
+    fn advance_over_blanks(&mut self) -> Result<bool, FormatError> {
+        while self.advance()? {
             if !self.bytes.trim_ascii().is_empty() {
-                return Ok(self.line());
+                return Ok(true);
             }
         }
+        Ok(false)
     }
 
     fn advance(&mut self) -> Result<bool, FormatError> {

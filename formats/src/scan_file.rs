@@ -40,10 +40,10 @@ crate::named! {
         Npz = "npz",
         /// Binary PLY.
         Ply = "ply",
-        /// Text with a header; it is read as a cloud with intensities.
+        /// Text with a header; it is read as a cloud with intensities and rings.
         Csv = "csv",
         /// The Point Cloud Library's format, binary, with the columns of PLY, the pose as its
-        /// VIEWPOINT, and no origin; it is read as a cloud with intensities.
+        /// VIEWPOINT, and no origin; it is read as a cloud with intensities and rings.
         Pcd = "pcd",
         /// A sensor's packets: see `vlp32c`. They hold ranges along beams instead of points, so
         /// that writing them requires the sensor.
@@ -119,8 +119,12 @@ pub fn read_scan(path: &Path) -> Result<Scan, FormatError> {
     match ScanFormat::of_path(path)? {
         ScanFormat::Npz => read_npz(path),
         ScanFormat::Ply => ply::read_scan(path),
-        ScanFormat::Csv => refuse("CSV is read as a cloud, with no attribute but the intensity"),
-        ScanFormat::Pcd => refuse("PCD is read as a cloud, with no attribute but the intensity"),
+        ScanFormat::Csv => {
+            refuse("CSV is read as a cloud, with no attributes but the intensity and the ring")
+        }
+        ScanFormat::Pcd => {
+            refuse("PCD is read as a cloud, with no attributes but the intensity and the ring")
+        }
         ScanFormat::Pcap => refuse("packets hold a sensor's ranges, not points"),
     }
 }

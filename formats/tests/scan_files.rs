@@ -92,7 +92,7 @@ fn pcd_has_the_fields_of_a_scan() {
         let near = |a: f64, b: f64| (a - b).abs() < 1e-15;
         let expected = [&place[..], &quaternion].concat();
         assert!(numbers.iter().zip(expected).all(|(a, b)| near(*a, b)), "{line}");
-        let read = formats::cloud_file::read_viewpoint(&path, None).unwrap().unwrap();
+        let read = formats::cloud_file::read_cloud_as(&path, None).unwrap().pose.unwrap();
         assert!(read.iter().zip(pose).all(|(a, b)| near(*a, b)), "{read:?}");
     }
     scan.origin = [1e6, 0.0, 0.0];

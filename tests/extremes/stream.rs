@@ -11,6 +11,7 @@ pub fn read(n: usize) -> Vec<[f64; 3]> {
     rest.set_position(RECORD as u64);
     read_cloud_from(Made { n, next: 0, rest }, Some(CloudFormat::Kitti), Path::new("a stream"))
         .unwrap_or_else(|error| panic!("{error}"))
+        .points
 }
 
 /// Number of bytes of x, y, z and intensity.

@@ -7,7 +7,7 @@ use std::fs::File;
 use std::io::{BufRead, Read, Write};
 use std::path::Path;
 
-use super::intensity::{Rows, Unit};
+use super::columns::{Extra, Rows, Unit};
 use super::{Cloud, CloudFormat};
 use crate::atomic;
 use crate::error::FormatError;
@@ -32,13 +32,17 @@ pub(super) fn read(
     format: CloudFormat,
     name: &Path,
 ) -> Result<Cloud, FormatError> {
-    let (mut rows, columns) = (Rows::default(), columns(format, name));
-    let mut row = vec![0.0; columns.min(KITTI_COLUMNS)];
+    let columns = columns(format, name);
+    let has_ring = format == CloudFormat::Nuscenes && columns == NUSCENES_COLUMNS;
+    let extras = [Extra::Intensity(Unit::Own), Extra::Ring];
+    let n_extras = if has_ring { 2 } else { usize::from(columns >= KITTI_COLUMNS) };
+    let mut rows = Rows::new(extras.into_iter().take(n_extras));
+    let mut row = vec![0.0; 3 + n_extras];
     read_points(reader, columns, name, |number| {
         row.iter_mut().enumerate().for_each(|(column, value)| *value = number(column));
         rows.push(&row);
     })?;
-    Ok(rows.cloud((columns >= KITTI_COLUMNS).then_some(Unit::Own)))
+    Ok(rows.cloud())
 }
 
 /// Checks that a file of KITTI has no fifth column of rings, or intensities that are coordinates, where

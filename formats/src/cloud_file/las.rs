@@ -12,8 +12,8 @@ use las::point::Format;
 use las::raw::Header;
 
 use super::Cloud;
+use super::columns::{Extra, Rows, Unit};
 use super::format::COMPRESSED_LAS;
-use super::intensity::{Rows, Unit};
 use crate::decoding::{error_in, invalid};
 use crate::error::FormatError;
 use crate::number::{ByteOrder, NumberType};
@@ -27,7 +27,7 @@ pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Cloud, Form
         FormatError::malformed(name, "header", "the points begin before the header ends")
     })?;
     records::skip(reader, gap).map_err(|error| error_in(name, "header", error))?;
-    let mut rows = Rows::default();
+    let mut rows = Rows::new([Extra::Intensity(Unit::Las)]);
     let transforms = transforms(&header);
     let size = usize::from(header.point_data_record_length);
     records::read(reader, size, n_points(&header), |record| {
@@ -35,7 +35,7 @@ pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Cloud, Form
         rows.push(&[x, y, z, NumberType::U16.decode(&record[12..], ByteOrder::Little)]);
     })
     .map_err(|error| error_in(name, "points", error))?;
-    Ok(rows.cloud(Some(Unit::Las)))
+    Ok(rows.cloud())
 }
 
 /// The header and its size, bytes.

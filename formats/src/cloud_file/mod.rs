@@ -15,8 +15,8 @@
 //! NaN and infinities are kept; the caller decides how to treat them. Memory grows
 //! with the decompressed bytes of the file, never with a count in a header.
 
+mod columns;
 mod format;
-mod intensity;
 mod kitti;
 #[cfg(feature = "las")]
 mod las;
@@ -54,8 +54,8 @@ pub(crate) use npz::{read_points as read_npz_points, read_pose as read_npz_pose}
 pub use plausible::{Unlike, check_sweep, coarse_coordinates, judge_object, judge_sweep};
 use precision::Precision;
 
-/// Points, and what a file says of their brightness.
-#[derive(Clone, Debug, PartialEq)]
+/// Points, and what a file says of them.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Cloud {
     /// The points, metres.
     pub points: Vec<[f64; 3]>,
@@ -64,6 +64,20 @@ pub struct Cloud {
     /// nuScenes. They are as in the file, except for those of LAS, of which 65535 is 1 unless all are
     /// below 256, and reflectivities of whole numbers up to 255, of which 100 is 1.
     pub intensities: Option<Vec<f32>>,
+    /// The ring of each point, if the file has them: the column `ring`, `scalar_ring` or
+    /// `laser_id`, or nuScenes' fifth. A column that holds anything else, or one number for all, is none of rings.
+    pub rings: Option<Vec<u16>>,
+    /// The pose of the sensor, a matrix of 4 by 4 row by row: `pose` of an NPZ or PLY file, or the
+    /// VIEWPOINT of a PCD file, unless it is the identity.
+    pub pose: Option<[f64; 16]>,
+}
+
+impl Cloud {
+    /// Where the sensor stood, in the frame of the points: the position of the pose, or the origin.
+    #[must_use]
+    pub fn sensor_position_m(&self) -> [f64; 3] {
+        Scan { pose: self.pose, ..Scan::default() }.sensor_position_m()
+    }
 }
 
 /// Reads the cloud at `path` in the format of its extension.
@@ -74,7 +88,7 @@ pub struct Cloud {
 /// makes KITTI's, and that cannot be points of a sweep or have nuScenes' rings. The error names the
 /// file and the line, element or key at fault.
 pub fn read_cloud(path: &Path) -> Result<Vec<[f64; 3]>, FormatError> {
-    read_cloud_as(path, None)
+    read_cloud_as(path, None).map(|cloud| cloud.points)
 }
 
 /// Whether the NPZ or PLY file at `path` holds a sensor's measurements beside the positions: ranges,
@@ -124,25 +138,11 @@ fn has_any(path: &Path, keys: &[&str]) -> bool {
     }
 }
 
-/// As [`read_cloud`], in `format` if it is given.
+/// As [`read_cloud`], in `format` if it is given, with what the file says of the points.
 ///
 /// # Errors
-/// As [`read_cloud`].
-pub fn read_cloud_as(
-    path: &Path,
-    format: Option<CloudFormat>,
-) -> Result<Vec<[f64; 3]>, FormatError> {
-    read_with_intensities(path, format).map(|cloud| cloud.points)
-}
-
-/// As [`read_cloud_as`], with the intensities.
-///
-/// # Errors
-/// As [`read_cloud`]; intensities of another number than the points.
-pub fn read_with_intensities(
-    path: &Path,
-    format: Option<CloudFormat>,
-) -> Result<Cloud, FormatError> {
+/// As [`read_cloud`]; intensities or rings of another number than the points.
+pub fn read_cloud_as(path: &Path, format: Option<CloudFormat>) -> Result<Cloud, FormatError> {
     read_file(path, format).map_err(|error| {
         let expected = format.or(CloudFormat::of_path(path).ok());
         or_foreign_file(path, expected.map_or("a cloud", CloudFormat::name), error)
@@ -169,45 +169,6 @@ fn read_file(path: &Path, format: Option<CloudFormat>) -> Result<Cloud, FormatEr
     }
 }
 
-/// Reads the sensor's pose in a file, a matrix of 4 by 4 row by row: `pose` of an NPZ or PLY file, or
-/// the VIEWPOINT of a PCD file, unless it is the identity; `None` in other formats, and of a pipe,
-/// which can be read once.
-///
-/// # Errors
-/// As [`read_cloud`].
-pub fn read_viewpoint(
-    path: &Path,
-    format: Option<CloudFormat>,
-) -> Result<Option<[f64; 16]>, FormatError> {
-    if path.exists() && !path.is_file() {
-        return Ok(None);
-    }
-    match open(path, format)? {
-        #[cfg(feature = "pcd")]
-        (file, CloudFormat::Pcd) => pcd::read_pose(&mut BufReader::new(file), path),
-        #[cfg(feature = "npz")]
-        (file, CloudFormat::Npz) => {
-            npz::read_pose(&mut crate::archive::NpzReader::new(BufReader::new(file), path)?)
-        }
-        #[cfg(feature = "ply")]
-        (file, CloudFormat::Ply) => ply::read_pose(&mut BufReader::new(file), path),
-        _ => Ok(None),
-    }
-}
-
-/// Reads where the sensor stood, in the frame of the points: the position of [`read_viewpoint`]'s pose,
-/// or the origin.
-///
-/// # Errors
-/// As [`read_cloud`].
-pub fn read_sensor_position(
-    path: &Path,
-    format: Option<CloudFormat>,
-) -> Result<[f64; 3], FormatError> {
-    let pose = read_viewpoint(path, format)?;
-    Ok(Scan { pose, ..Scan::default() }.sensor_position_m())
-}
-
 fn open(path: &Path, format: Option<CloudFormat>) -> Result<(File, CloudFormat), FormatError> {
     if path.is_dir() {
         let cause = "expected a file, found a folder: name the files in it";
@@ -229,7 +190,7 @@ pub fn read_cloud_from(
     mut reader: impl Read,
     format: Option<CloudFormat>,
     name: &Path,
-) -> Result<Vec<[f64; 3]>, FormatError> {
+) -> Result<Cloud, FormatError> {
     let mut start = [0; format::SNIFFED_SIZE];
     let n = records::fill(&mut reader, &mut start);
     let start = &start[..n.map_err(|source| FormatError::io(name, source))?];
@@ -237,7 +198,7 @@ pub fn read_cloud_from(
         Some(format) => format,
         None => CloudFormat::of_content(start, name)?,
     };
-    read_as(&mut BufReader::new(start.chain(reader)), format, name).map(|cloud| cloud.points)
+    read_as(&mut BufReader::new(start.chain(reader)), format, name)
 }
 
 fn read_as(

@@ -5,7 +5,7 @@ use std::io::{self, Read, Write};
 use std::path::Path;
 
 use super::Cloud;
-use super::intensity::{self, Rows, Unit};
+use super::columns::{self, Extra, Rows};
 use super::precision::Precision;
 use crate::decoding::{error_in, excerpt, invalid};
 use crate::error::FormatError;
@@ -23,18 +23,18 @@ pub(super) fn holds_points(header: &Header) -> bool {
     (is_table && header.number().is_some()) || columns(header).is_some()
 }
 
-/// The coordinates x, y and z of a record and perhaps its intensity, with the unit of that, and the
-/// size of a record, bytes.
-fn columns(header: &Header) -> Option<(Vec<RecordField<'_>>, Option<Unit>, usize)> {
+/// The coordinates x, y and z of a record and what else there is of a point, and the size of a record,
+/// bytes.
+fn columns(header: &Header) -> Option<(Vec<RecordField<'_>>, Vec<Extra>, usize)> {
     let (mut fields, size) = header.record()?;
     let mut take = |name: &str| {
         let at = fields.iter().position(|field| field.name.eq_ignore_ascii_case(name))?;
         Some(fields.swap_remove(at))
     };
     let mut columns = vec![take("x")?, take("y")?, take("z")?];
-    let (intensity, unit) = intensity::find(take).unzip();
-    columns.extend(intensity);
-    Some((columns, unit, size))
+    let (more, extras): (Vec<_>, _) = columns::find(take).into_iter().unzip();
+    columns.extend(more);
+    Some((columns, extras, size))
 }
 
 /// Most values of a point. A wider array of three rows is transposed.
@@ -42,16 +42,16 @@ const WIDEST_POINT: usize = 64;
 
 /// Reads the points that follow `header`: numbers of any type.
 pub(super) fn read_points(header: &Header, reader: &mut (impl Read + ?Sized)) -> io::Result<Cloud> {
-    if let Some((columns, unit, size)) = columns(header) {
+    if let Some((columns, extras, size)) = columns(header) {
         let n = header.n_elements().unwrap_or(usize::MAX);
-        let (mut rows, mut row) = (Rows::default(), vec![0.0; columns.len()]);
+        let (mut rows, mut row) = (Rows::new(extras), vec![0.0; columns.len()]);
         records::read(reader, size, n as u64, |record| {
             for (value, column) in row.iter_mut().zip(&columns) {
                 *value = column.number.decode(&record[column.offset..], column.order);
             }
             rows.push(&row);
         })?;
-        return Ok(rows.cloud(unit));
+        return Ok(rows.cloud());
     }
     let mut points = Vec::new();
     if header.descr.starts_with('[') {
@@ -74,13 +74,13 @@ pub(super) fn read_points(header: &Header, reader: &mut (impl Read + ?Sized)) ->
     let (number, order) = header.number_or_error()?;
     if header.is_fortran_order {
         read_columns(reader, n as u64, number, order, &mut points)?;
-        return Ok(Cloud { points, intensities: None });
+        return Ok(Cloud { points, ..Cloud::default() });
     }
     let size = number.size();
     records::read(reader, columns.saturating_mul(size), n as u64, |row| {
         points.push([0, 1, 2].map(|axis| number.decode(&row[axis * size..], order)));
     })?;
-    Ok(Cloud { points, intensities: None })
+    Ok(Cloud { points, ..Cloud::default() })
 }
 
 /// Reads all x, then all y, then all z.

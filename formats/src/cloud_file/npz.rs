@@ -4,7 +4,7 @@ use std::io::{self, Read, Seek, Write};
 use std::path::Path;
 
 use super::precision::Precision;
-use super::{Cloud, intensity, npy};
+use super::{Cloud, columns, npy};
 use crate::archive::{NpzReader, NpzWriter};
 use crate::decoding::invalid;
 use crate::error::FormatError;
@@ -26,11 +26,12 @@ pub(super) fn read(reader: impl Read + Seek, name: &Path) -> Result<Cloud, Forma
     if [x, y, z] != [0.0; 3] {
         cloud.points.iter_mut().for_each(|p| *p = [p[0] + x, p[1] + y, p[2] + z]);
     }
+    cloud.pose = read_pose(&mut npz)?;
     let keys = npz.keys();
     let key = |name: &str| keys.iter().find(|key| key.eq_ignore_ascii_case(name));
-    if cloud.intensities.is_none()
-        && let Some((key, unit)) = intensity::find(key)
-    {
+    // Records have their own.
+    let is_record = cloud.intensities.is_some() || cloud.rings.is_some();
+    for (key, extra) in columns::find(key).into_iter().filter(|_| !is_record) {
         let n = cloud.points.len();
         // Anything may be called `i`: only an array with a number for each point has intensities.
         let is_short = key.len() == 1;
@@ -41,7 +42,7 @@ pub(super) fn read(reader: impl Read + Seek, name: &Path) -> Result<Cloud, Forma
             }
             crate::npy::read_numbers(elements, &header, |x| x as f32).map(Some)
         })?;
-        cloud.intensities = values.and_then(|values| unit.intensities(values));
+        values.into_iter().for_each(|values| cloud.set(extra, values));
     }
     Ok(cloud)
 }

@@ -7,7 +7,7 @@
 use std::io::{self, BufRead, Read, Write};
 use std::path::Path;
 
-use super::intensity::Rows;
+use super::columns::Rows;
 use super::pcd_header::{Coordinate, Encoding, Header, read_header};
 use super::precision::Precision;
 use super::{Cloud, lzf};
@@ -20,9 +20,9 @@ use crate::records;
 pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Cloud, FormatError> {
     let mut lines = Lines::new(reader, name);
     let mut header = read_header(&mut lines, name)?;
-    let columns =
+    let (columns, extras) =
         header.columns().map_err(|cause| FormatError::malformed(name, "FIELDS", cause))?;
-    let mut rows = Rows::default();
+    let mut rows = Rows::new(extras);
     match header.encoding {
         Encoding::Ascii => read_ascii(&mut lines, header.n, &columns, &mut rows)?,
         Encoding::Binary => {
@@ -40,19 +40,10 @@ pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Cloud, Form
         Encoding::Compressed => read_compressed(lines.reader, &mut header, &mut rows)
             .map_err(|error| error_in(name, "points", error))?,
     }
-    Ok(rows.cloud(header.intensity().map(|(_, unit)| unit)))
+    Ok(Cloud { pose: header.viewpoint.and_then(pose_of_viewpoint), ..rows.cloud() })
 }
 
-/// The pose from which the points were seen, from the sensor's frame to that of the points.
-pub(super) fn read_pose(
-    reader: &mut impl BufRead,
-    name: &Path,
-) -> Result<Option<[f64; 16]>, FormatError> {
-    let header = read_header(&mut Lines::new(reader, name), name)?;
-    Ok(header.viewpoint.and_then(pose_of_viewpoint))
-}
-
-/// The pose of a VIEWPOINT; `None` if it is the identity, or its quaternion is 0.
+/// The pose of a VIEWPOINT, from the sensor's frame to that of the points; `None` if it is the identity, or its quaternion is 0.
 fn pose_of_viewpoint([tx, ty, tz, w, x, y, z]: [f64; 7]) -> Option<[f64; 16]> {
     let square = w * w + x * x + y * y + z * z;
     let s = 2.0 / square;
@@ -88,7 +79,7 @@ fn read_ascii<R: BufRead>(
         }
         rows.push(&row);
     }
-    Ok(())
+    lines.check_end(n)
 }
 
 /// Reads compressed points, whose numbers are stored field by field.
@@ -114,7 +105,7 @@ fn read_compressed(reader: &mut impl Read, header: &mut Header, rows: &mut Rows)
         return Err(records::truncated(bytes.len() as u64, compressed));
     }
     let bytes = lzf::decompress(&bytes, uncompressed)?;
-    let columns = header.columns().map_err(invalid)?;
+    let (columns, _) = header.columns().map_err(invalid)?;
     let mut row = vec![0.0; columns.len()];
     for i in 0..header.n {
         for (value, column) in row.iter_mut().zip(&columns) {

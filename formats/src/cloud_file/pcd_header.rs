@@ -3,7 +3,7 @@
 use std::io::BufRead;
 use std::path::Path;
 
-use super::intensity::{self, Unit};
+use super::columns::{self, Extra};
 use crate::decoding::excerpt;
 use crate::error::FormatError;
 use crate::lines::{Line, Lines};
@@ -35,7 +35,7 @@ pub(super) enum Encoding {
     Compressed,
 }
 
-/// One coordinate of every point, or its intensity.
+/// One number of every point.
 #[derive(Clone, Copy)]
 pub(super) struct Coordinate {
     pub number: NumberType,
@@ -115,15 +115,12 @@ impl Header {
         self.fields.retain(|field| field.name != "_");
     }
 
-    /// The coordinates x, y and z, and the intensity if there is one.
-    pub fn columns(&self) -> Result<Vec<Coordinate>, String> {
-        let intensity = self.intensity().map(|(column, _)| Ok(column));
-        ["x", "y", "z"].map(|axis| self.coordinate(axis)).into_iter().chain(intensity).collect()
-    }
-
-    /// The intensity.
-    pub fn intensity(&self) -> Option<(Coordinate, Unit)> {
-        intensity::find(|name| self.coordinate(name).ok())
+    /// The coordinates x, y and z, and what else there is of each point.
+    pub fn columns(&self) -> Result<(Vec<Coordinate>, Vec<Extra>), String> {
+        let (columns, extras): (Vec<_>, _) =
+            columns::find(|name| self.coordinate(name).ok()).into_iter().unzip();
+        let axes = ["x", "y", "z"].map(|axis| self.coordinate(axis)).into_iter();
+        Ok((axes.chain(columns.into_iter().map(Ok)).collect::<Result<_, _>>()?, extras))
     }
 
     fn coordinate(&self, axis: &str) -> Result<Coordinate, String> {

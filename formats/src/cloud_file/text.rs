@@ -2,8 +2,8 @@
 //!
 //! Semicolons, commas, tabs or blanks separate columns: the first of these that the first line has, and
 //! tabs rather than the commas between them. A first line of names, which may be a comment, states the
-//! columns of x, y and z, their unit if that is not the metre, and the column of intensities; without
-//! names they are the first three, and where pandas numbers the columns, those after the nameless one.
+//! columns of x, y and z, their unit if that is not the metre, and the columns of intensities and rings;
+//! without names they are the first three, and where pandas numbers the columns, those after the nameless one.
 //! Text after a `#`, and a line that begins with `//`, is a comment. A line with nothing but a count is
 //! that of the points after it, as in Leica's `.pts`.
 
@@ -11,7 +11,7 @@ use std::io::{self, BufRead, Write};
 use std::path::Path;
 
 use super::Cloud;
-use super::intensity::{self, Rows, Unit};
+use super::columns::{self, Extra, Rows};
 use crate::decoding::excerpt;
 use crate::error::FormatError;
 use crate::lines::{Line, Lines};
@@ -26,11 +26,11 @@ enum Separator {
 
 struct Layout {
     separator: Separator,
-    /// Those of x, y and z, and of the intensity if there is one.
+    /// Those of x, y and z, and of what else there is of a point.
     columns: Vec<usize>,
     unit_m: [f64; 3],
-    /// That of the intensity.
-    unit: Option<Unit>,
+    /// What the columns after z hold.
+    extras: Vec<Extra>,
     /// Whether nothing names the columns, and there are more than three.
     is_guessed: bool,
 }
@@ -70,6 +70,7 @@ pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Cloud, Form
             }
             None => {
                 let (first, is_header) = Layout::from_first_line(&line, content, &comment)?;
+                rows = Rows::new(first.extras.iter().copied());
                 if !is_header {
                     are_decimal_commas = has_decimal_commas(content);
                     first.read(&line, content, &mut row)?;
@@ -79,7 +80,7 @@ pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Cloud, Form
             }
         }
     }
-    let (points, unit) = (rows.points(), layout.as_ref().and_then(|layout| layout.unit));
+    let points = rows.points();
     match promised {
         Some(n) if n > points.len() as u64 => {
             let cause = format!("the file ends after {} of {n}", points.len());
@@ -95,7 +96,7 @@ pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Cloud, Form
                          commas: write decimal points, or semicolons between the columns";
             Err(FormatError::malformed(name, "columns", cause))
         }
-        _ => Ok(rows.cloud(unit)),
+        _ => Ok(rows.cloud()),
     }
 }
 
@@ -166,9 +167,9 @@ impl Layout {
             let unit_m =
                 [x, y, z].map(|at| axis_named(names[at]).map_or(1.0, |(_, unit_m)| unit_m));
             let place = |of: &str| names.iter().position(|name| name.eq_ignore_ascii_case(of));
-            let (intensity, unit) = intensity::find(place).unzip();
-            let columns = [x, y, z].into_iter().chain(intensity).collect();
-            let layout = Self { separator, columns, unit_m, unit, is_guessed: false };
+            let (more, extras): (Vec<_>, _) = columns::find(place).into_iter().unzip();
+            let columns = [x, y, z].into_iter().chain(more).collect();
+            let layout = Self { separator, columns, unit_m, extras, is_guessed: false };
             return Ok((layout, is_header));
         }
         if is_header {
@@ -186,7 +187,7 @@ impl Layout {
     /// The layout of lines whose coordinates begin in the column `first`.
     fn unnamed(separator: Separator, first: usize) -> Self {
         let columns = (first..first + AXES.len()).collect();
-        Self { separator, columns, unit_m: [1.0; 3], unit: None, is_guessed: false }
+        Self { separator, columns, unit_m: [1.0; 3], extras: Vec::new(), is_guessed: false }
     }
 
     /// Reads the numbers of a line into `row`. An intensity that is missing or not a number is NaN.

@@ -52,7 +52,12 @@ pub fn read_elements(
         let (kind, chosen) = choice.map_or((None, Vec::new()), |(kind, c)| (Some(kind), c));
         let each = |row: &[f64]| kind.into_iter().for_each(|kind| each(kind, row));
         match header.encoding {
-            Encoding::Ascii => read_ascii(&mut lines, element, &chosen, each)?,
+            Encoding::Ascii => {
+                read_ascii(&mut lines, element, &chosen, each)?;
+                if last == Some(at) {
+                    lines.check_end(element.n)?;
+                }
+            }
             Encoding::Binary(order) => read_binary(lines.reader, element, &chosen, order, each)
                 .and_then(|()| match element.size().filter(|_| last == Some(at)) {
                     Some(size) => records::check_end(lines.reader, size, element.n),

@@ -49,7 +49,7 @@ fn the_files_are_whole_before_they_are_damaged() {
         let read = read_cloud_from(&bytes[..], Some(*format), Path::new("a"));
         // The binary PLY and the text of PCD need not make sense.
         if !matches!(format, CloudFormat::Ply | CloudFormat::Pcd) {
-            assert!(read.is_ok_and(|points| !points.is_empty()), "{format}");
+            assert!(read.is_ok_and(|cloud| !cloud.points.is_empty()), "{format}");
         }
     }
 }

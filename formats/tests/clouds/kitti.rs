@@ -34,7 +34,7 @@ fn what_only_its_name_makes_kittis_must_make_sense() {
     let path = folder.path().join("frame.bin");
     let read = |format: Option<CloudFormat>, points: &[&[f32]]| {
         fs::write(&path, floats(&points.concat())).unwrap();
-        let read = read_cloud_as(&path, format).map(|points| points.len());
+        let read = read_cloud_as(&path, format).map(|cloud| cloud.points.len());
         read.map_err(|error| error.to_string().split_once("frame.bin: ").unwrap().1.to_owned())
     };
     let remedy = "name the format by --format: kitti has four f32 for each point, nuscenes five; \
@@ -85,7 +85,7 @@ fn what_only_its_name_makes_kittis_must_make_sense() {
     let path = need!(shared_data("bug_inputs/nus100.bin"));
     let error = read_cloud(&path).unwrap_err().to_string();
     assert!(error.ends_with(&rings), "{error}");
-    assert_eq!(read_cloud_as(&path, Some(CloudFormat::Nuscenes)).unwrap().len(), 100);
+    assert_eq!(read_cloud_as(&path, Some(CloudFormat::Nuscenes)).unwrap().points.len(), 100);
 }
 
 #[test]

@@ -1,6 +1,6 @@
+mod columns;
 mod damaged;
 #[cfg(feature = "dataset")]
-mod intensities;
 mod kitti;
 mod las;
 mod npy;
@@ -17,7 +17,7 @@ use formats::cloud_file::{CloudFormat, read_cloud_from};
 
 fn read(name: &str, bytes: impl AsRef<[u8]>) -> Vec<[f64; 3]> {
     let name = Path::new(name);
-    read_cloud_from(bytes.as_ref(), Some(CloudFormat::of_path(name).unwrap()), name).unwrap()
+    read_cloud_from(bytes.as_ref(), Some(CloudFormat::of_path(name).unwrap()), name).unwrap().points
 }
 
 /// What is wrong with `bytes`, taken for a file called `name`, after that name.

@@ -123,6 +123,10 @@ fn what_is_no_cloud_is_refused() {
     assert_eq!(refuse(&ascii, b"1 2 3\n4 5\n"), "line 10: expected a number in column 3");
     assert_eq!(refuse(&ascii, b"1 2 3\n4 5 x\n"), "line 10: expected a number, found `x`");
     assert_eq!(refuse(&ascii, b"1 2 3\n"), "line 10: the file ends after 1 of 2");
+    assert_eq!(
+        refuse(&ascii, b"1 2 3\n4 5 6\n\n7 8 9\n"),
+        "line 12: expected 2 lines by the header, found more"
+    );
     let binary = with("POINTS 2\nDATA binary\n");
     assert_eq!(refuse(&binary, &[0; 23]), "points: the file ends after 1 of 2");
     assert_eq!(refuse(&binary, &[0; 48]), "points: expected 2 by the header, found 4");

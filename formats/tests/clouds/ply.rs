@@ -131,6 +131,8 @@ fn what_is_no_cloud_is_refused() {
     assert_eq!(rows(b"1 2 3\n4 5 up\n"), "line 10: expected a number, found `up`");
     assert_eq!(rows(b"1 2 3\n4 5\n"), "line 10: the number for property z is missing");
     assert_eq!(rows(b"1 2 3\n"), "line 10: the file ends after 1 of 2");
+    let more = rows(b"1 2 3\n4 5 6\n7 8 9\n");
+    assert_eq!(more, "line 11: expected 2 lines by the header, found more");
     let vertices = |faces: usize, size: usize| {
         let header =
             format!("element vertex 2\n{XYZ}element face {faces}\nproperty list char int v\n");

@@ -18,11 +18,11 @@ fn there_and_back(extension: &str, points: &[[f64; 3]]) -> Vec<[f64; 3]> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("cloud").with_extension(extension);
     write_cloud(&path, points).unwrap();
-    let named = read_cloud_as(&path, CloudFormat::of_path(&path).ok()).unwrap();
+    let named = read_cloud_as(&path, CloudFormat::of_path(&path).ok()).unwrap().points;
     let format = CloudFormat::of_path(&path).unwrap();
     let told = Some(format).filter(|&format| format == CloudFormat::Kitti);
     let file = fs::File::open(&path).unwrap();
-    assert_eq!(bits(&read_cloud_from(file, told, Path::new("-")).unwrap()), bits(&named));
+    assert_eq!(bits(&read_cloud_from(file, told, Path::new("-")).unwrap().points), bits(&named));
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
     named
 }

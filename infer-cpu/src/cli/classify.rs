@@ -11,7 +11,7 @@ use crate::sampler::{SamplerKind, SamplerSpec};
 use crate::{Classifier, Options, Precision, UpAxis};
 use anyhow::Context;
 use formats::FormatError;
-use formats::cloud_file::{CloudFormat, Unlike, judge_object, read_cloud_as, read_sensor_position};
+use formats::cloud_file::{Cloud, CloudFormat, Unlike, judge_object, read_cloud_as};
 use formats::model_card::{ModelCard, Normalization};
 use formats::outcome::{joined_causes, say};
 
@@ -188,20 +188,11 @@ struct Session<'a> {
 
 impl Session<'_> {
     /// Classifies the cloud `name`, if it could be `read`, and prints the result.
-    fn answer(
-        &mut self,
-        name: &Path,
-        read: Result<Vec<[f64; 3]>, FormatError>,
-    ) -> anyhow::Result<()> {
-        let judged = read.map_err(anyhow::Error::from).and_then(|points| {
-            let named = || name.display().to_string();
-            let sensor_m = match input::is_standard_input(name) {
-                true => [0.0; 3],
-                false => read_sensor_position(name, self.args.format)?,
-            };
-            let unlike = judge_object(&points, sensor_m).map_err(anyhow::Error::msg);
-            let unlike = unlike.with_context(named)?;
-            Ok((points, unlike))
+    fn answer(&mut self, name: &Path, read: Result<Cloud, FormatError>) -> anyhow::Result<()> {
+        let judged = read.map_err(anyhow::Error::from).and_then(|cloud| {
+            let unlike = judge_object(&cloud.points, cloud.sensor_position_m());
+            let unlike = unlike.map_err(anyhow::Error::msg);
+            Ok((cloud.points, unlike.with_context(|| name.display().to_string())?))
         });
         let (points, unlike) = match judged {
             Ok(judged) => judged,

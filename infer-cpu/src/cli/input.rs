@@ -4,19 +4,19 @@ use std::io::stdin;
 use std::path::Path;
 
 use formats::FormatError;
-use formats::cloud_file::{CloudFormat, read_cloud_as, read_cloud_from};
+use formats::cloud_file::{Cloud, CloudFormat, read_cloud_as, read_cloud_from};
 
 use super::Usage;
 
 const STANDARD_INPUT: &str = "-";
 
-pub fn is_standard_input(name: &Path) -> bool {
+fn is_standard_input(name: &Path) -> bool {
     name.as_os_str() == STANDARD_INPUT
 }
 
 /// Reads a cloud from a file or from standard input. Without a `format`, the extension of the file
 /// or the first bytes of standard input determine it.
-pub fn read(name: &Path, format: Option<CloudFormat>) -> Result<Vec<[f64; 3]>, FormatError> {
+pub fn read(name: &Path, format: Option<CloudFormat>) -> Result<Cloud, FormatError> {
     if is_standard_input(name) {
         return read_cloud_from(stdin().lock(), format, Path::new("standard input"));
     }

@@ -62,7 +62,7 @@ pub fn run(args: &SampleArgs) -> anyhow::Result<Outcome> {
     // An unknown extension fails before a long computation.
     CloudFormat::of_path(&args.output)?;
     args.overwrite.check([&*args.output])?;
-    let mut points = input::read(&args.input, args.format)?;
+    let mut points = input::read(&args.input, args.format)?.points;
     if args.drop_invalid {
         let n = points.len();
         points.retain(|point| point.iter().all(|x| x.is_finite()));

@@ -89,7 +89,7 @@ pub(crate) fn prepare<'a>(run: &Run<'a>, entry: &MeshEntry) -> Result<Prepared<'
     Ok(Prepared { record, views, jobs, scene })
 }
 
-/// What is probably wrong with the unit of a mesh or with the place of a sensor.
+/// What is probably wrong with the unit of a mesh, with the effects or with the place of a sensor.
 pub(crate) fn doubts(
     source: &str,
     config: &DatasetConfig,
@@ -106,7 +106,8 @@ pub(crate) fn doubts(
         let units = if is_scaled { "" } else { ", or another of --units" };
         format!("a sensor stands inside its bounding box: expected a larger --distance{units}")
     });
-    size.into_iter().chain(inside).map(move |doubt| format!("{source}: {doubt}"))
+    let effects = mesh.and_then(|mesh| mesh.doubtful_effects(&config.effects));
+    size.into_iter().chain(effects).chain(inside).map(move |doubt| format!("{source}: {doubt}"))
 }
 
 /// What is doubtful about the files of a mesh, for the user.

@@ -1,6 +1,7 @@
 //! What is probably wrong with the unit or the place of a mesh.
 
 use super::Mesh;
+use crate::effects::Effects;
 use crate::mesh::frame::Unit;
 use glam::DVec3;
 
@@ -41,6 +42,19 @@ impl Mesh {
         let (least, most) = (size.min_element(), size.max_element());
         let is_doubtful = most > 200.0 && least > most / 10.0 || most < 0.01;
         self.doubtful_size(unit).filter(|_| is_doubtful)
+    }
+
+    /// Why its form is not to be seen in scans with `effects`: noise or a quantum as large as it is.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn doubtful_effects(&self, effects: &Effects) -> Option<String> {
+        let [low, high] = self.bounds_m().map(DVec3::from_array);
+        let size = high - low;
+        let noise = effects.noise.map(|noise| ("noise", noise.sigma_m));
+        let quantum = effects.quantum.and_then(|quantum| Some(("a quantum", quantum.step_m?)));
+        let largest = noise.into_iter().chain(quantum).find(|(_, m)| *m >= size.max_element())?;
+        let (what, found_m) = largest;
+        Some(format!("expected {what} smaller than the mesh, {}, found {found_m} m", shown(size)))
     }
 
     /// Whether one of `sensors_m` stands inside its bounding box: it then sees the mesh from inside.
@@ -105,6 +119,23 @@ mod tests {
         let corners = [[0.0; 3], [900.0, 0.0, 0.0], [0.0, 900.0, 30.0]];
         let terrain = Mesh::from_triangles(corners.to_vec(), vec![[0, 1, 2]]).unwrap();
         assert_eq!(terrain.doubtful_unit(Unit::Metre), None);
+    }
+
+    #[test]
+    fn noise_and_quanta_as_large_as_the_mesh_are_doubted() {
+        for (effects, doubt) in [
+            ("noise = { sigma_m = 1.9 }\nquantise_m = 1.9", None),
+            (
+                "noise = { sigma_m = 2 }",
+                Some("noise smaller than the mesh, 2 x 2 x 2 m, found 2 m"),
+            ),
+            ("quantise_m = 4", Some("a quantum smaller than the mesh, 2 x 2 x 2 m, found 4 m")),
+            ("quantise_m = true", None),
+        ] {
+            let effects: Effects = toml::from_str(effects).unwrap();
+            let found = tetrahedron(2.0).doubtful_effects(&effects);
+            assert_eq!(found, doubt.map(|doubt| format!("expected {doubt}")));
+        }
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Directions in a table, as makers of scanners without a formula publish them.
 
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
@@ -31,6 +32,10 @@ pub struct Table {
     #[serde(default)]
     pub directions_deg: Vec<[f64; 2]>,
 }
+
+/// The directions that a table can have.
+const AZIMUTHS_DEG: RangeInclusive<f64> = -360.0..=360.0;
+const ELEVATIONS_DEG: RangeInclusive<f64> = -90.0..=90.0;
 
 fn one_line() -> u16 {
     1
@@ -67,8 +72,8 @@ impl Table {
         }
         for (i, [azimuth_deg, elevation_deg]) in self.directions_deg.iter().enumerate() {
             let key = |column: u8| format!("table.directions_deg[{i}][{column}]");
-            within(&key(0), *azimuth_deg, -360.0..=360.0)?;
-            within(&key(1), *elevation_deg, -90.0..=90.0)?;
+            within(&key(0), *azimuth_deg, AZIMUTHS_DEG)?;
+            within(&key(1), *elevation_deg, ELEVATIONS_DEG)?;
         }
         let (rows, lines) = (self.directions_deg.len(), self.lines);
         if !rows.is_multiple_of(lines.into()) {
@@ -132,7 +137,8 @@ fn read(file: &Path) -> Result<Vec<[f64; 2]>, ConfigError> {
         .map_err(|source| ConfigError::Read { file: file.to_owned(), source })?;
     let mut csv = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(opened);
     let line_of = |error: &csv::Error| error.position().map_or(0, csv::Position::line);
-    let heading = csv.headers().map_err(|error| failed(line_of(&error), error.to_string()))?;
+    let heading =
+        csv.headers().map_err(|error| failed(line_of(&error), error.to_string()))?.clone();
     let column =
         |name: &str| heading.iter().position(|found| found.to_ascii_lowercase().starts_with(name));
     let missing = |name: &str| {
@@ -154,9 +160,22 @@ fn read(file: &Path) -> Result<Vec<[f64; 2]>, ConfigError> {
             let found = word.parse::<f64>().ok().filter(|x| x.is_finite());
             found.ok_or_else(|| failed(line, format!("expected a number, found \"{word}\"")))
         };
-        let upright_deg = number(upright)?;
-        let elevation_deg = if is_zenith { 90.0 - upright_deg } else { upright_deg };
-        directions_deg.push([number(azimuth)?, elevation_deg]);
+        let within = |name: &str, found: f64, range: RangeInclusive<f64>| {
+            within(name, found, range).map_err(|error| failed(line, error.to_string()))
+        };
+        let (azimuth_deg, upright_deg) = (number(azimuth)?, number(upright)?);
+        within(&heading[azimuth], azimuth_deg, AZIMUTHS_DEG)?;
+        let elevation_deg = match is_zenith {
+            true => {
+                within(&heading[upright], upright_deg, 0.0..=180.0)?;
+                90.0 - upright_deg
+            }
+            false => {
+                within(&heading[upright], upright_deg, ELEVATIONS_DEG)?;
+                upright_deg
+            }
+        };
+        directions_deg.push([azimuth_deg, elevation_deg]);
         if directions_deg.len() as u64 > MAX_RAYS {
             return Err(failed(line, format!("expected at most {MAX_RAYS} rows, found more")));
         }

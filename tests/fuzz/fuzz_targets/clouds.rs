@@ -11,8 +11,8 @@ use libfuzzer_sys::fuzz_target;
 fuzz_target!(|bytes: &[u8]| {
     let Some((choice, content)) = bytes.split_first() else { return };
     let format = CloudFormat::ALL.get(usize::from(*choice)).copied();
-    let Ok(points) = read_cloud_from(content, format, Path::new("-")) else { return };
+    let Ok(cloud) = read_cloud_from(content, format, Path::new("-")) else { return };
     // Three bytes hold a point at the least, of which compression makes at most
     // 1032 times as many.
-    assert!(points.len() <= content.len() * 1032 / 3);
+    assert!(cloud.points.len() <= content.len() * 1032 / 3);
 });

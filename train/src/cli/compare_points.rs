@@ -2,7 +2,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::ensure;
 use formats::chamfer::chamfer;
-use formats::cloud_file::read_cloud;
+use formats::cloud_file::{Cloud, read_cloud_as};
 
 use super::print;
 
@@ -18,17 +18,17 @@ pub struct ComparePointsArgs {
 }
 
 pub fn run(args: &ComparePointsArgs) -> anyhow::Result<()> {
-    let (a, b) = (read_finite(&args.a)?, read_finite(&args.b)?);
+    let [a, b] = [read_finite(&args.a)?.points, read_finite(&args.b)?.points];
     let found = chamfer(&a, &b);
     print(&format!("{} and {} points", a.len(), b.len()))?;
     print(&format!("Chamfer distance, squared, sum of both means: {:.9}", found.squared))?;
     print(&format!("Chamfer distance, plain, sum of both means:   {:.9}", found.plain))
 }
 
-pub fn read_finite(path: &Path) -> anyhow::Result<Vec<[f64; 3]>> {
-    let cloud = read_cloud(path)?;
-    ensure!(!cloud.is_empty(), "{}: expected points, found none", path.display());
-    let bad = cloud.iter().position(|point| !point.iter().all(|x| x.is_finite()));
+pub fn read_finite(path: &Path) -> anyhow::Result<Cloud> {
+    let cloud = read_cloud_as(path, None)?;
+    ensure!(!cloud.points.is_empty(), "{}: expected points, found none", path.display());
+    let bad = cloud.points.iter().position(|point| !point.iter().all(|x| x.is_finite()));
     if let Some(i) = bad {
         anyhow::bail!("{}: point {i} is not finite", path.display());
     }

@@ -5,7 +5,7 @@ use crate::lime::{Explanation, Lime, explain};
 use crate::random_baseline::RandomBaseline;
 use anyhow::{Context, Error};
 use formats::atomic;
-use formats::cloud_file::{Unlike, judge_object, read_sensor_position};
+use formats::cloud_file::{Unlike, judge_object};
 use formats::outcome::say;
 use formats::outputs::{Overwrite, need_extension};
 use infer_cpu::sampler::{Resize, SamplerKind, SamplerSpec};
@@ -51,8 +51,9 @@ pub fn run(args: &ExplainArgs) -> anyhow::Result<()> {
     args.svg.iter().try_for_each(|file| need_extension("--svg", file, &["svg"]))?;
     args.overwrite.check(args.svg.iter().map(PathBuf::as_path))?;
     let cloud = read_finite(&args.cloud)?;
+    let sensor_m = cloud.sensor_position_m();
+    let cloud = cloud.points;
     let file = || args.cloud.display().to_string();
-    let sensor_m = read_sensor_position(&args.cloud, None)?;
     let unlike = judge_object(&cloud, sensor_m).map_err(Error::msg).with_context(file)?;
     if unlike == Some(Unlike::Sweep) {
         say(format!("warning: {} {}", file(), Unlike::Sweep));

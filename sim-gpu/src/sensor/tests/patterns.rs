@@ -355,7 +355,11 @@ fn a_table_that_cannot_be_used_is_named_with_its_line() {
         ("azimuth_deg,elevation_deg\n1,x\n", "rows.csv: line 2: expected a number, found \"x\""),
         ("azimuth_deg,elevation_deg\n1\n", "rows.csv: line 2"),
         ("azimuth_deg,elevation_deg\n1,nan\n", "expected a number, found \"nan\""),
-        ("azimuth_deg,elevation_deg\n1,91\n", "own.toml: line 4: table.directions_deg[0][1]"),
+        (
+            "azimuth_deg,elevation_deg\n1,91\n",
+            "rows.csv: line 2: elevation_deg: expected a number within -90..=90, found 91",
+        ),
+        ("Azimuth/deg,Zenith/deg\n1,181\n", "line 2: Zenith/deg: expected a number within 0..=180"),
         ("azimuth_deg,elevation_deg\n", "own.toml: line 4: table.directions_deg: expected a row"),
     ] {
         std::fs::write(folder.path().join("rows.csv"), rows).unwrap();

@@ -1,14 +1,14 @@
 use std::fs;
 
 use formats::Scan;
-use formats::cloud_file::{LasPoint, read_with_intensities, write_las};
+use formats::cloud_file::{LasPoint, read_cloud_as, write_las};
 use formats::hash::Hashing;
 use formats::scan_file::{ScanFormat, write_scan};
 
 use crate::numpy::{npy, npz};
 
 fn read(path: &std::path::Path) -> Option<Vec<f32>> {
-    let cloud = read_with_intensities(path, None).unwrap();
+    let cloud = read_cloud_as(path, None).unwrap();
     assert_eq!(cloud.points, [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]);
     cloud.intensities
 }
@@ -53,11 +53,44 @@ fn columns_of_intensities_are_known_by_their_names() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.npz");
     fs::write(&path, column("intensity", "|u1", "(3,)", &[7; 3])).unwrap();
-    let error = read_with_intensities(&path, None).unwrap_err().to_string();
+    let error = read_cloud_as(&path, None).unwrap_err().to_string();
     assert!(
         error.ends_with("intensity: expected 2 values, one for each point, found 3"),
         "{error}"
     );
+}
+
+#[test]
+fn columns_of_rings_are_known_by_their_names() {
+    let pcd = |rings: [u8; 2]| {
+        let header = "VERSION 0.7\nFIELDS x y z ring\nSIZE 4 4 4 2\nTYPE F F F U\nWIDTH 2\nHEIGHT 1\n\
+                      VIEWPOINT 0 0 2 1 0 0 0\nPOINTS 2\nDATA ascii\n";
+        format!("{header}1 2 3 {}\n4 5 6 {}\n", rings[0], rings[1]).into_bytes()
+    };
+    let xyz = npy("|u1", "False", "(2, 3)", &[1, 2, 3, 4, 5, 6]);
+    let nuscenes = [1.0f32, 2.0, 3.0, 9.0, 31.0, 4.0, 5.0, 6.0, 9.0, 0.0];
+    for (name, bytes, expected) in [
+        ("a.pcd", pcd([31, 0]), Some([31, 0])),
+        // What nobody filled is no ring.
+        ("a.pcd", pcd([0, 0]), None),
+        ("a.csv", b"x,y,z,laser_id,intensity\n1,2,3,31,0\n4,5,6,0,0\n".into(), Some([31, 0])),
+        ("a.csv", b"x,y,z,ring\n1,2,3,0.5\n4,5,6,1\n".into(), None),
+        (
+            "a.npz",
+            npz(&[("points", xyz), ("ring", npy("|u1", "False", "(2,)", &[31, 0]))]),
+            Some([31, 0]),
+        ),
+        ("a.pcd.bin", nuscenes.map(f32::to_le_bytes).concat(), Some([31, 0])),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        fs::write(&path, &bytes).unwrap();
+        let cloud = read_cloud_as(&path, None).unwrap();
+        assert_eq!(cloud.points, [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]);
+        assert_eq!(cloud.rings, expected.map(Vec::from), "{name}");
+        let height_m = if name == "a.pcd" { 2.0 } else { 0.0 };
+        assert_eq!(cloud.sensor_position_m(), [0.0, 0.0, height_m]);
+    }
 }
 
 /// LAS 1.4 R15, 2.6.2: the largest intensity is 65535, and 0 says that there is none.
