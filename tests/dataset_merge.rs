@@ -24,11 +24,11 @@ fn make(out: &Path, terms: &Terms, entries: &[Entry], failures: &[MeshFailure]) 
     finish(out, terms, records, failures.to_vec()).expect("a dataset");
 }
 
-/// Three shards; the last has a class less, and all failures.
+/// Three shards; the last has a class less, and the others a failure each.
 fn make_shards(folder: &Path) -> Vec<PathBuf> {
     let make_shard = |number: u32| {
         let part = entries().into_iter().skip(number as usize).step_by(3).collect::<Vec<_>>();
-        let failed = if number == 2 { failures() } else { Vec::new() };
+        let failed: Vec<_> = failures().into_iter().skip(number as usize).take(1).collect();
         let out = folder.join(format!("shard{number}"));
         make(&out, &terms(config(), Some((number, 3))), &part, &failed);
         out

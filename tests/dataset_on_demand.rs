@@ -1,16 +1,19 @@
 //! Clouds cast on demand equal the packed clouds of a dataset with the same settings.
 
+use edgepuck_dataset::internals::Journal;
 use edgepuck_dataset::{
-    Clouds, DatasetConfig, DatasetError, MeshEntry, Normalize, Plan, Poses, Progress, SetConfig,
-    Variant, Viewpoints, Views, discover, make, seed_of_epoch, verify,
+    Begin, Clouds, DatasetConfig, DatasetError, MeshEntry, Normalize, Plan, Poses, Progress,
+    SetConfig, Variant, Viewpoints, Views, discover, make, seed_of_epoch, verify,
 };
 use formats::Split;
 use formats::labelled::read_labelled;
+use formats::scan::Attribute;
 use formats::scan_file::read_scan;
 use glam::DVec3;
 use sim_gpu::effects::{Effects, Noise, NoiseModel};
 use sim_gpu::{Caster, Sensor};
 use std::path::Path;
+use tests::tree::assert_same;
 
 const CACHE_BYTES: usize = 1 << 20;
 
@@ -65,6 +68,48 @@ fn clouds_on_demand_are_those_of_the_packed_set() {
         assert_eq!(clouds.label(i), expected.labels[i] as usize, "{i}");
         assert_eq!(found, expected.cloud(i).as_flattened(), "{i}");
     }
+
+    // An attribute is that of its point: the cloud is its beams' points, moved and scaled.
+    let mut config = settings(7);
+    config.attributes.insert(Attribute::Beam);
+    let clouds = self::clouds(&meshes, config, CACHE_BYTES);
+    let with_beams = clouds.draw(&Caster::cpu(), 7, &[3], &[Attribute::Beam]).unwrap();
+    let scan = clouds.scan_each(&Caster::cpu(), 7, &[3]).unwrap().remove(0).unwrap();
+    let rows: Vec<[DVec3; 2]> = with_beams[0]
+        .chunks_exact(4)
+        .map(|row| {
+            let beams = scan.beam.as_ref().unwrap();
+            let at = beams.iter().position(|&beam| beam as f32 == row[3]).unwrap();
+            [[row[0], row[1], row[2]], scan.positions[at]].map(|p| DVec3::from(p.map(f64::from)))
+        })
+        .collect();
+    let lengths = [0, 1].map(|which: usize| -> Vec<f64> {
+        rows.iter().map(|row| row[which].distance(rows[0][which])).collect()
+    });
+    let scale = lengths[1].iter().sum::<f64>() / lengths[0].iter().sum::<f64>();
+    for (drawn, seen) in lengths[0].iter().zip(&lengths[1]) {
+        assert!((scale * drawn - seen).abs() < 1e-5, "{drawn} {seen}");
+    }
+}
+
+/// The journal of a run that was interrupted at its end, and a mesh that was changed since.
+#[test]
+fn a_mesh_that_changes_before_a_run_goes_on_is_scanned_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let (meshes, config) = (meshes(&at("meshes")), settings(7));
+    let run = |out: &Path, begin| {
+        let plan = Plan { begin, ..Plan::new(out, &config, &meshes) };
+        make(&plan, &Caster::cpu(), &Progress::default()).unwrap()
+    };
+    let before = run(&at("out"), Begin::Fresh);
+    let journal = Journal::at(&at("out"));
+    journal.begin(&before.terms()).unwrap();
+    before.meshes.iter().for_each(|record| journal.note(record).unwrap());
+    std::fs::copy(&meshes[9].path, &meshes[0].path).unwrap();
+    run(&at("out"), Begin::Resume);
+    run(&at("anew"), Begin::Fresh);
+    assert_same(&at("out"), &at("anew"));
 }
 
 #[test]

@@ -117,43 +117,47 @@ fn a_scan_in_motion_is_a_loop_of_scans_of_a_world_that_stands_still() {
 
 #[test]
 fn culling_loses_nothing_of_what_moves() {
-    let (sensor, targets) = (sensor(), targets());
+    let (sensor, [_, lump]) = (sensor(), targets());
     let pattern = sensor.pattern();
-    let with = |culling| -> Scan {
-        let mut request = request(&sensor, &pattern);
-        (request.motion, request.culling) = (swerving(), culling);
-        let mut placed = PlacedTarget::new(&targets[1]);
-        placed.motion = passing();
-        scan_objects(&OpenCaster::Cpu(Effects::default()), &[placed], &request).unwrap().scan
+    let seen = |of_sensor: Option<Arc<Trajectory>>, target: &Target, x_m: f64, of_car| -> Scan {
+        let [culled, all] = [Culling::On, Culling::Off].map(|culling| {
+            let mut request = request(&sensor, &pattern);
+            (request.motion, request.culling) = (of_sensor.clone(), culling);
+            let mut placed = PlacedTarget::new(target);
+            placed.world_from_object = DAffine3::from_translation(DVec3::X * x_m);
+            placed.motion.clone_from(&of_car);
+            scan_objects(&OpenCaster::Cpu(Effects::default()), &[placed], &request).unwrap().scan
+        });
+        assert_eq!(culled, all);
+        all
     };
-    assert!(with(Culling::On).len() > 30);
-    assert_eq!(with(Culling::On), with(Culling::Off));
-
+    let at =
+        |at_s: f64, [x, y]: [f64; 2], yaw_rad: f64| (at_s, pose([x, y, 0.0], DVec3::Z, yaw_rad));
+    assert!(seen(swerving(), &lump, 0.0, passing()).len() > 30);
     // A car whose frame is far from its origin, as in a map, and turns: it passes by the sensor.
-    let turning = |culling| -> Scan {
-        let mut request = request(&sensor, &pattern);
-        request.culling = culling;
-        let mut placed = PlacedTarget::new(&targets[1]);
-        placed.world_from_object = DAffine3::from_translation(DVec3::X * 10.0);
-        placed.motion = moving(&[
-            (0.0, pose([-6.0, 0.0, 0.0], DVec3::Z, -1.0)),
-            (0.1, pose([-6.0, 0.0, 0.0], DVec3::Z, 1.0)),
-        ]);
-        scan_objects(&OpenCaster::Cpu(Effects::default()), &[placed], &request).unwrap().scan
-    };
-    assert!(turning(Culling::Off).len() > 30);
-    assert_eq!(turning(Culling::On), turning(Culling::Off));
+    let turning = moving(&[at(0.0, [-6.0, 0.0], -1.0), at(0.1, [-6.0, 0.0], 1.0)]);
+    assert!(seen(None, &lump, 10.0, turning).len() > 30);
+    // 3 m ahead, what the beams meet 28 degrees to the right they meet again, a turn later, as far to
+    // the left, as the sensor or the car goes by.
+    let ball = casting::target(&meshes::mapped(&meshes::icosphere(3), |p| p * 0.5));
+    let along_y = |from, to| moving(&[at(0.0, [0.0, from], 0.0), at(0.1, [0.0, to], 0.0)]);
+    for (of_sensor, of_car) in [(along_y(2.0, -2.0), None), (None, along_y(-2.0, 2.0))] {
+        let times_s = seen(of_sensor, &ball, 3.0, of_car).time_s.unwrap();
+        assert!(times_s.iter().any(|s| *s < 0.02) && times_s.iter().any(|s| *s > 0.08));
+    }
 }
 
 #[test]
 fn culling_loses_nothing_of_beams_that_start_beside_the_axis_at_rest_and_in_motion() {
-    let mut sensor = sensor();
+    let mut sensor = SensorProfile::builtin("vlp32c").unwrap();
     let Layout::Rotating(head) = &mut sensor.layout else { panic!("a VLP-32C rotates") };
-    head.beam_start_m = Some(0.3);
+    head.beam_start_m = Some(1.0);
     let pattern = sensor.pattern();
-    let near =
-        casting::target(&meshes::mapped(&meshes::icosphere(3), |p| p * 0.8 + DVec3::X * 3.5));
-    for motion in [None, swerving()] {
+    // What stands still as a sensor that may move does, too.
+    let still = moving(&[0.0, 1.0].map(|at_s| (at_s, pose([0.0; 3], DVec3::Z, 0.0))));
+    for (motion, radius_m) in [(None, 0.8), (swerving(), 0.8), (still, 0.05)] {
+        let ball = meshes::mapped(&meshes::icosphere(3), |p| p * radius_m + DVec3::X * 3.5);
+        let near = casting::target(&ball);
         let [culled, all] = [Culling::On, Culling::Off].map(|culling| {
             let mut request = request(&sensor, &pattern);
             (request.motion, request.culling) = (motion.clone(), culling);

@@ -6,7 +6,7 @@
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, Scan};
 use glam::DVec3;
-use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel, Quantum};
+use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel};
 use sim_gpu::internals::caster::OpenCaster;
 use sim_gpu::internals::pose::Pose;
 use sim_gpu::internals::scan::{PlacedTarget, ScanRequest, Tally, scan_objects};
@@ -139,19 +139,6 @@ fn dropout_loses_its_share_and_all_casters_lose_the_same() {
         let (scan, _) = on_cpu(&effects);
         assert_eq!(!scan.is_empty(), left, "{probability}");
     }
-}
-
-#[test]
-fn quantised_ranges_are_multiples_of_the_quantum() {
-    let effects = Effects { quantum: Some(Quantum { step_m: Some(0.004) }), ..Effects::default() };
-    on_each(&effects, |(clean, _), (rounded, _)| {
-        for (p, q) in ranges(clean).into_iter().zip(ranges(rounded)) {
-            // Stored in f32: 1.2e-7 m each.
-            assert!((p - q).abs() <= 0.002 + 3e-7);
-            let steps = q / 0.004;
-            assert!((steps - steps.round()).abs() * 0.004 < 3e-7, "{q}");
-        }
-    });
 }
 
 #[test]

@@ -112,6 +112,32 @@ fn scans_of_other_seeds_sensors_objects_and_times_have_other_noise() {
     assert_eq!(named("b").points, all[9].1.points);
 }
 
+/// A sensor whose points are all drawn once before the rings, which keep all of them, and all once
+/// again after.
+#[test]
+fn the_draws_of_points_before_and_after_the_rings_are_independent() {
+    let order = |before_rings: &str| -> Vec<usize> {
+        let text = format!(
+            "name = \"drawn\"\nrange = {{ max_m = 100 }}\n\
+             uniform = {{ azimuth_from_deg = -40, azimuth_to_deg = 40, azimuth_steps = 40, \
+             elevation_from_deg = -20, elevation_to_deg = 20, elevation_steps = 25 }}\n\
+             rings = {{ step_deg = 0.1, keep_from = 0, keep_to = 1 }}\n\
+             sample = {{ points = 1000, with_replacement = false{before_rings} }}"
+        );
+        let sensor: Sensor = toml::from_str(&text).unwrap();
+        let scene = world(&[None]);
+        let scan = scene.scan(&sensor, Pose::IDENTITY).effects(Effects::default());
+        let scan = scan.attributes([Attribute::Beam]).run().unwrap();
+        scan.beam.as_ref().unwrap().iter().map(|&beam| beam as usize).collect()
+    };
+    let (after, both) = (order(""), order(", before_rings = 1000"));
+    let mut before = vec![0.0; 1000];
+    // Number i of both draws is what the first of them drew as number after[i].
+    after.iter().zip(&both).for_each(|(&after, &both)| before[after] = both as f64);
+    let draws = before.iter().zip(&after).map(|(a, b)| [a - 499.5, *b as f64 - 499.5]);
+    assert_uncorrelated("the two draws", &draws.collect::<Vec<_>>());
+}
+
 #[test]
 fn losses_noise_and_directions_of_noise_are_independent() {
     let (sensor, scene) = (sensor(), world(&[None]));

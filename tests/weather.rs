@@ -111,30 +111,44 @@ fn no_weather_is_clear_air_to_the_bit() {
 }
 
 #[test]
-fn rain_replaces_as_many_returns_as_its_closed_form_says() {
+fn rain_and_snow_replace_as_many_returns_as_their_closed_form_says() {
     // At 30 m and 30 mm/h drops are stronger than a surface of 10 % in 2.79 % of LISA's beams of
     // 3 by 3 mrad: a beam of half the area has half as many drops, but more of them are strong
     // enough. The integral of the density by another program, for 3 by 1.5 mrad and drops from
     // 1 m: see the module `weather`.
-    let (scan, tally) = on_cpu(&in_weather(rain(30.0)), 0.1);
-    let n = tally.points as f64;
-    assert!(n > 50_000.0);
+    let snow = Weather { snow_mm_h: Some(30.0), ..Weather::default() };
     let width = (0.172f64.to_radians().tan() * 0.086f64.to_radians().tan()).sqrt();
-    let (slope, extinction) = (4.1 * 30f64.powf(-0.21), 3.67e-4 * 30f64.powf(0.63));
-    let limit: f64 = 0.1 * (-2.0 * extinction * WALL_M).exp() / WALL_M.powi(2);
-    let density = |r: f64| {
-        let least_mm =
-            1000.0 * width * r * r * (limit * (2.0 * extinction * r).exp() / 0.019_853).sqrt();
-        let per_m3 = 8000.0 / slope * (-slope * least_mm.max(0.05)).exp();
-        per_m3 * std::f64::consts::PI / 4.0 * (width * r).powi(2)
-    };
-    let step = 1e-3;
-    let mean = (0..29_000).map(|i| density(1.0 + (f64::from(i) + 0.5) * step) * step).sum::<f64>();
-    let expected = 1.0 - (-mean).exp();
-    let found = count(&scan, Medium::Rain) as f64 / n;
-    let sigma = (expected * (1.0 - expected) / n).sqrt();
-    assert!((found - expected).abs() < 4.0 * sigma + 1e-4, "{found}, not {expected}");
-    assert_eq!(tally.scattered as usize, count(&scan, Medium::Rain));
+    // The extinction; N0 and the slope of diameters; the index of refraction at 905 nm.
+    let of_rain = [3.67e-4 * 30f64.powf(0.63), 8000.0, 4.1 * 30f64.powf(-0.21), 1.328];
+    let of_snow = [
+        1.447e-3 * 30f64.powf(0.565),
+        7600.0 * 30f64.powf(-0.87),
+        2.55 * 30f64.powf(-0.48),
+        1.3031,
+    ];
+    for (weather, medium, [extinction, n0, slope, index]) in
+        [(rain(30.0), Medium::Rain, of_rain), (snow, Medium::Snow, of_snow)]
+    {
+        let (scan, tally) = on_cpu(&in_weather(weather), 0.1);
+        let n = tally.points as f64;
+        assert!(n > 50_000.0);
+        let limit: f64 = 0.1 * (-2.0 * extinction * WALL_M).exp() / WALL_M.powi(2);
+        let mirror = ((index - 1.0) / (index + 1.0)).powi(2);
+        let density = |r: f64| {
+            let least = (limit * (2.0 * extinction * r).exp() / mirror).sqrt();
+            let least_mm = 1000.0 * width * r * r * least;
+            let per_m3 = n0 / slope * (-slope * least_mm.max(0.05)).exp();
+            per_m3 * std::f64::consts::PI / 4.0 * (width * r).powi(2)
+        };
+        let step = 1e-3;
+        let mean =
+            (0..29_000).map(|i| density(1.0 + (f64::from(i) + 0.5) * step) * step).sum::<f64>();
+        let expected = 1.0 - (-mean).exp();
+        let found = count(&scan, medium) as f64 / n;
+        let sigma = (expected * (1.0 - expected) / n).sqrt();
+        assert!((found - expected).abs() < 4.0 * sigma + 1e-4, "{found}, not {expected}");
+        assert_eq!(tally.scattered as usize, count(&scan, medium));
+    }
 }
 
 #[test]
@@ -179,6 +193,28 @@ fn in_hahners_fog(visibility_m: f64, footprint: Option<Footprint>) -> Effects {
 }
 
 const SEVEN_RAYS: Footprint = Footprint { samples: 7, divergence_deg: None, separation_m: None };
+
+/// Step 4 of "Order" in EFFECTS.md: the air returns light beyond a surface that some rays pass by.
+#[test]
+fn the_air_behind_an_edge_returns_what_passes_it() {
+    let wall = meshes::mapped(&meshes::icosphere(0), |p| DVec3::new(5.0, 2.0 * p.y, 2.0 * p.z));
+    // So thick that every beam that reaches it returns from it.
+    let dust = Volume { min_m: [10.0, -20.0, -20.0], max_m: [20.0; 3], visibility_m: 1.0 };
+    let weather = Weather { volumes: vec![dust], ..Weather::default() };
+    let (footprint, returns) = (Some(SEVEN_RAYS), Some(ReturnMode::Dual));
+    let effects = Effects { footprint, returns, ..in_weather(weather) };
+    let (scan, _) = scan(&OpenCaster::Cpu(effects), &wall, 0.5, Culling::On);
+    let mut media = std::collections::BTreeMap::<u32, Vec<u8>>::new();
+    for (&beam, &medium) in scan.beam.iter().flatten().zip(scan.medium.iter().flatten()) {
+        media.entry(beam).or_default().push(medium);
+    }
+    let count = |wanted: &[Medium]| {
+        let wanted: Vec<u8> = wanted.iter().map(|medium| *medium as u8).collect();
+        media.values().filter(|found| **found == wanted).count()
+    };
+    assert!(count(&[Medium::Surface]) > 1000, "the wall hides the dust");
+    assert!(count(&[Medium::Surface, Medium::Dust]) > 20, "but at its edges");
+}
 
 #[test]
 fn by_hahners_model_beams_beyond_a_range_become_fog_whatever_they_meet() {

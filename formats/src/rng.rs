@@ -129,12 +129,4 @@ mod tests {
         }
         assert!(seen.iter().all(|&count| count > 800), "{seen:?}");
     }
-
-    #[test]
-    fn streams_of_neighbouring_names_and_seeds_differ() {
-        let base = StreamKey::new(1, "a", 0);
-        assert_ne!(base, StreamKey::new(2, "a", 0));
-        assert_ne!(base, StreamKey::new(1, "b", 0));
-        assert_ne!(base, StreamKey::new(1, "a", 1));
-    }
 }

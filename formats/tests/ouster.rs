@@ -24,6 +24,8 @@ const HEIGHT_M: f64 = 0.0362;
 
 /// Ten turns a second.
 const COLUMN_NS: u64 = 100_000_000 / COLUMNS as u64;
+/// Unix time, as with PTP, takes all 64 bits.
+const START_NS: u64 = 1_700_000_000_000_000_000;
 
 /// In the layout of older firmware.
 fn flat(profile: Profile) -> Value {
@@ -89,7 +91,8 @@ fn packet_of(
     let mut bytes = [&[1, 0], &frame.to_le_bytes()[..], &[7; 28]].concat();
     bytes.truncate(around);
     for column in start..start + 4 {
-        let time_ns = (u64::from(frame) * u64::from(COLUMNS) + u64::from(column)) * COLUMN_NS;
+        let nth = u64::from(frame) * u64::from(COLUMNS) + u64::from(column);
+        let time_ns = START_NS + nth * COLUMN_NS;
         bytes.extend(time_ns.to_le_bytes());
         bytes.extend(column.to_le_bytes());
         match is_legacy {
@@ -122,7 +125,7 @@ fn every_profile_is_read_to_the_bits_of_its_packets() {
         let expected = Header {
             frame_id: 513,
             measurement_id: 8,
-            time_ns: (513 * u64::from(COLUMNS) + 8) * COLUMN_NS,
+            time_ns: START_NS + (513 * u64::from(COLUMNS) + 8) * COLUMN_NS,
             columns_per_frame: COLUMNS,
             columns: 4,
             valid: 0b1111,
@@ -149,6 +152,27 @@ fn every_profile_is_read_to_the_bits_of_its_packets() {
             };
             assert_eq!(found, expected, "{profile}");
         }
+    }
+}
+
+/// By the manual's "XYZ Lookup Table": r counts from the origin of the lidar frame, so that n, the
+/// length of the shift of the beams, goes off it. Of two rows of one altitude, the later is lower.
+#[test]
+fn beams_begin_beside_and_above_the_origin_and_rows_are_listed_from_above() {
+    let mut metadata = flat(Profile::Single);
+    metadata["beam_to_lidar_transform"] = json!([1, 0, 0, 30, 0, 1, 0, 0, 0, 0, 1, 40, 0, 0, 0, 1]);
+    metadata["beam_altitude_angles"] = json!([30, 0, 0]);
+    metadata["beam_azimuth_angles"] = json!([0, 0, 0]);
+    let mut found = Vec::new();
+    let packet = packet_of(Profile::Single, 1, 0, |_, _| [(2050, 1), (0, 0)]);
+    Decoder::new(&parse(&metadata).unwrap()).decode(&packet, |it| found.push(*it)).unwrap();
+    let [high, middle, low] = found[..3] else { panic!("expected three rows") };
+    assert_eq!([high.ring, middle.ring, low.ring], [2, 1, 0]);
+    // 2.05 m less 0.05 m; half a turn about z, and up to the sensor's frame.
+    for (found, x, z) in [(high, 3f64.sqrt(), 1.0), (low, 2.0, 0.0)] {
+        let expected = [-x - 0.03, 0.0, z + 0.04 + HEIGHT_M];
+        let apart = [0, 1, 2].map(|axis| f64::from(found.point_m[axis]) - expected[axis]);
+        assert!(apart.iter().all(|x| x.abs() < 4.8e-7), "{apart:?}");
     }
 }
 
@@ -187,7 +211,7 @@ fn what_was_not_measured_gives_no_return() {
     let header = header.unwrap();
     assert_eq!((n, header.valid, header.measurement_id), (3 * 3 - 1, 0b1110, 4));
     // Times count from the first column that was measured.
-    assert_eq!((header.time_ns, first_us), ((32 + 5) * COLUMN_NS, 0.0));
+    assert_eq!((header.time_ns, first_us), (START_NS + (32 + 5) * COLUMN_NS, 0.0));
     (0..4).for_each(|i| bytes[32 + i * column + 10] = 0);
     let header = decoder.decode(&bytes, |_| panic!("a return of a column that is not valid"));
     assert_eq!(header.unwrap().valid, 0);

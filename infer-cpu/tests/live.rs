@@ -101,17 +101,25 @@ fn an_ouster_sees_the_same_street() {
     let things = street();
     let n_packets = 2 * OUSTER_PACKETS_PER_S;
     let sent: Vec<_> = (0..n_packets).map(|number| ouster_packet(&things, number)).collect();
-    let mut options = LiveOptions::default();
-    options.ouster = Some(Metadata::parse(&ouster_metadata(), Path::new("os.json")).unwrap());
-    let mut pipeline = pipeline(&options);
     let since_s = |i: usize| i as f64 / OUSTER_PACKETS_PER_S as f64;
-    let lost = |i: usize| i % 640 == 100;
-    let coming = sent.iter().enumerate().filter(|(i, _)| !lost(*i));
-    let objects = run(&mut pipeline, coming.map(|(i, packet)| (since_s(i), &packet[..])));
-    pipeline.take(&sent[0][..48], Arrival { time_s: START_S, moment: None });
-    let counts = pipeline.counts();
-    assert_eq!((counts.packets, counts.lost, counts.foreign), (n_packets as u64 - 2, 2, 1));
-    last_of_tracks(&objects, &things, 18);
+    let lost = |i: usize| i % 640 == 20;
+    // It sends all 64 packets of a turn, or the first half of them.
+    for (last_column, n_sent) in [(1023, 64), (511, 32)] {
+        let window = format!("\"column_window\": [0, {last_column}], \"pixels_per_column\"");
+        let metadata = ouster_metadata().replace("\"pixels_per_column\"", &window);
+        let mut options = LiveOptions::default();
+        options.ouster = Some(Metadata::parse(&metadata, Path::new("os.json")).unwrap());
+        let mut pipeline = pipeline(&options);
+        let coming = sent.iter().enumerate().filter(|(i, _)| !lost(*i) && i % 64 < n_sent);
+        let objects = run(&mut pipeline, coming.map(|(i, packet)| (since_s(i), &packet[..])));
+        pipeline.take(&sent[0][..48], Arrival { time_s: START_S, moment: None });
+        let counts = pipeline.counts();
+        let expected = ((n_packets * n_sent / 64) as u64 - 2, 2, 1);
+        assert_eq!((counts.packets, counts.lost, counts.foreign), expected, "{n_sent}");
+        if n_sent == 64 {
+            last_of_tracks(&objects, &things, 18);
+        }
+    }
 }
 
 /// A packet covers 4.8 degrees, so that its loss divides a near car. Losing 1 % of the packets

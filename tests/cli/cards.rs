@@ -14,7 +14,21 @@ fn a_dataset_of_either_form_has_a_card_and_metadata() {
     folder.succeeds(&format!("{WORDS} --out tars --layout webdataset --tar-clouds 4"));
     // Files that the manifest does not list are the user's.
     folder.write("files/train-000001.tar", "mine");
-    for (out, manifest) in [("files", "manifest.json"), ("tars", "dataset.json")] {
+    // 6 meshes for training and 3 for tests, with 2 views each; scans are clean or noisy.
+    for (out, manifest, told, held) in [
+        (
+            "files",
+            "manifest.json",
+            "36 scans of",
+            "rotational-clean-train.npz` | 12 clouds of 64 points |",
+        ),
+        (
+            "tars",
+            "dataset.json",
+            "18 point clouds of",
+            "| 2 tars `test-*.tar` | 6 clouds of 64 points |",
+        ),
+    ] {
         folder.succeeds(&format!("card {out} {PUBLICATION}"));
         let (card, metadata) = (
             folder.text(&format!("{out}/README.md")),
@@ -23,7 +37,16 @@ fn a_dataset_of_either_form_has_a_card_and_metadata() {
         assert!(card.starts_with("---\nlicense: \"cc-by-4.0\"\npretty_name: "), "{card}");
         assert!(card.contains("at 2 to 3 m and an elevation of 20 degrees"), "{card}");
         let metadata: serde_json::Value = serde_json::from_str(&metadata).unwrap();
+        assert!(card.contains(held) && card.contains(told), "{card}");
         assert_eq!(metadata["name"], out);
+        for set in metadata["recordSet"].as_array().unwrap() {
+            for field in set["field"].as_array().unwrap() {
+                // Croissant 1.1: a field's identifier begins with that of its set.
+                let [set, id, name] = [&set["@id"], &field["@id"], &field["name"]]
+                    .map(|value| value.as_str().unwrap());
+                assert_eq!((id, &field["@type"]), (&*format!("{set}/{name}"), &"cr:Field".into()));
+            }
+        }
         assert_eq!(metadata["license"], "https://spdx.org/licenses/CC-BY-4.0.html");
         assert_eq!(metadata["distribution"][0]["contentUrl"], manifest);
         folder.succeeds(&format!("gen-dataset --verify {out}"));

@@ -40,6 +40,11 @@ fn a_dataset_has_packets_beside_its_points_and_is_verified() {
     let whole = folder.bytes(&capture);
     folder.write(&capture, &whole[..whole.len() - 1]);
     folder.refuses(1, &[("gen-dataset --verify out", "noisy/donut/test/donut_0003_v1.pcap")]);
+    // Without hashes, more returns than points tell that it is another capture: its frames twice.
+    folder.succeeds(&format!("{DATASET} --out bare --hash none"));
+    folder.write(&capture.replace("out/", "bare/"), [&whole[..], &whole[24..]].concat());
+    let problem = format!("donut_0003_v1.pcap: holds {} returns of {points} points", 2 * points);
+    folder.refuses(1, &[("gen-dataset --verify bare", &problem)]);
 }
 
 #[test]

@@ -24,6 +24,17 @@ fn the_manifest_says_what_was_simplified_and_how_far() {
     // rpm, at the nearest point, 2 m away, is 1.7 mm: Sensor's own test has it exactly.
     let bound_m = mesh["simplified"]["bound_m"].as_f64().unwrap();
     assert!((0.001..0.003).contains(&bound_m), "{bound_m}");
+    // One that stands 64 m away is seen from 1 to 3 m as well.
+    let text = folder.text("meshes/ring/test/ring_0001.off");
+    let moved = text.lines().map(|line| match line.split(' ').collect::<Vec<_>>()[..] {
+        [x, y, z] if z != "0" => format!("{} {y} {z}\n", x.parse::<f64>().unwrap() + 64.0),
+        _ => format!("{line}\n"),
+    });
+    folder.write("moved/ring/test/ring_0001.off", moved.collect::<String>());
+    folder.succeeds("gen-dataset moved --simplify auto --normalize none --out there");
+    let there: Value = serde_json::from_str(&folder.text("there/manifest.json")).unwrap();
+    let bound_m = there["meshes"][0]["simplified"]["bound_m"].as_f64().unwrap();
+    assert!((0.0008..0.003).contains(&bound_m), "{bound_m}");
     let told = format!("simplified: {after} triangles cast at for {before} in the files");
     assert!(said.contains(&told), "{said}");
     folder.succeeds("gen-dataset --verify out");

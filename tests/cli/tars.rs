@@ -1,6 +1,7 @@
 //! Tars of samples are the same for any number of tasks, and are handed over once.
 
 use crate::{Folder, meshes, run_for, terminate};
+use std::collections::BTreeMap;
 use std::fs;
 use std::process::Stdio;
 use std::time::Duration;
@@ -130,6 +131,42 @@ fn a_tar_is_handed_over_once_and_a_failing_command_is_tried_again() {
     // All tars were handed over: the command does not run again.
     assert_eq!(run("touch again; false").status.code(), Some(0));
     assert!(!folder.at("again").exists());
+}
+
+/// The files of a tar: 512 bytes with the name and, from byte 124, the size in octal digits; then the
+/// bytes, padded to 512 (POSIX.1-1988, "ustar").
+fn files_of(tar: &[u8]) -> BTreeMap<String, Vec<u8>> {
+    let (mut rest, mut files) = (tar, BTreeMap::new());
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).trim_matches(['\0', ' ']).to_owned();
+    while rest.first().is_some_and(|byte| *byte != 0) {
+        let size = usize::from_str_radix(&text(&rest[124..136]), 8).unwrap();
+        files.insert(text(&rest[..100]), rest[512..][..size].to_vec());
+        rest = &rest[512 + size.next_multiple_of(512)..];
+    }
+    files
+}
+
+#[test]
+fn a_scan_of_a_tar_is_that_of_its_class_mesh_and_view() {
+    let folder = Folder::with_meshes();
+    let words = WORDS.replace("--layout webdataset ", "").replace("--tar-clouds 4", "");
+    folder.succeeds(&format!("{words} --out files"));
+    folder.succeeds(&format!("{WORDS} --out tars --sample scan"));
+    // All meshes are in it once before one is again.
+    let both =
+        [0, 3].map(|number| files_of(&folder.bytes(&format!("tars/train-00000{number}.tar"))));
+    let files: BTreeMap<_, _> = both.into_iter().flatten().collect();
+    assert_eq!(files.len(), 2 * 4 * 3, "{:?}", files.keys());
+    for (name, json) in files.iter().filter(|(name, _)| name.ends_with(".json")) {
+        let told: serde_json::Value = serde_json::from_slice(json).unwrap();
+        let mesh = told["mesh"].as_str().unwrap().strip_suffix(".off").unwrap();
+        let scan = folder.scan(&format!("files/rotational/noisy/{mesh}_v{}.npz", told["view"]));
+        folder.write("one.npz", &files[&name.replace("json", "npz")]);
+        assert_eq!(folder.scan("one.npz"), scan, "{told}");
+        assert_eq!(told["points"], scan.len());
+        let label = ["ball", "donut", "ring"].iter().position(|class| told["class"] == **class);
+        assert_eq!(files[&name.replace("json", "cls")], label.unwrap().to_string().into_bytes());
+    }
 }
 
 #[test]

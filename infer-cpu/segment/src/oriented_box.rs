@@ -212,6 +212,12 @@ mod tests {
     }
 
     #[test]
+    fn a_box_holds_points_that_are_not_searched() {
+        let line: Vec<[f32; 3]> = (0..602).map(|i| [0.01 * i as f32, 0.0, 0.0]).collect();
+        assert!((OrientedBox::around(&line).size_m[0] - 6.01).abs() < 1e-4);
+    }
+
+    #[test]
     fn nothing_and_single_points_have_boxes() {
         let nothing = OrientedBox { centre_m: [0.0; 3], size_m: [0.0; 3], yaw_rad: 0.0 };
         assert_eq!(OrientedBox::around(&[]), nothing);

@@ -294,14 +294,25 @@ mod tests {
         assert_eq!(tracker.observe(&at(5.0)).id, 2);
     }
 
+    /// After 0.1 s the variance of the innovation is twice that of the middle, s = 0.1 m + 0.05 of the
+    /// length, plus (0.1 s v)^2 + (0.01 s^2 a / 2)^2; chi-squared with three degrees of freedom exceeds
+    /// 11.345 once in a hundred. v and a are 8 m/s and 3 m/s^2 aside, and 0.5 of both upwards.
     #[test]
-    fn what_is_cut_in_two_is_two_tracks_and_so_is_what_is_far_off() {
-        let mut tracker = Tracker::new(2);
-        tracker.observe(&seen(0.0, 5.0, 0.0));
-        assert_eq!(tracker.observe(&seen(0.1, 5.1, 0.0)).id, 1);
-        assert_eq!(tracker.observe(&seen(0.101, 5.4, 0.0)).id, 2);
-        assert_eq!(tracker.observe(&seen(0.2, 9.0, 0.0)).id, 3);
-        assert_eq!(tracker.observe(&seen(0.2, 9.0, 0.0)).velocity_m_s(), None);
+    fn one_in_a_hundred_of_the_clusters_of_an_object_is_beyond_its_gate() {
+        for (size_m, axis, v, a) in
+            [([1.0, 1.0], 0, 8.0, 3.0f64), ([4.2, 1.8], 1, 8.0, 3.0), ([1.0, 1.0], 2, 0.5, 0.5)]
+        {
+            let s: f64 = 0.1 + 0.05 * size_m[0];
+            let variance = 2.0 * s.powi(2) + f64::powi(0.1 * v, 2) + (0.005 * a).powi(2);
+            for (share, id) in [(0.995, 1), (1.005, 2)] {
+                let mut tracker = Tracker::new(2);
+                let mut next = Observation { size_m, ..seen(0.0, 20.0, 0.0) };
+                assert_eq!(tracker.observe(&next).velocity_m_s(), None);
+                next.time_s = 0.1;
+                next.position_m[axis] += share * (11.345 * variance).sqrt();
+                assert_eq!(tracker.observe(&next).id, id, "{axis} {share}");
+            }
+        }
     }
 
     #[test]

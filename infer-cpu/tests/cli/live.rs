@@ -91,8 +91,11 @@ fn in_real_time_a_capture_takes_its_time_and_answers_have_latencies() {
     let ran = run("drive.pcap");
     let latencies: Vec<_> = ran.json().iter().map(|o| o["latency_ms"].as_f64().unwrap()).collect();
     assert!(!latencies.is_empty() && latencies.iter().all(|ms| *ms > 0.0));
-    let first = "latency of the first turn";
-    for word in ["decode", "segment", "classify", "track", "latency, ms", first, "0 lost"] {
+    let first = ran.json().into_iter().filter(|object| object["turn"] == 0);
+    let first = first.map(|object| object["latency_ms"].as_f64().unwrap()).fold(0.0, f64::max);
+    let first =
+        format!("of the first turn, whose objects wait for its end, left out above: {first:.3} ms");
+    for word in ["decode", "segment", "classify", "track", "latency, ms", &first, "0 lost"] {
         assert!(ran.err.contains(word), "{}", ran.err);
     }
 }

@@ -13,6 +13,7 @@ use infer_cpu::{Classifier, Options, Prediction};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 const TURN_S: f64 = 0.1;
 
@@ -314,6 +315,30 @@ fn an_object_that_was_hidden_for_a_while_keeps_its_track_although_another_one_ap
     assert_ne!(tracks(&car), tracks(&person));
 }
 
+/// Packets that seem to have come ten seconds ago, each at its time.
+#[test]
+fn a_latency_counts_from_the_packet_with_the_last_point() {
+    let sent = packets(&street(), 5_000, PACKETS_PER_S / 2);
+    let start = Instant::now().checked_sub(Duration::from_secs(10)).unwrap();
+    let mut pipeline = super::pipeline(&LiveOptions::default());
+    let mut n_objects = 0;
+    for (since_s, packet) in on_time(&sent) {
+        let moment = Some(start + Duration::from_secs_f64(since_s));
+        let before_s = start.elapsed().as_secs_f64();
+        pipeline.take(packet, Arrival { time_s: START_S + since_s, moment });
+        pipeline.answer(|object| {
+            let after_s = start.elapsed().as_secs_f64();
+            // Its points were measured within a packet, after the moment of which it arrived.
+            let at_s = object.last_s - START_S;
+            let answered_s = at_s + object.latency_ms.unwrap() * 1e-3;
+            let span_s = before_s..after_s + PACKET_S + 1e-5;
+            assert!(span_s.contains(&answered_s), "{answered_s} {span_s:?}");
+            n_objects += 1;
+        });
+    }
+    assert!(n_objects > 10, "{n_objects}");
+}
+
 /// By the manual (VLP-16, 63-9243, 9.3.2): in dual return mode the last return of a firing is in the
 /// first block of a pair, and the strongest in the second.
 #[test]
@@ -326,7 +351,11 @@ fn the_last_and_the_strongest_return_of_a_pair_of_blocks_are_not_swapped() {
         at[2..4].copy_from_slice(&azimuth.to_le_bytes());
         for i in 0..32 {
             // 10 m, of reflectivity 5, behind 4 m, of 90. Unit: 2 mm.
-            let (units, reflectivity) = if block % 2 == 0 { (5_000u16, 5) } else { (2_000, 90) };
+            let (units, reflectivity) = match (i, block % 2) {
+                (31, _) => (3_000u16, 7),
+                (_, 0) => (5_000, 5),
+                _ => (2_000, 90),
+            };
             at[4 + 3 * i..6 + 3 * i].copy_from_slice(&units.to_le_bytes());
             at[6 + 3 * i] = reflectivity;
         }
@@ -340,7 +369,7 @@ fn the_last_and_the_strongest_return_of_a_pair_of_blocks_are_not_swapped() {
             *seen.entry(text).or_default() += 1;
         })
         .unwrap();
-    let expected = [("Last 10 m, 5", 192), ("Strongest 4 m, 90", 192)];
+    let expected = [("Both 6 m, 7", 6), ("Last 10 m, 5", 186), ("Strongest 4 m, 90", 186)];
     assert_eq!(seen, expected.map(|(text, n)| (text.to_owned(), n)).into());
 }
 
@@ -404,6 +433,9 @@ fn a_recording_has_the_points_the_pose_and_the_objects_of_each_turn() {
             let ring = found.ring.to_le_bytes();
             assert_eq!(bytes, [&numbers.concat()[..], &ring, &since_s.to_le_bytes()].concat());
         }
+        // After four bytes of CDR and the number of transforms: whole seconds, and nanoseconds.
+        let [s, ns] = [8, 12].map(|at| u32::from_le_bytes(tf[at..at + 4].try_into().unwrap()));
+        assert_time(u64::from(s) * 1_000_000_000 + u64::from(ns), last_s);
         let [x, y, z, rotation @ ..] = numbers::<7>(&tf[tf.len() - 56..]);
         let expected = driven(last_s - START_S);
         assert!(DVec3::new(x, y, z).distance(expected.position_m) < 1e-4);

@@ -108,3 +108,18 @@ impl AddAssign for Tally {
         self.scattered += other.scattered;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_count_is_summed() {
+        let tally = |[points, out_of_range, dropped, undetected, negative, scattered]: [u64; 6]| {
+            Tally { points, out_of_range, dropped, undetected, negative, scattered }
+        };
+        let mut sum = tally([1, 2, 3, 4, 5, 6]);
+        sum += tally([10, 20, 30, 40, 50, 60]);
+        assert_eq!(sum, tally([11, 22, 33, 44, 55, 66]));
+    }
+}

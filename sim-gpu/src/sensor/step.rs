@@ -114,6 +114,9 @@ mod tests {
     fn a_grid_steps_by_its_pitch() {
         let ultrapuck = SensorProfile::builtin("blainder-ultrapuck").unwrap();
         assert!((step_deg(&ultrapuck) - 360.0 / 1799.0).abs() < 1e-9);
+        // Every second column is left out: now the rows are closer.
+        let halved = ultrapuck.decimated(NonZeroU32::new(2).unwrap());
+        assert!((step_deg(&halved) - 40.0 / 121.0).abs() < 1e-9);
         let camera = SensorProfile::builtin("generic-static").unwrap();
         // 100 pixels over 60 degrees, uniform in the tangent: least at the edge.
         let edge = 30f64.to_radians().tan();

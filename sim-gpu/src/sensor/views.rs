@@ -113,4 +113,25 @@ mod tests {
             assert_ne!(pose("chair"), pose("table"));
         }
     }
+
+    #[test]
+    fn azimuth_distance_and_elevation_are_drawn_by_themselves() {
+        let (distance_to_m, elevation_to_deg) = (Some(4.0), Some(30.0));
+        let drawn = Views { distance_to_m, elevation_to_deg, count: 1000, ..Views::ROTATING };
+        let views = Views { azimuth_jitter_deg: 0.1, ..drawn };
+        let poses = views.poses(DVec3::ZERO, StreamKey::new(0, "chair", 0));
+        let drawn = (0..).zip(&poses).map(|(view, pose)| {
+            let ([x, y, z], d) = (pose.position_m.to_array(), pose.position_m.length());
+            let off_deg = y.atan2(x).to_degrees() - 0.36 * f64::from(view);
+            // Each in -1 to 1.
+            let jitter = ((off_deg + 180.0).rem_euclid(360.0) - 180.0) / 0.1;
+            [jitter, (d - 3.5) / 0.5, ((z / d).asin().to_degrees() - 25.0) / 5.0]
+        });
+        let drawn: Vec<[f64; 3]> = drawn.collect();
+        assert!(drawn.iter().flatten().all(|x| x.abs() < 1.0 + 1e-9));
+        for (a, b) in [(0, 1), (0, 2), (1, 2)] {
+            let pairs: Vec<[f64; 2]> = drawn.iter().map(|drawn| [drawn[a], drawn[b]]).collect();
+            test_support::assert_uncorrelated(&format!("{a} and {b}"), &pairs);
+        }
+    }
 }

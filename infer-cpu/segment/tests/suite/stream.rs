@@ -244,6 +244,10 @@ fn unusual_returns_are_passed_over() {
         stream.push(position, 0, ());
     }
     stream.push([5.0, -5.0, 0.0], 99, ());
+    assert_eq!(stream.dropped().late, 1);
+    // The beams begin behind the sensor, and passed this point just before.
+    stream.push([-5.0, -0.5, 0.0], 0, ());
+    assert_eq!(stream.dropped().late, 2);
     stream.end(|_| unreachable!("there was no point"));
     assert_eq!(Dropped { late: 2, overflow: 3 }.total(), 5);
 }
