@@ -75,16 +75,21 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let cause = "--format: this build does not include las".to_owned();
     ensure!(args.format != SweepFormat::Las || cfg!(feature = "las"), Usage(cause));
     let mut recipe = read_recipe(&args.recipe)?;
-    let mut outputs = ["packed", "sweeps"].map(|folder| args.out.join(folder)).to_vec();
+    let preview = args.out.join("preview.png");
+    // The sweeps of an earlier run in another layout would stand beside those of this one.
+    let folders = ["packed", "sweeps"].into_iter().chain(Layout::ALL.iter().map(|of| of.name()));
+    let outputs: Vec<PathBuf> = folders.map(|folder| args.out.join(folder)).collect();
+    let outputs = || outputs.iter().map(PathBuf::as_path);
+    args.overwrite.check_cleared(outputs(), is_written)?;
+    args.overwrite.check([preview.as_path()])?;
     let set = args.layout.map(|layout| args.out.join(layout.name()));
-    outputs.extend(set.clone());
-    args.overwrite.clear(outputs.iter().map(PathBuf::as_path), is_written)?;
     recipe.use_sensors(&args.sensor);
     let meshes = args.meshes.as_deref();
     let caster = args.caster.caster()?;
     let stage = Stage::with_caster(recipe, &args.recipe, meshes, args.seed, &caster)?;
     let stage = stage.with_culling(args.caster.culling());
     stage.warnings().iter().for_each(|warning| formats::say!("warning: {warning}"));
+    args.overwrite.clear(outputs(), is_written)?;
     let started = Instant::now();
     let style = ProgressStyle::with_template("{bar:40} {pos}/{len} scenes, {per_sec}, {eta} left")?;
     let bar = ProgressBar::new(args.sweeps.into()).with_style(style);
@@ -102,13 +107,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
         if done.scene.number == 0 {
             let LabelledScene { sweep, labels, .. } = done;
             let tints: Vec<_> = labels.iter().map(|&label| segment::tint(label)).collect();
-            preview::draw_from_above(
-                &sweep.scan,
-                &tints,
-                &[],
-                "scene 0",
-                &args.out.join("preview.png"),
-            )?;
+            preview::draw_from_above(&sweep.scan, &tints, &[], "scene 0", &preview)?;
         }
         if let Some(set) = &mut set {
             set.add(&stage, done)?;
@@ -140,11 +139,11 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     if counts.test.iter().all(|n| *n == 0) {
         formats::say!("warning: no cluster is in the test part, which has every tenth of --sweeps");
     }
-    formats::say!(
-        "Clusters: {}. Picture: {}.",
-        packed.display(),
-        args.out.join("preview.png").display()
-    );
+    formats::say!("Clusters: {}. Picture: {}.", packed.display(), preview.display());
+    if n_points == 0 {
+        formats::say!("warning: no beam returned a point");
+        return Ok(Outcome::SomeRefused);
+    }
     Ok(Outcome::Success)
 }
 

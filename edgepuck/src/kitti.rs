@@ -76,9 +76,15 @@ type Flaw = (&'static str, String);
 /// The matrix of three rows in the line `key`.
 fn matrix(text: &str, key: &'static str, columns: usize) -> Result<DMat4, Flaw> {
     let line = text.lines().find_map(|line| line.trim_start().strip_prefix(key)?.strip_prefix(':'));
-    let words = line.unwrap_or_default().split_whitespace();
-    let numbers: Vec<f64> = words.map_while(|word| word.parse().ok()).collect();
-    if numbers.len() != 3 * columns || numbers.iter().any(|x| !x.is_finite()) {
+    let Some(line) = line else {
+        let cause = "expected this line of the calibration of KITTI's object benchmark \
+                     (training/calib), found none; odometry and raw data have other files";
+        return Err((key, cause.to_owned()));
+    };
+    let words = line.split_whitespace();
+    let is_finite = |x: &f64| x.is_finite();
+    let numbers: Vec<f64> = words.map_while(|word| word.parse().ok().filter(is_finite)).collect();
+    if numbers.len() != 3 * columns {
         let (expected, found) = (3 * columns, numbers.len());
         return Err((key, format!("expected a line of {expected} finite numbers, found {found}")));
     }

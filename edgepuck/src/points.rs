@@ -1,7 +1,6 @@
 //! The reader of points of all commands: scans, clouds and captures.
 
 use std::borrow::Cow;
-use std::net::IpAddr;
 use std::path::{Path, PathBuf};
 
 use edgepuck_segment::doubtful_axes;
@@ -9,7 +8,7 @@ use formats::cloud_file::{
     Cloud, CloudFormat, check_sweep, coarse_coordinates, must_be_scan, read_cloud_as,
 };
 use formats::scan_file::read_scan;
-use formats::{FormatError, Scan, Senders, ouster, pcap, velodyne};
+use formats::{ChosenSender, FormatError, Scan, Senders, ouster, pcap, velodyne};
 
 /// How a file of points is read.
 #[derive(Clone, clap::Args)]
@@ -23,9 +22,10 @@ pub struct PointsArgs {
     #[arg(long, value_name = "FILE")]
     pub metadata: Option<PathBuf>,
 
-    /// Address of the sensor whose packets are used [default: the first sensor of the capture]
+    /// Address of the sensor whose packets are used, of several at one address ADDRESS:PORT with its
+    /// source or destination port [default: the first sensor of the capture]
     #[arg(long, value_name = "ADDRESS")]
-    pub from: Option<IpAddr>,
+    pub from: Option<ChosenSender>,
 }
 
 /// How a sweep is read.

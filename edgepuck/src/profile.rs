@@ -115,7 +115,21 @@ fn slips(sensor: &SensorProfile, n_rays: usize) -> impl Iterator<Item = String> 
     found.push(odd(sigma_m > 0.5, "noise.typical_sigma_m", sigma_m, "metres"));
     let widest_deg = sensor.footprint.map_or(0.0, |shape| shape.divergence_deg[0]);
     found.push(odd(widest_deg > 2.0, "footprint.divergence_deg", widest_deg, "degrees"));
+    let views_m = sensor.views.as_ref().map_or(0.0, |views| views.distance_m);
+    if views_m > range.max_m {
+        let most_m = range.max_m;
+        found.push(Some(format!("views.distance_m = {views_m}: range.max_m is {most_m} m")));
+    }
+    if let Layout::Uniform(raster) = &sensor.layout
+        && (raster.azimuth_to_deg - raster.azimuth_from_deg).abs() >= 360.0
+        && raster.azimuth_steps > 1
+    {
+        let cause = "uniform: the first and the last azimuth are the same direction";
+        found.push(Some(cause.to_owned()));
+    }
     if let Layout::Rotating(head) = &sensor.layout {
+        let quantum_deg = head.azimuth_quantum_deg.unwrap_or_default();
+        found.push(odd(quantum_deg > 5.0, "rotating.azimuth_quantum_deg", quantum_deg, "degrees"));
         let is_odd = !(60.0..=6_000.0).contains(&head.rpm);
         found.push(odd(is_odd, "rotating.rpm", head.rpm, "revolutions a minute"));
         let firings = 60e6 / head.rpm / head.sequence_us;

@@ -189,10 +189,14 @@ fn scene(args: &Args) -> anyhow::Result<(Scene, String)> {
         let cause = "expected a file, found a folder: `edgepuck gen-dataset` scans its meshes";
         return Err(Usage(format!("{what}: {cause}")).into());
     }
-    if let Some(extension) = file.extension().filter(|of| !of.eq_ignore_ascii_case("toml")) {
-        let found = extension.display();
+    let extension = file.extension().unwrap_or_default();
+    if !extension.eq_ignore_ascii_case("toml") {
+        let found = match extension.is_empty() {
+            true => "no extension".to_owned(),
+            false => format!("the extension .{}", extension.display()),
+        };
         let cause = "expected a mesh (.obj, .off, .ply, .stl) or a scene (.toml)";
-        return Err(Usage(format!("{what}: {cause}, found the extension .{found}")).into());
+        return Err(Usage(format!("{what}: {cause}, found {found}")).into());
     }
     if let Some(flag) = args.meshes.given().or(args.effects.given()) {
         let cause =

@@ -1,56 +1,105 @@
 //! Reads captures of a sensor's packets and collects their returns in a scan.
 
 use std::fmt::{self, Display};
-use std::net::IpAddr;
+use std::net::{AddrParseError, IpAddr, SocketAddr};
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::str::FromStr;
 
 use crate::error::FormatError;
 use crate::pcap::{self, Counts};
 use crate::returns::Return;
 use crate::scan::Scan;
 
-/// The sensor whose packets are used, where several send to one port: the one at the address that
-/// a user chose, else the first that sends data.
+/// What tells the sensors apart that send to one program: the address, and in captures the ports, since
+/// sensors behind a relay have one address.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sender {
+    /// The address.
+    pub ip: IpAddr,
+    /// The source and the destination port; 0 where they do not matter.
+    pub ports: [u16; 2],
+}
+
+/// The address that a user chose, perhaps with one of the ports: `ADDRESS` or `ADDRESS:PORT`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ChosenSender {
+    ip: IpAddr,
+    port: Option<u16>,
+}
+
+impl FromStr for ChosenSender {
+    type Err = AddrParseError;
+
+    fn from_str(text: &str) -> Result<Self, AddrParseError> {
+        let with_port =
+            text.parse().map(|at: SocketAddr| Self { ip: at.ip(), port: Some(at.port()) });
+        with_port.or_else(|_| Ok(Self { ip: text.parse()?, port: None }))
+    }
+}
+
+impl Display for ChosenSender {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.port {
+            Some(port) => SocketAddr::new(self.ip, port).fmt(f),
+            None => self.ip.fmt(f),
+        }
+    }
+}
+
+impl ChosenSender {
+    fn is(self, sender: Sender) -> bool {
+        let is_port = |port| sender.ports == [0; 2] || sender.ports.contains(&port);
+        self.ip == sender.ip && self.port.is_none_or(is_port)
+    }
+}
+
+/// The sensor whose packets are used, where several send to one port: the first that sends data, of
+/// those that a user chose.
 #[derive(Clone, Debug, Default)]
 pub struct Senders {
-    used: Option<IpAddr>,
-    is_chosen: bool,
-    /// The first other addresses, with the number of their packets of data.
-    others: Vec<(IpAddr, u64)>,
+    used: Option<Sender>,
+    chosen: Option<ChosenSender>,
+    /// The first others, with the number of their packets of data.
+    others: Vec<(Sender, u64)>,
     n_dropped: u64,
 }
 
-/// The most other addresses that are named: a network may have any number.
+/// The most others that are named: a network may have any number.
 const MOST_NAMED: usize = 8;
 
 impl Senders {
-    /// The sensor at the address `from`, or the first one.
+    /// The first sensor of those `from` an address, or of all.
     #[must_use]
-    pub fn new(from: Option<IpAddr>) -> Self {
-        Self { used: from, is_chosen: from.is_some(), ..Self::default() }
+    pub fn new(from: Option<ChosenSender>) -> Self {
+        Self { chosen: from, ..Self::default() }
     }
 
-    /// Whether a packet from `source` is used; `is_data` says whether it is a sensor's data. Until
-    /// the first packet of data, all are.
-    pub fn takes(&mut self, source: IpAddr, is_data: impl Fn() -> bool) -> bool {
+    /// Whether a packet of `sender` is used; `is_data` says whether it is a sensor's data. Until
+    /// the first packet of data, all are; a sensor sends its other packets to another port.
+    pub fn takes(&mut self, sender: Sender, is_data: impl Fn() -> bool) -> bool {
+        let is_chosen = self.is_chosen(sender);
         match self.used {
-            Some(used) if used == source => return true,
-            None if !is_data() => return true,
-            None => {
-                self.used = Some(source);
+            Some(used) if used == sender => return true,
+            Some(used) if used.ip == sender.ip && !is_data() => return true,
+            None if is_chosen => {
+                self.used = is_data().then_some(sender);
                 return true;
             }
-            Some(_) => {}
+            _ => {}
         }
         self.n_dropped += 1;
-        let is_known = self.others.iter().any(|(other, _)| *other == source);
+        let is_known = self.others.iter().any(|(other, _)| *other == sender);
         if !is_known && self.others.len() < MOST_NAMED {
-            self.others.push((source, 0));
+            self.others.push((sender, 0));
         }
-        let known = self.others.iter_mut().find(|(other, _)| *other == source);
+        let known = self.others.iter_mut().find(|(other, _)| *other == sender);
         known.into_iter().for_each(|(_, data)| *data += u64::from(is_data()));
         false
+    }
+
+    fn is_chosen(&self, sender: Sender) -> bool {
+        self.chosen.is_none_or(|chosen| chosen.is(sender))
     }
 
     /// The number of packets that were not used.
@@ -62,28 +111,42 @@ impl Senders {
     /// The other sensors, if a user has to choose one.
     #[must_use]
     pub fn warning(&self) -> Option<String> {
-        let used = self.used.filter(|_| !self.is_chosen)?;
-        let sensors = self.others.iter().filter(|(_, data)| *data > 0);
-        let others: Vec<_> =
-            sensors.map(|(other, data)| format!("{other} ({data} so far)")).collect();
-        (!others.is_empty()).then(|| {
-            format!(
-                "expected packets of one sensor, found those of {used}, which are used, and of {}, \
-                 which are not; --from ADDRESS chooses another",
-                others.join(", ")
-            )
-        })
+        let used = self.used?;
+        let is_sensor = |(other, data): &&(Sender, u64)| *data > 0 && self.is_chosen(*other);
+        let others: Vec<_> = self.others.iter().filter(is_sensor).collect();
+        if others.is_empty() {
+            return None;
+        }
+        // The ports are named where the addresses are the same: the one that differs.
+        let twin = others.iter().find(|(other, _)| other.ip == used.ip);
+        let port = twin.map(|(other, _)| usize::from(other.ports[1] != used.ports[1]));
+        let named = |sender: &Sender| match port {
+            None => sender.ip.to_string(),
+            Some(which) => SocketAddr::new(sender.ip, sender.ports[which]).to_string(),
+        };
+        let of_others: Vec<_> = others
+            .iter()
+            .map(|(other, data)| format!("{} ({data} so far)", named(other)))
+            .collect();
+        let from = if port.is_some() { "ADDRESS:PORT" } else { "ADDRESS" };
+        Some(format!(
+            "expected packets of one sensor, found those of {}, which are used, and of {}, \
+             which are not; --from {from} chooses another",
+            named(&used),
+            of_others.join(", ")
+        ))
     }
 }
 
-/// What the packets of other addresses explain, where those of the chosen one are missing.
+/// What the packets of others explain, where those of the chosen one are missing.
 impl Display for Senders {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (n, Some(used)) = (self.n_dropped, self.used) else { return Ok(()) };
+        let used = self.used.map(|used| used.ip).or(self.chosen.map(|chosen| chosen.ip));
+        let (n, Some(used)) = (self.n_dropped, used) else { return Ok(()) };
         if n == 0 {
             return Ok(());
         }
-        let others: Vec<_> = self.others.iter().map(|(other, _)| other.to_string()).collect();
+        let others: Vec<_> = self.others.iter().map(|(other, _)| other.ip.to_string()).collect();
         write!(f, ", {n} of them from other addresses than {used}: {}", others.join(", "))
     }
 }
@@ -98,7 +161,7 @@ pub(crate) fn each_packet<E: Display>(
 ) -> Result<Counts, FormatError> {
     let mut flaw = None;
     let counts = pcap::read(path, |packet| {
-        if !senders.takes(packet.source, || is_data(&packet.payload)) {
+        if !senders.takes(packet.sender(), || is_data(&packet.payload)) {
             return ControlFlow::Continue(());
         }
         take(&packet.payload).unwrap_or_else(|cause| {

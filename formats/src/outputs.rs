@@ -1,6 +1,7 @@
 //! The one rule for outputs that exist already, and for the names of outputs.
 
 use crate::outcome::Usage;
+use anyhow::Context;
 use std::path::{Path, PathBuf};
 
 /// The flag of commands that write files.
@@ -43,27 +44,40 @@ impl Overwrite {
         check_place(path)
     }
 
-    /// As [`Overwrite::check_folder`]; removes the folders that are there, if all files in them are
-    /// those of an earlier run, `is_ours`.
+    /// As [`Overwrite::check_folder`], of folders that [`Overwrite::clear`] removes, if all files in
+    /// them are those of an earlier run, `is_ours`.
     ///
     /// # Errors
-    /// As [`Overwrite::check_folder`], a folder has another file, or it cannot be removed.
-    pub fn clear<'a>(
+    /// As [`Overwrite::check_folder`], or a folder has another file.
+    pub fn check_cleared<'a>(
         &self,
-        folders: impl IntoIterator<Item = &'a Path>,
+        folders: impl IntoIterator<Item = &'a Path, IntoIter: Clone>,
         is_ours: impl Fn(&Path) -> bool,
     ) -> anyhow::Result<()> {
-        let folders: Vec<&Path> = folders.into_iter().collect();
-        for folder in &folders {
+        let mut folders = folders.into_iter();
+        for folder in folders.clone() {
             if let Some(other) = other_file(folder, &is_ours)? {
                 let cause = "expected only files that this command wrote in a folder to replace: \
                              move this one, or choose another --out";
                 return Err(refused(&other, cause).into());
             }
         }
-        folders.iter().try_for_each(|folder| self.check_folder(folder))?;
-        for folder in folders.into_iter().filter(|folder| folder.exists()) {
-            std::fs::remove_dir_all(folder)?;
+        Ok(folders.try_for_each(|folder| self.check_folder(folder))?)
+    }
+
+    /// As [`Overwrite::check_cleared`]; removes the folders that are there.
+    ///
+    /// # Errors
+    /// As [`Overwrite::check_cleared`], or a folder cannot be removed.
+    pub fn clear<'a>(
+        &self,
+        folders: impl IntoIterator<Item = &'a Path, IntoIter: Clone>,
+        is_ours: impl Fn(&Path) -> bool,
+    ) -> anyhow::Result<()> {
+        let folders = folders.into_iter();
+        self.check_cleared(folders.clone(), is_ours)?;
+        for folder in folders.filter(|folder| folder.exists()) {
+            std::fs::remove_dir_all(folder).with_context(|| folder.display().to_string())?;
         }
         Ok(())
     }

@@ -22,6 +22,7 @@ use etherparse::{
 use pcap_parser::traits::PcapNGPacketBlock;
 use pcap_parser::{Block, Linktype, PIB_MAGIC, PcapBlockOwned, PcapError, create_reader};
 
+use crate::capture::Sender;
 use crate::error::FormatError;
 use crate::foreign::or_foreign_file;
 
@@ -35,7 +36,7 @@ const ETHERNET: u32 = 1;
 /// Routers that a broadcast may pass: the default of operating systems.
 const TIME_TO_LIVE: u8 = 64;
 
-pub(crate) struct Sender {
+pub(crate) struct Origin {
     pub mac: [u8; 6],
     pub ip: [u8; 4],
     /// The source and destination port.
@@ -57,7 +58,7 @@ pub(crate) fn write_header(writer: &mut impl Write) -> io::Result<()> {
 /// Writes a UDP broadcast packet that was sent at this Unix time.
 pub(crate) fn write_packet(
     writer: &mut impl Write,
-    sender: &Sender,
+    sender: &Origin,
     [seconds, microseconds]: [u32; 2],
     payload: &[u8],
 ) -> io::Result<()> {
@@ -84,10 +85,20 @@ pub struct UdpPacket<'a> {
     pub time_s: Option<f64>,
     /// The sender.
     pub source: IpAddr,
+    /// The source port.
+    pub source_port: u16,
     /// The destination port.
     pub port: u16,
     /// The payload.
     pub payload: Cow<'a, [u8]>,
+}
+
+impl UdpPacket<'_> {
+    /// Who sent it.
+    #[must_use]
+    pub fn sender(&self) -> Sender {
+        Sender { ip: self.source, ports: [self.source_port, self.port] }
+    }
 }
 
 /// What a capture has.
@@ -326,6 +337,7 @@ impl<'a> Frame<'a> {
         let packet_with = |udp: &UdpSlice<'_>, payload| UdpPacket {
             time_s: self.time_s,
             source,
+            source_port: udp.source_port(),
             port: udp.destination_port(),
             payload,
         };

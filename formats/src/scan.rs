@@ -142,12 +142,23 @@ pub(crate) fn whole<T: TryFrom<u32>>(x: f64) -> Result<T, String> {
 }
 
 /// What [`pose_of`] takes.
-pub(crate) const POSE: &str = "expected the 16 numbers of a matrix whose last row is 0, 0, 0, 1";
+pub(crate) const POSE: &str =
+    "expected the 16 numbers of a rotation and a translation, with 0, 0, 0, 1 as the last row";
 
 /// The pose of these numbers, row by row.
 pub(crate) fn pose_of(numbers: &[f64]) -> Option<[f64; 16]> {
-    let is_pose = numbers.iter().all(|x| x.is_finite()) && numbers.ends_with(&[0.0, 0.0, 0.0, 1.0]);
-    numbers.try_into().ok().filter(|_| is_pose)
+    let pose: [f64; 16] = numbers.try_into().ok()?;
+    let row = |i: usize| [pose[4 * i], pose[4 * i + 1], pose[4 * i + 2]];
+    let dot = |a: [f64; 3], b: [f64; 3]| (0..3).map(|i| a[i] * b[i]).sum::<f64>();
+    let [x, y, z] = [row(0), row(1), row(2)];
+    let cross = [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]];
+    // Poses of f32, multiplied some times, are rotations within this.
+    let is_near = |a: f64, b: f64| (a - b).abs() < 1e-3;
+    let is_rotation =
+        is_near(dot(x, x), 1.0) && is_near(dot(y, y), 1.0) && is_near(dot(cross, z), 1.0);
+    let is_pose =
+        is_rotation && pose.iter().all(|x| x.is_finite()) && pose[12..] == [0.0, 0.0, 0.0, 1.0];
+    is_pose.then_some(pose)
 }
 
 /// Beyond this, f32 resolves less than half a millimetre.

@@ -406,16 +406,48 @@ fn of_two_sensors_one_is_read() {
          10.0.0.7 ({n} so far), which are not; --from ADDRESS chooses another"
     );
     assert_eq!((senders.warning(), senders.n_dropped()), (Some(warning), 2 * n - 1));
-    let mut chosen = Senders::new(Some([10, 0, 0, 7].into()));
+    let mut chosen = Senders::new(Some("10.0.0.7".parse().unwrap()));
     assert_eq!(read_turn(&path, &mut chosen).unwrap().0, expected[1].0);
     assert_eq!(chosen.warning(), None);
-    let error = read_turn(&path, &mut Senders::new(Some([10, 0, 0, 1].into()))).unwrap_err();
+    let error = read_turn(&path, &mut Senders::new(Some("10.0.0.1".parse().unwrap()))).unwrap_err();
     let found = format!(
         "found none among {0} UDP packets, {0} of them from other addresses than 10.0.0.1: \
          10.0.0.9, 192.168.1.201, 10.0.0.7",
         3 * n
     );
     assert!(error.to_string().ends_with(&found), "{error}");
+}
+
+/// The same two sensors behind one address: the second's packets go to another port, or come from
+/// another one.
+#[test]
+fn sensors_of_one_address_are_told_apart_by_their_ports() {
+    let folder = tempfile::tempdir().unwrap();
+    let alone = capture(folder.path(), Returns::Strongest);
+    let path = folder.path().join("two.pcapng");
+    let expected = read_turn(&alone, &mut Senders::default()).unwrap().0;
+    for place in [34, 36] {
+        let mut both = Vec::new();
+        for frame in frames(&fs::read(&alone).unwrap()) {
+            let mut other = frame.clone();
+            other[place..place + 2].copy_from_slice(&2369u16.to_be_bytes());
+            for block in other[PROTOCOLS..][..1200].chunks_mut(100) {
+                block[4..].chunks_mut(3).for_each(|range| range[1] ^= 0x10);
+            }
+            both.extend([frame, other]);
+        }
+        fs::write(&path, pcapng(&both)).unwrap();
+        let mut senders = Senders::default();
+        assert_eq!(read_turn(&path, &mut senders).unwrap().0, expected);
+        let warning = senders.warning().unwrap();
+        let named =
+            "found those of 192.168.1.201:2368, which are used, and of 192.168.1.201:2369 (";
+        assert!(warning.contains(named), "{warning}");
+        assert!(warning.ends_with("--from ADDRESS:PORT chooses another"), "{warning}");
+        let mut chosen = Senders::new(Some("192.168.1.201:2369".parse().unwrap()));
+        assert_ne!(read_turn(&path, &mut chosen).unwrap().0, expected);
+        assert_eq!(chosen.warning(), None);
+    }
 }
 
 #[test]

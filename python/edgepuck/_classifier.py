@@ -103,6 +103,10 @@ def _is_batch(cloud: Any) -> bool:
 
 def points_of(cloud: ArrayLike) -> NDArray[np.float32]:
     """The first three columns of `cloud`, which are points of shape [n, 3]."""
+    if isinstance(cloud, (str, os.PathLike)):
+        raise _edgepuck.Error(
+            f"expected points, found the path {os.fspath(cloud)!r}: `Scan.read` reads files"
+        )
     points = np.asarray(cloud)
     if points.dtype.names is not None:
         missing = [axis for axis in "xyz" if axis not in points.dtype.names]

@@ -73,6 +73,10 @@ def detect(
         rings = sweep.ring if rings is None else rings
         sweep = sweep.in_sensor_frame()
     least = whole("min_points", min_points, 1, 2**32)
+    if not 0 <= min_confidence <= 1:
+        raise _edgepuck.Error(
+            f"min_confidence: expected a number from 0 to 1, found {min_confidence!r}"
+        )
     cloud = points_of(sweep)
     found = _edgepuck.detect(
         cloud, rings_of(rings), place(model), precision, least, min_confidence

@@ -50,6 +50,11 @@ class Mesh(Remade):
         units: Unit | None = None,
         up: Axis | None = None,
     ) -> None:
+        if units is not None and normalize != "none":
+            raise _edgepuck.Error(
+                f'units: expected normalize="none" beside it, found {normalize!r}, which scales '
+                "meshes of any unit"
+            )
         if faces is None and isinstance(source, (str, os.PathLike)):
             path = place(source)
             self._made_of = (path,), {"normalize": normalize, "units": units, "up": up}

@@ -31,6 +31,8 @@ def scan(
     """Scan `scene` by `sensor`. `Scene.scan` describes the arguments."""
     if isinstance(attributes, str):
         raise _edgepuck.Error(f"attributes: expected a list of names, found {attributes!r}")
+    if effects is not None and not isinstance(effects, Mapping):
+        raise _edgepuck.Error(f"effects: expected a dict, found {effects!r}")
     wanted: dict[str, Any] = dict(effects or {})
     for name, given in [("noise", noise != 0), ("dropout", dropout != 0)]:
         if given and name in wanted:

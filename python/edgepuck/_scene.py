@@ -192,5 +192,7 @@ def _pose(pose: ArrayLike | None, position: ArrayLike | None) -> list[float]:
         at = np.asarray(position, dtype=np.float64)
         if at.shape != (3,):
             raise _edgepuck.Error(f"position: expected shape [3], found {list(at.shape)}")
+        if not np.isfinite(at).all():
+            raise _edgepuck.Error(f"position: expected finite metres, found {at.tolist()}")
         matrix[:3, 3] = at
     return matrix.ravel().tolist()

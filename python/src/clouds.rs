@@ -106,10 +106,9 @@ fn argument_error(error: &anyhow::Error) -> String {
     let text = formats::outcome::joined_causes(error);
     let cause = text.split("\n\n").next().unwrap_or_default();
     let cause = cause.trim_start_matches("error: ").trim_end().replace("'--", "'");
-    match cause.strip_prefix("--").and_then(|cause| cause.split_once(':')) {
-        Some((flag, cause)) => format!("{}:{cause}", flag.replace('-', "_")),
-        None => cause,
-    }
+    let in_python =
+        |word: &str| word.strip_prefix("--").map_or(word.to_owned(), |flag| flag.replace('-', "_"));
+    cause.split(' ').map(in_python).collect::<Vec<_>>().join(" ")
 }
 
 impl Clouds {

@@ -98,8 +98,11 @@ impl Scene {
         let pose = place.pose()?;
         let (caster, mut scene) = (sensor.caster.open()?, lock(&self.scene).clone());
         if let Some(effects) = effects {
-            scene.effects = serde_json::from_str(effects)
-                .map_err(|error| raised(format!("effects: {error}")))?;
+            scene.effects = serde_json::from_str(effects).map_err(|error| {
+                // The place in the text of JSON says nothing to the user.
+                let place = format!(" at line {} column {}", error.line(), error.column());
+                raised(format!("effects: {}", error.to_string().replace(&place, "")))
+            })?;
         }
         if let Some(names) = attributes {
             let attributes = names.iter().map(|name| name.parse::<Attribute>());

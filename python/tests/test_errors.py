@@ -9,6 +9,7 @@ import edgepuck as ep
 
 SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0]]
 CUBE = ep.Mesh(*ep.box((1, 1, 1)))
+FLOOR = np.stack([*np.meshgrid(*[np.linspace(-9.0, 9.0, 90)] * 2), np.full((90, 90), -1.5)], -1).reshape(-1, 3)
 
 
 @pytest.mark.parametrize(
@@ -38,7 +39,7 @@ CUBE = ep.Mesh(*ep.box((1, 1, 1)))
         (lambda: ep.segment(np.zeros((5, 2))), "expected points of shape"),
         (lambda: ep.detect(np.zeros((5, 2))), "expected points of shape"),
         (lambda: ep.detect(np.ones((5, 3)), "no-model"), "no-model"),
-        (lambda: ep.Mesh(SQUARE, [[0, 1, 2]], units="km"), "expected one of m, mm, cm, in, ft"),
+        (lambda: ep.Mesh(SQUARE, [[0, 1, 2]], normalize="none", units="km"), "expected one of m, mm, cm, in, ft"),
         (lambda: ep.segment(np.ones((5, 3)), rings=[1, 2]), "ring"),
         (lambda: ep.segment(np.zeros((2, 3)), rings=[1, 2.5]), "rings: expected whole numbers"),
         (lambda: ep.detect(np.zeros((2, 3)), rings=[1, np.nan]), "rings: expected whole numbers"),
@@ -50,6 +51,12 @@ CUBE = ep.Mesh(*ep.box((1, 1, 1)))
         (lambda: ep.detect(np.zeros((3, 200))), "found [3, 200]: transpose it"),
         (lambda: ep.Classifier("edge-64")(np.zeros((2, 3, 200))), "found [3, 200]: transpose it"),
         (lambda: ep.segment(np.zeros(5, [("x", "f4"), ("y", "f4")])), "expected fields x, y and z"),
+        (lambda: ep.segment("sweep.npz"), "found the path 'sweep.npz': `Scan.read` reads files"),
+        (lambda: ep.detect(FLOOR, min_confidence=2), "min_confidence: expected a number from 0 to 1"),
+        (lambda: ep.detect(FLOOR, min_confidence=np.nan), "min_confidence: expected a number from 0"),
+        (lambda: ep.Mesh(SQUARE, [[0, 1, 2]], units="mm"), "units: expected normalize=\"none\" beside it"),
+        (lambda: ep.Scene().add(CUBE, position=(np.nan, 0, 0)), "position: expected finite metres"),
+        (lambda: ep.Sensor("vlp16").scan(CUBE, effects="fog"), "effects: expected a dict, found 'fog'"),
         (lambda: ep.Scenes("moon"), "moon"),
         (lambda: ep.scan_scene("missing.toml"), "missing.toml"),
         (lambda: ep.Dataset("missing"), "missing: cannot be read"),
@@ -69,8 +76,6 @@ def test_what_cannot_be_used_is_named(make, message: str) -> None:
         make()
     assert message in str(caught.value)
 
-
-FLOOR = np.stack([*np.meshgrid(*[np.linspace(-9.0, 9.0, 90)] * 2), np.full((90, 90), -1.5)], -1).reshape(-1, 3)
 
 
 @pytest.mark.parametrize(

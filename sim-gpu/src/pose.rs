@@ -137,6 +137,9 @@ struct PosesFile {
 }
 
 fn poses(PosesFile { pose }: PosesFile) -> Result<Vec<Pose>, Vec<InvalidValue>> {
+    if pose.is_empty() {
+        return Err(InvalidValue::new("pose", "expected at least one [[pose]], found none").into());
+    }
     config::all(pose.iter().enumerate().map(|(i, keys)| keys.pose(&format!("pose[{i}]"))))
 }
 

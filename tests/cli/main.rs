@@ -15,6 +15,7 @@ mod export_onnx;
 mod golden;
 mod import_weights;
 mod interrupted;
+mod meanings;
 mod mesh_scans;
 mod meshes;
 mod packets;

@@ -425,7 +425,7 @@ fn what_cannot_be_used_is_named_and_nothing_is_written() {
             ("detect missing.npz --model nothing.safetensors --out out.json", "missing.npz"),
             (
                 "detect missing.npz --out out.txt --calib flat/chairs/flat.obj",
-                "flat.obj: R0_rect: expected a line of 9 finite numbers, found 0",
+                "flat.obj: R0_rect: expected this line of the calibration of KITTI's object",
             ),
         ],
     );

@@ -12,7 +12,7 @@ use formats::outputs::Overwrite;
 use plan::{Entry, Plan};
 use sim_gpu::Sensor;
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -82,7 +82,7 @@ pub fn run(args: &CorruptArgs) -> anyhow::Result<Outcome> {
         let cause = format!("{flag} applies to {other} only, and {} is {found}", sweep.display());
         return Err(Usage(cause).into());
     }
-    args.overwrite.check_folder(&args.out)?;
+    args.overwrite.check_cleared([args.out.as_path()], is_written)?;
     let input = SweepArgs { sweep, place: args.place.clone() };
     let sensor = Sensor::resolve(&args.profile)?;
     if input.sweep.is_dir() {
@@ -108,6 +108,20 @@ fn listed(plan: &Plan) -> String {
     text
 }
 
+/// Whether this command writes files of this name: the list, and scans and sets by the corruption and
+/// its severity, such as `fog-2.npz` and `jitter-1-test.npz`.
+fn is_written(file: &Path) -> bool {
+    let name = file.file_name().unwrap_or_default().to_string_lossy();
+    let Some(stem) = name.strip_suffix(".npz") else { return name == LIST };
+    let corruption = stem.strip_suffix("-test").unwrap_or(stem);
+    let severity =
+        corruption.rsplit_once('-').and_then(|(_, severity)| severity.parse::<u32>().ok());
+    severity.is_some() || stem == "clean-test"
+}
+
+/// The list of what was written.
+const LIST: &str = "corruptions.csv";
+
 /// A line of `corruptions.csv`.
 #[derive(serde::Serialize)]
 struct Written<'a> {
@@ -131,10 +145,10 @@ fn ended(written: &[Written<'_>]) -> Outcome {
 }
 
 /// Writes `corruptions.csv`.
-fn write_list(written: &[Written<'_>], out: &std::path::Path) -> anyhow::Result<()> {
+fn write_list(written: &[Written<'_>], out: &Path) -> anyhow::Result<()> {
     let mut csv = csv::Writer::from_writer(Vec::new());
     written.iter().try_for_each(|line| csv.serialize(line))?;
-    Ok(formats::atomic::write_bytes(&out.join("corruptions.csv"), csv.into_inner()?)?)
+    Ok(formats::atomic::write_bytes(&out.join(LIST), csv.into_inner()?)?)
 }
 
 fn usage(error: impl std::fmt::Display) -> Usage {

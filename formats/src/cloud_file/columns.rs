@@ -61,12 +61,10 @@ impl Unit {
     }
 }
 
-/// The rings that these numbers are; `None` if one is no ring, or if all are the same, as in a column
-/// that nobody filled.
+/// The rings that these numbers are; `None` if one is no ring.
 fn rings(values: &[f32]) -> Option<Vec<u16>> {
     let ring = |&x: &f32| (x.fract() == 0.0 && (0.0..65536.0).contains(&x)).then_some(x as u16);
-    let rings: Vec<u16> = values.iter().map(ring).collect::<Option<_>>()?;
-    rings.iter().any(|ring| *ring != rings[0]).then_some(rings)
+    values.iter().map(ring).collect()
 }
 
 /// Points as they are read: x, y and z, and what else the file has of each.

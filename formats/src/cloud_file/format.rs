@@ -6,6 +6,7 @@ use crate::error::FormatError;
 use crate::foreign::foreign;
 use crate::lines::BYTE_ORDER_MARK;
 use crate::npy;
+use crate::records;
 
 /// The number of first bytes that [`CloudFormat::of_content`] examines.
 pub(super) const SNIFFED_SIZE: usize = 512;
@@ -63,6 +64,17 @@ impl CloudFormat {
         }
     }
 
+    /// The format of the file at `path` by its first bytes, if these are unmistakable.
+    pub(super) fn of_signature(path: &Path) -> Option<Self> {
+        let mut start = [0; SIGNED_SIZE];
+        let mut file = std::fs::File::open(path).ok().filter(|_| path.is_file())?;
+        let n = records::fill(&mut file, &mut start).ok()?;
+        let found = Self::of_content(&start[..n], path).ok()?;
+        // Of other archives than NumPy's, the first file has another name.
+        let is_whole = found != Self::Npz || start.windows(4).any(|name| name == b".npy");
+        (is_whole && found != Self::Text).then_some(found)
+    }
+
     /// The format whose files begin with `start`, or text if no format does and no byte is zero.
     /// Errors call the file `name`.
     ///
@@ -88,6 +100,10 @@ impl CloudFormat {
         }
     }
 }
+
+/// Bytes at the start of a file that are examined for [`CloudFormat::of_signature`]: enough for the
+/// name of an archive's first file.
+const SIGNED_SIZE: usize = 128;
 
 pub(super) const COMPRESSED_LAS: &str =
     "LAZ is compressed LAS: decompress it first (`laszip`, or `pdal translate in.laz out.las`)";

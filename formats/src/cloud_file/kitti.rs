@@ -8,6 +8,7 @@ use std::io::{BufRead, Read, Write};
 use std::path::Path;
 
 use super::columns::{Extra, Rows, Unit};
+use super::precision::{self, Precision};
 use super::{Cloud, CloudFormat};
 use crate::atomic;
 use crate::error::FormatError;
@@ -167,6 +168,9 @@ fn is_velodyne_packets(start: &[u8]) -> bool {
     start.starts_with(FLAG) && start.get(100..102) == Some(FLAG)
 }
 
+/// What f32 may always change in a coordinate, metres.
+const COARSEST_M: f64 = 1e-3;
+
 /// Writes `points` with intensity 0.
 pub(super) fn write(
     path: &Path,
@@ -182,6 +186,14 @@ pub(super) fn write(
     if let Some(i) = points.iter().position(|point| !point.iter().all(fits)) {
         let cause = format!("{:?} does not fit f32, the format's only type", points[i]);
         return Err(FormatError::malformed(path, format!("point {i}"), cause));
+    }
+    let loss_m = precision::loss(points);
+    if loss_m > COARSEST_M && Precision::tolerable(points) == Precision::Double {
+        let cause = format!(
+            "f32, the format's only type, changes coordinates by {loss_m:.2} m: move the origin near the \
+             points, or choose another format"
+        );
+        return Err(FormatError::malformed(path, "points", cause));
     }
     atomic::write(path, |writer| {
         points.iter().try_for_each(|&[x, y, z]| {

@@ -34,6 +34,10 @@ pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Cloud, Form
         let [x, y, z] = [0, 1, 2].map(|axis| coordinate(transforms[axis], &record[4 * axis..]));
         rows.push(&[x, y, z, NumberType::U16.decode(&record[12..], ByteOrder::Little)]);
     })
+    .and_then(|()| match has_more(&header) {
+        true => Ok(()),
+        false => records::check_end(reader, size, n_points(&header)),
+    })
     .map_err(|error| error_in(name, "points", error))?;
     Ok(rows.cloud())
 }
@@ -58,6 +62,12 @@ fn read_header(reader: &mut impl Read) -> io::Result<(Header, u64)> {
     }
     let n_bytes = header.header_size.max(header.version.header_size());
     Ok((header, n_bytes.into()))
+}
+
+/// Whether something may follow the points: waveforms or extended records (LAS 1.3, 1.4).
+fn has_more(header: &Header) -> bool {
+    header.evlr.is_some_and(|evlr| evlr.number_of_evlrs > 0)
+        || header.start_of_waveform_data_packet_record.is_some_and(|start| start > 0)
 }
 
 /// The number of points. The field of LAS 1.3 and before takes precedence unless it is 0 (LAS 1.4

@@ -65,7 +65,7 @@ pub struct Cloud {
     /// below 256, and reflectivities of whole numbers up to 255, of which 100 is 1.
     pub intensities: Option<Vec<f32>>,
     /// The ring of each point, if the file has them: the column `ring`, `scalar_ring` or
-    /// `laser_id`, or nuScenes' fifth. A column that holds anything else, or one number for all, is none of rings.
+    /// `laser_id`, or nuScenes' fifth. A column that holds anything else is none of rings.
     pub rings: Option<Vec<u16>>,
     /// The pose of the sensor, a matrix of 4 by 4 row by row: `pose` of an NPZ or PLY file, or the
     /// VIEWPOINT of a PCD file, unless it is the identity.
@@ -145,7 +145,17 @@ fn has_any(path: &Path, keys: &[&str]) -> bool {
 pub fn read_cloud_as(path: &Path, format: Option<CloudFormat>) -> Result<Cloud, FormatError> {
     read_file(path, format).map_err(|error| {
         let expected = format.or(CloudFormat::of_path(path).ok());
-        or_foreign_file(path, expected.map_or("a cloud", CloudFormat::name), error)
+        match CloudFormat::of_signature(path) {
+            Some(found) if expected.is_some_and(|expected| expected != found) => {
+                let cause = format!(
+                    "expected {}, found {found} by the first bytes: call the file .{found}, or name \
+                     the format by --format {found}",
+                    expected.map_or("a cloud", CloudFormat::name)
+                );
+                FormatError::malformed(path, "format", cause)
+            }
+            _ => or_foreign_file(path, expected.map_or("a cloud", CloudFormat::name), error),
+        }
     })
 }
 

@@ -84,6 +84,9 @@ pub(super) fn read_header<R: BufRead>(
             "HEIGHT" => height = Some(line.count(words.next().unwrap_or_default())?),
             "VIEWPOINT" => {
                 let numbers: Vec<f64> = words.map_while(|word| word.parse().ok()).collect();
+                if numbers.iter().any(|x| !x.is_finite()) {
+                    return Err(line.error("expected finite numbers, or no line VIEWPOINT"));
+                }
                 viewpoint = numbers.try_into().ok();
             }
             "DATA" => {

@@ -23,8 +23,7 @@ impl Precision {
 
     /// The type that represents `points` to a millionth of the longest side of their box.
     pub fn tolerable(points: &[[f64; 3]]) -> Self {
-        let finite = || points.as_flattened().iter().filter(|x| x.is_finite());
-        let loss = finite().map(|&x| (f64::from(x as f32) - x).abs()).fold(0.0, f64::max);
+        let loss = loss(points);
         // The error of a number beyond f32 is infinite, and never tolerable.
         if loss < f64::INFINITY && loss <= TOLERABLE * extent(points) {
             Self::Single
@@ -47,6 +46,12 @@ impl Precision {
             Self::Double => writer.write_all(&coordinate.to_le_bytes()),
         })
     }
+}
+
+/// The largest error of a coordinate as f32.
+pub(super) fn loss(points: &[[f64; 3]]) -> f64 {
+    let finite = points.as_flattened().iter().filter(|x| x.is_finite());
+    finite.map(|&x| (f64::from(x as f32) - x).abs()).fold(0.0, f64::max)
 }
 
 /// The longest side of the box around the coordinates that are finite.

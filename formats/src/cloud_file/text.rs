@@ -44,6 +44,10 @@ pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Cloud, Form
     let mut comment = String::new();
     let mut are_decimal_commas = true;
     while let Some(line) = lines.next()? {
+        if line.text.contains('\r') {
+            let cause = "expected lines that end in LF or CR LF, found CR alone: convert them";
+            return Err(line.error(cause));
+        }
         let content = without_comment(&line.text);
         if content.is_empty() {
             if layout.is_none() && !line.text.is_empty() {

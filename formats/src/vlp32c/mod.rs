@@ -57,7 +57,7 @@ use crate::atomic::Unfinished;
 use crate::error::FormatError;
 #[cfg(feature = "dataset")]
 use crate::hash::{FileHash, Hashing};
-use crate::pcap::{self, Sender};
+use crate::pcap::{self, Origin};
 use crate::scan::{Attribute, Scan};
 use packet::{BLOCKS, LASERS, Measurement, Sequence};
 
@@ -94,8 +94,8 @@ pub const START_S: u32 = 946_684_800;
 pub const WHITE: u8 = 100;
 
 /// A sensor with its factory settings: its IP address, and a MAC address of its maker.
-const SENSOR: Sender =
-    Sender { mac: [0x60, 0x76, 0x88, 0, 0, 0], ip: [192, 168, 1, 201], port: 2368 };
+const SENSOR: Origin =
+    Origin { mac: [0x60, 0x76, 0x88, 0, 0, 0], ip: [192, 168, 1, 201], port: 2368 };
 
 /// One turn of the sensor's head.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -12,7 +12,7 @@ static WHOLE_FILES: LazyLock<Vec<(CloudFormat, Vec<u8>)>> = LazyLock::new(whole_
 
 fn whole_files() -> Vec<(CloudFormat, Vec<u8>)> {
     let folder = tempfile::tempdir().unwrap();
-    let points: Vec<_> = (0..20).map(|i| [f64::from(i) * 0.1, -1e-30, 1e30]).collect();
+    let points: Vec<_> = (0..20).map(f64::from).map(|i| [i * 0.1, -1e-30, i * 1e30]).collect();
     let extensions = ["ply", "npz", "npy", "pcd", "xyz", "csv", "bin"];
     let mut files: Vec<_> = extensions
         .into_iter()

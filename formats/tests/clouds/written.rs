@@ -148,7 +148,7 @@ fn pcd_holds_f64_only_where_f32_would_not_do() {
 #[test]
 fn the_same_points_give_the_same_bytes() {
     let folder = tempfile::tempdir().unwrap();
-    let points: Vec<_> = (0..100).map(|i| [f64::from(i) * 0.1, -1e-30, 1e30]).collect();
+    let points: Vec<_> = (0..100).map(f64::from).map(|i| [i * 0.1, -1e-30, i * 1e30]).collect();
     for extension in ALL {
         let [first, second] = ["a", "b"].map(|name| {
             let path = folder.path().join(name).with_extension(extension);

@@ -88,6 +88,7 @@ impl RangeImage {
     fn place(&mut self, sweep: &Sweep<'_>, settings: &Settings, labels: &mut [Label]) {
         let per_row = 1.0 / settings.row_height_deg.to_radians();
         let squares = settings.min_range_m.powi(2)..=settings.max_range_m.powi(2);
+        let rings = sweep.told_rings();
         self.spots.clear();
         self.rows.clear();
         for (point, &[x, y, z]) in sweep.points.iter().enumerate() {
@@ -102,7 +103,7 @@ impl RangeImage {
             }
             labels[point] = Label::OBSTACLE;
             spot.column = column(self.n_columns, x, y);
-            spot.ring = match sweep.rings {
+            spot.ring = match rings {
                 Some(rings) => rings[point],
                 None => ((atan2(z, spot.range_m) + FRAC_PI_2) * per_row) as u16,
             };

@@ -10,6 +10,13 @@ pub struct Sweep<'a> {
     pub rings: Option<&'a [u16]>,
 }
 
+impl<'a> Sweep<'a> {
+    /// The rings; `None` if all points have the same one, as in a column that nobody filled.
+    pub(crate) fn told_rings(&self) -> Option<&'a [u16]> {
+        self.rings.filter(|rings| rings.iter().any(|ring| *ring != rings[0]))
+    }
+}
+
 /// A sweep that cannot be segmented.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]

@@ -11,7 +11,7 @@ use crate::sampler::{SamplerKind, SamplerSpec};
 use crate::{Classifier, Options, Precision, UpAxis};
 use anyhow::Context;
 use formats::FormatError;
-use formats::cloud_file::{Cloud, CloudFormat, Unlike, judge_object, read_cloud_as};
+use formats::cloud_file::{Cloud, CloudFormat, Unlike, check_sweep, judge_object, read_cloud_as};
 use formats::model_card::{ModelCard, Normalization};
 use formats::outcome::{joined_causes, say};
 
@@ -190,8 +190,17 @@ impl Session<'_> {
     /// Classifies the cloud `name`, if it could be `read`, and prints the result.
     fn answer(&mut self, name: &Path, read: Result<Cloud, FormatError>) -> anyhow::Result<()> {
         let judged = read.map_err(anyhow::Error::from).and_then(|cloud| {
-            let unlike = judge_object(&cloud.points, cloud.sensor_position_m());
-            let unlike = unlike.map_err(anyhow::Error::msg);
+            let sensor_m = cloud.sensor_position_m();
+            if self.classifier.card().normalization.is_metric() {
+                let from = |p: &[f64; 3]| [0, 1, 2].map(|axis| p[axis] - sensor_m[axis]);
+                // The classifier judges points that are not finite.
+                let is_finite = |p: &[f64; 3]| p.iter().all(|x| x.is_finite());
+                let points = cloud.points.iter().map(from).filter(is_finite);
+                if points.clone().next().is_some() {
+                    check_sweep(points, name, "are they in millimetres? Scale them")?;
+                }
+            }
+            let unlike = judge_object(&cloud.points, sensor_m).map_err(anyhow::Error::msg);
             Ok((cloud.points, unlike.with_context(|| name.display().to_string())?))
         });
         let (points, unlike) = match judged {

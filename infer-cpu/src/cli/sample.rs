@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use crate::sampler::{SamplerKind, SamplerSpec};
 use crate::{Classifier, Options};
 use anyhow::Context;
-use formats::cloud_file::{CloudFormat, write_cloud};
+use formats::cloud_file::{Cloud, CloudFormat, write_cloud};
 use formats::outcome::say;
 use formats::outputs::Overwrite;
 
@@ -60,9 +60,13 @@ pub struct SampleArgs {
 
 pub fn run(args: &SampleArgs) -> anyhow::Result<Outcome> {
     // An unknown extension fails before a long computation.
-    CloudFormat::of_path(&args.output)?;
+    let format = CloudFormat::of_path(&args.output)?;
     args.overwrite.check([&*args.output])?;
-    let mut points = input::read(&args.input, args.format)?.points;
+    let Cloud { mut points, intensities, .. } = input::read(&args.input, args.format)?;
+    if format == CloudFormat::Kitti && intensities.is_some() {
+        let name = args.output.display();
+        say(format!("warning: {name}: the intensities are 0: only coordinates are written"));
+    }
     if args.drop_invalid {
         let n = points.len();
         points.retain(|point| point.iter().all(|x| x.is_finite()));

@@ -6,10 +6,12 @@ use crate::finish::finish;
 use crate::journal::{Journal, Terms};
 use crate::layout;
 use crate::manifest::{Manifest, is_plain};
-use crate::pipeline::scan_all;
+use crate::pipeline::{is_current, scan_all};
 use crate::plan::{Begin, Plan};
 use crate::progress::{Progress, Stage};
+use crate::record::Entry;
 use crate::retract::retract;
+use crate::verify::first_problem;
 use formats::atomic;
 use sim_gpu::Caster;
 use sim_gpu::internals::mesh::tree::MeshEntry;
@@ -25,7 +27,8 @@ use std::sync::atomic::Ordering::SeqCst;
 ///
 /// # Errors
 /// - [`DatasetError::Occupied`], [`DatasetError::InTheWay`] or [`DatasetError::Different`] if the
-///   folder holds files that [`Plan::begin`] does not allow;
+///   folder holds files that [`Plan::begin`] does not allow; a complete dataset, of which a mesh or a
+///   file was changed;
 /// - settings that the layouts cannot hold, or effects that do not fit a sensor;
 /// - [`DatasetError::Interrupted`] if [`Progress::stop`] was set before all meshes were scanned;
 /// - a file that cannot be written, or an adapter that fails.
@@ -41,6 +44,7 @@ pub fn make(plan: &Plan, caster: &Caster, progress: &Progress) -> Result<Manifes
     check_layouts(plan.config, &Vec::from_iter(classes))?;
     let terms = Terms::new(plan.config.clone(), caster, &meshes, plan.part);
     if let Some(manifest) = begin(plan.out, &terms, plan.begin)? {
+        check_finished(plan.out, &manifest, &meshes)?;
         return Ok(manifest);
     }
     progress.expected_meshes.store(meshes.len() as u64, SeqCst);
@@ -82,6 +86,30 @@ pub(crate) fn begin(
     }
     journal.begin(terms)?;
     Ok(None)
+}
+
+/// Checks that a complete dataset is of `meshes` as they are now, and that its files are there and as
+/// they were written.
+fn check_finished(
+    out: &Path,
+    manifest: &Manifest,
+    meshes: &[MeshEntry],
+) -> Result<(), DatasetError> {
+    let hashing = manifest.config.hash;
+    let found = |mesh: &&MeshEntry| {
+        let entry = Entry::from(*mesh);
+        let record = manifest.meshes.iter().find(|record| record.entry == entry);
+        record.is_some_and(|record| !is_current(record, mesh, hashing))
+    };
+    let changed = meshes.iter().find(found);
+    let changed = changed.map(|mesh| format!("{} has changed since", mesh.path.display()));
+    match changed.or_else(|| first_problem(out, manifest).map(|problem| problem.to_string())) {
+        None => Ok(()),
+        Some(what) => {
+            let cause = format!("the dataset is complete, but {what}: --overwrite makes it again");
+            Err(DatasetError::malformed(out, cause))
+        }
+    }
 }
 
 fn refuse_occupied(out: &Path, terms: &Terms) -> Result<(), DatasetError> {

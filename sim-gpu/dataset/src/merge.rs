@@ -5,6 +5,7 @@ use crate::journal::Journal;
 use crate::layout;
 use crate::manifest::Manifest;
 use crate::record::Entry;
+use crate::verify::first_problem;
 use formats::atomic;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -19,13 +20,18 @@ use std::path::{Path, PathBuf};
 /// On failure `out` is emptied again. A process that is killed leaves files, but no manifest.
 ///
 /// # Errors
-/// Shards that do not make one dataset or are not finished; a file that cannot be read or written.
+/// Shards that do not make one dataset, are not finished or have a file that was changed; a file that cannot be read or written.
 pub fn merge(shards: &[PathBuf], out: &Path) -> Result<Manifest, DatasetError> {
     let parts: Vec<Part> = shards.iter().map(|path| Part::read(path)).collect::<Result<_, _>>()?;
     check_agreement(&parts)?;
     check_numbers(&parts, out)?;
     check_entries(&parts)?;
     check_empty(out)?;
+    for Part { path, manifest, .. } in &parts {
+        if let Some(problem) = first_problem(path, manifest) {
+            return Err(DatasetError::malformed(path, problem));
+        }
+    }
     let merged = parts.iter().try_for_each(|part| link_scans(part, out));
     let merged = merged.and_then(|()| complete(out, union(parts)));
     if merged.is_err() {

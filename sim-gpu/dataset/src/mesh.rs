@@ -2,7 +2,7 @@
 //! its scans on disk.
 
 use crate::clouds::Source;
-use crate::config::{DatasetConfig, SetConfig};
+use crate::config::{DatasetConfig, SetConfig, Viewpoints};
 use crate::error::DatasetError;
 use crate::layout;
 use crate::plan::Plan;
@@ -104,7 +104,12 @@ pub(crate) fn doubts(
         .map(|doubt| format!("{doubt}; --units names another unit"));
     let inside = mesh.is_some_and(|mesh| mesh.surrounds(sensors_m)).then(|| {
         let units = if is_scaled { "" } else { ", or another of --units" };
-        format!("a sensor stands inside its bounding box: expected a larger --distance{units}")
+        let is_posed = |set: &SetConfig| matches!(set.viewpoints, Viewpoints::Poses(_));
+        let place = match config.sets.iter().any(is_posed) {
+            true => "poses outside of it",
+            false => "a larger --distance",
+        };
+        format!("a sensor stands inside its bounding box: expected {place}{units}")
     });
     let effects = mesh.and_then(|mesh| mesh.doubtful_effects(&config.effects));
     size.into_iter().chain(effects).chain(inside).map(move |doubt| format!("{source}: {doubt}"))

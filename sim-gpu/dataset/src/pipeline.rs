@@ -101,7 +101,7 @@ pub(crate) fn scan_all(
 }
 
 /// Whether `record` is of the file of `mesh` as it is now. Without a hash, the name has to do.
-fn is_current(record: &MeshRecord, mesh: &MeshEntry, hashing: Hashing) -> bool {
+pub fn is_current(record: &MeshRecord, mesh: &MeshEntry, hashing: Hashing) -> bool {
     hashing.of_file(&mesh.path).is_ok_and(|now| now == record.hash)
 }
 

@@ -80,6 +80,11 @@ pub fn verify(out: &Path) -> Result<Report, DatasetError> {
     })
 }
 
+/// The first file of `manifest`, by its path, that is not as it says in the folder `out`.
+pub(crate) fn first_problem(out: &Path, manifest: &Manifest) -> Option<Problem> {
+    problems(out, &expected_files(manifest)).into_iter().min()
+}
+
 fn verify_tars(out: &Path) -> Result<Report, DatasetError> {
     let root: RootManifest = read_json(&root_file(out))?;
     let clouds = root.parts.iter().map(|part| part.clouds).sum();

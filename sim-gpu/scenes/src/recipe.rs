@@ -338,6 +338,19 @@ impl SensorChoice {
 const MESH: &str = "mesh";
 
 impl Objects {
+    /// Checks that labels can name the class: they have one word for it, and words of their own.
+    fn check_class(&self, key: &str) -> Result<(), InvalidValue> {
+        let class = &self.class;
+        let is_word = !class.is_empty() && !class.contains(char::is_whitespace);
+        if is_word && !["air", "ground"].contains(&&**class) {
+            return Ok(());
+        }
+        let cause = format!(
+            "expected one word other than \"air\" and \"ground\", such as \"big_car\", found {class:?}"
+        );
+        Err(InvalidValue::new(format!("{key}.class"), cause))
+    }
+
     /// The built-in kind; `None` for the user's meshes.
     #[must_use]
     pub fn built_in(&self) -> Option<ObjectKind> {
@@ -351,6 +364,7 @@ impl Objects {
     }
 
     fn check(&self, key: &str) -> Result<(), InvalidValue> {
+        self.check_class(key)?;
         let at = |field: &str| format!("{key}.{field}");
         if self.built_in().is_none() && self.kind != MESH {
             let known: Vec<&str> = ObjectKind::ALL.into_iter().map(ObjectKind::name).collect();

@@ -15,6 +15,8 @@ use super::{InvalidValue, one_of};
 
 /// The largest number of mistakes in a message.
 const MOST: usize = 20;
+/// The largest number of errors of syntax in a message.
+const MOST_OF_SYNTAX: usize = 3;
 
 /// The largest number of characters of a value in a message.
 const MOST_CHARS: usize = 60;
@@ -47,7 +49,8 @@ impl Mistakes {
                 line: error.span().map(|span| line(span.start)),
                 invalid: InvalidValue::new("", error.message()),
             };
-            return Err(Self::sorted(errors.iter().map(mistake)));
+            // Of a file that is no TOML, each line is an error.
+            return Err(Self::sorted(errors.iter().take(MOST_OF_SYNTAX).map(mistake)));
         }
         let read = |root| T::deserialize(Deserializer::from(root));
         let found = match read(root.clone()) {

@@ -89,6 +89,10 @@ impl Weather {
     /// # Errors
     /// On the first that is not finite or out of its bounds.
     pub fn validate(&self) -> Result<(), InvalidValue> {
+        if self.fog_visibility_m.is_none() && !self.fog_model.is_default() {
+            let cause = "expected fog_visibility_m, whose fog it describes, found none";
+            return Err(InvalidValue::new("effects.weather.fog_model", cause));
+        }
         within("effects.weather.rain_mm_h", self.rain_mm_h, 0.0..=MOST_MM_H)?;
         within("effects.weather.snow_mm_h", self.snow_mm_h, 0.0..=MOST_MM_H)?;
         within("effects.weather.fog_visibility_m", self.fog_visibility_m, VISIBILITIES_M)?;

@@ -158,7 +158,8 @@ fn bad_poses_are_named() {
     }
     let error = parse("[[pose]]\nposition_m = [1, inf, 3]\nyaw_deg = 0").unwrap_err();
     assert!(error.to_string().contains("pose[0].position_m"), "{error}");
-    assert!(parse("").unwrap().is_empty());
+    let error = parse("").unwrap_err().to_string();
+    assert!(error.ends_with("pose: expected at least one [[pose]], found none"), "{error}");
 }
 
 #[test]

@@ -123,6 +123,10 @@ impl SceneFile {
                 return Err(wrong);
             }
         };
+        if effects.motion.is_some() && sensors.iter().all(|sensor| sensor.motion.is_some()) {
+            let cause = "expected a sensor without a trajectory, which it would move, found none";
+            return Err(InvalidValue::new("effects.motion", cause).into());
+        }
         config::all([
             check_names("object", objects.iter().map(|object| &object.name)),
             check_names("sensor", sensors.iter().map(|sensor| &sensor.name)),

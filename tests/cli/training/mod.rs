@@ -90,6 +90,19 @@ fn a_run_leaves_a_model_and_a_folder() {
     let measured = train(folder.path(), csv);
     assert!(measured.status.success(), "{}", stderr(&measured));
     assert_eq!(std::fs::read_to_string(folder.path().join("c.csv")).unwrap().lines().count(), 4);
+    // Classes in another order are those of their names.
+    let mut turned = CLASSES.to_vec();
+    turned.reverse();
+    let mut of_names = clouds(30);
+    of_names.iter_mut().for_each(|(_, label)| *label = CLASSES.len() - 1 - *label);
+    write(&folder.path().join("turned.npz"), &of_names, &turned);
+    write(&folder.path().join("same.npz"), &clouds(30), &CLASSES);
+    let [of_turned, of_same] = ["turned", "same"].map(|name| {
+        let ran = train(folder.path(), &format!("eval --model m.safetensors --data {name}.npz"));
+        assert!(!stderr(&ran).contains("is called"), "{}", stderr(&ran));
+        String::from_utf8_lossy(&ran.stdout).replace(name, "")
+    });
+    assert_eq!(of_turned, of_same);
 }
 
 #[test]

@@ -118,7 +118,15 @@ fn report_clouds(
     // The data have no clouds of the model's further classes, such as `unknown`.
     let mut clouds = clouds.clone();
     let n_classes = clouds.classes.len();
-    if names.starts_with(&clouds.classes) {
+    // The model may have the classes in another order.
+    let by_name = |class: &String| names.iter().position(|name| name == class);
+    let numbers: Option<Vec<usize>> = clouds.classes.iter().map(by_name).collect();
+    if let Some(numbers) = numbers {
+        for label in &mut clouds.set.labels {
+            *label = numbers[*label as usize] as _;
+        }
+        clouds.classes = names.to_vec();
+    } else if names.starts_with(&clouds.classes) {
         clouds.classes = names.to_vec();
     }
     // `confusion` checks that the model and the data have the same number of classes.

@@ -5,7 +5,7 @@ mod outputs;
 mod report;
 mod source;
 
-use std::net::{IpAddr, Ipv4Addr};
+use std::net::Ipv4Addr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,9 +13,9 @@ use std::time::{Duration, Instant};
 
 use crate::live::{Counts, EgoMotion, Flaw, LiveOptions, Pipeline, Recorder, Timeline};
 use crate::{Classifier, Options, Precision};
-use formats::FormatError;
 use formats::ouster::Metadata;
 use formats::outputs::need_extension;
+use formats::{ChosenSender, FormatError};
 use glam::DVec3;
 use signal_hook::consts::{SIGINT, SIGTERM};
 
@@ -88,9 +88,10 @@ pub struct LiveArgs {
     #[arg(long)]
     stats: bool,
 
-    /// Address of the sensor whose packets are used [default: the first sensor that sends]
+    /// Address of the sensor whose packets are used, of several at one address ADDRESS:PORT with its
+    /// source or destination port [default: the first sensor that sends]
     #[arg(long, value_name = "ADDRESS")]
-    from: Option<IpAddr>,
+    from: Option<ChosenSender>,
 
     /// Join a multicast group
     #[arg(long, value_name = "IP", conflicts_with = "pcap", value_parser = group)]
@@ -205,7 +206,15 @@ pub fn run(args: &LiveArgs) -> anyhow::Result<Outcome> {
     if !args.stats && read.capture.first_unread.is_some() {
         formats::say!("warning: {}{} UDP packets{}", args.capture(), read.n_packets, read.capture);
     }
-    let Counts { packets, lost, .. } = *pipeline.counts();
+    let Counts { packets, lost, duplicated, late, .. } = *pipeline.counts();
+    // Single repeated and late packets are usual in networks.
+    if duplicated + late > packets {
+        formats::say!(
+            "warning: {}expected packets in the order of the sensor's stamps, found {duplicated} with a \
+             stamp again and {late} with an earlier one, which were not used",
+            args.capture()
+        );
+    }
     if !args.stats && lost > 0 {
         let of = packets + lost;
         formats::say!("warning: {}{lost} of {of} packets are probably missing", args.capture());

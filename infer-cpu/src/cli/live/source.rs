@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 use crate::live::{Arrival, Timeline};
 use anyhow::Context;
 use formats::ouster::{self, Metadata};
-use formats::{Senders, pcap, velodyne};
+use formats::{ChosenSender, Sender, Senders, pcap, velodyne};
 use socket2::{Domain, Protocol, Socket, Type};
 
 /// The most packets in the queue: two thirds of a second of a VLP-32C.
@@ -57,13 +57,13 @@ pub struct Sensor {
 impl Sensor {
     /// The sensor at the address `from` or the first one: an Ouster with this `metadata`, or a
     /// Velodyne.
-    pub fn new(from: Option<IpAddr>, metadata: Option<&Metadata>) -> Self {
+    pub fn new(from: Option<ChosenSender>, metadata: Option<&Metadata>) -> Self {
         let ouster = metadata.map(|metadata| Box::new(ouster::Decoder::new(metadata)));
         Self { senders: Senders::new(from), ouster, has_warned: false }
     }
 
-    fn sent(&mut self, payload: &[u8], source: IpAddr) -> bool {
-        let is_used = self.senders.takes(source, || match &self.ouster {
+    fn sent(&mut self, payload: &[u8], sender: Sender) -> bool {
+        let is_used = self.senders.takes(sender, || match &self.ouster {
             Some(decoder) => decoder.header(payload).is_ok(),
             None => velodyne::Header::parse(payload).is_ok(),
         });
@@ -193,7 +193,9 @@ fn receive(
         };
         read.n_packets += 1;
         let payload = slot.as_ref().map_or(&overrun[..], |slot| &slot.bytes[..n_bytes]);
-        if !sensor.sent(payload, sender.ip()) {
+        // A sensor that starts again behind a relay may send from another port.
+        let sender = Sender { ip: sender.ip(), ports: [0; 2] };
+        if !sensor.sent(payload, sender) {
             spare = slot;
             continue;
         }
@@ -251,7 +253,7 @@ fn replay(
     let (mut read, start, mut first_s) = (Read::default(), Instant::now(), None);
     let ended = pcap::read(file, |packet| {
         read.n_packets += 1;
-        if !sensor.sent(&packet.payload, packet.source) {
+        if !sensor.sent(&packet.payload, packet.sender()) {
             return ControlFlow::Continue(());
         }
         let time_s = packet.time_s.unwrap_or_default();
