@@ -3,6 +3,7 @@
 
 mod boxes;
 mod mounting;
+mod precision;
 
 use crate::table::{Table, percent, publish};
 use anyhow::{Context, Result, bail};
@@ -15,6 +16,7 @@ use formats::interval::wilson;
 use formats::labelled_sweep::{LabelledBox, LabelledSweep, read_labelled_sweep};
 use glam::DVec3;
 use infer_cpu::Options;
+use precision::{OfClass, Place};
 use sim_gpu::internals::sensor::{Layout, SensorProfile};
 use std::path::{Path, PathBuf};
 
@@ -120,6 +122,7 @@ pub fn run(args: &FramesArgs) -> Result<()> {
     let judged = args.frames.iter().map(|file| Judged::of(file, &mut detector));
     let mut judged = judged.collect::<Result<Vec<_>>>()?;
     let sources: Vec<_> = judged.iter().map(|frame| frame.source).collect();
+    let precision = precision::table(&["car", "person"].map(|class| of_class(&judged, class)));
     let mut curve = Table::new(
         "By least confidence",
         &["least confidence", "found and named", "false cars and persons", "other false alarms"],
@@ -138,8 +141,29 @@ pub fn run(args: &FramesArgs) -> Result<()> {
             tables = vec![summary(&asked, &alarms, &sources), boxes, misses, alarms_told];
         }
     }
+    tables.insert(2.min(tables.len()), precision);
     tables.insert(1.min(tables.len()), curve);
     publish(&tables, args.report.as_deref())
+}
+
+/// Where objects of a class are found, and where those are that have a point in the sweep.
+fn of_class(judged: &[Judged], class_name: &'static str) -> OfClass {
+    let mut of = OfClass { class: class_name, found: Vec::new(), labelled: Vec::new() };
+    for (number, frame) in judged.iter().enumerate() {
+        let place = |[x, y, _]: [f64; 3], score| {
+            let centre_m = [x, y];
+            frame.is_judged(centre_m).then_some(Place { frame: number, centre_m, score })
+        };
+        let found = frame.found.objects.iter().filter(|object| object.class == class_name);
+        let found = found.map(|object| (object.whole.centre_m.map(f64::from), object.confidence));
+        of.found.extend(found.filter_map(|(centre_m, score)| place(centre_m, score)));
+        let is_seen = |one: &&LabelledBox| {
+            class(&one.class) == Some(class_name) && !frame.points_in(one, 0.0).is_empty()
+        };
+        let labelled = frame.boxes.iter().filter(is_seen);
+        of.labelled.extend(labelled.filter_map(|one| place(one.centre_m, 0.0)));
+    }
+    of
 }
 
 /// The names among `sources`, sorted.
