@@ -282,12 +282,15 @@ fn a_turn_is_that_of_the_packets_times() {
     assert_eq!(of_frames(&repeated).unwrap(), expected);
     let echoed: Vec<_> = [&frames[..9], &frames[3..5], &frames[9..]].concat();
     assert_eq!(of_frames(&echoed).unwrap(), expected);
-    // Of 1808 sequences, 12 of which fill a packet, the time of three packets is empty.
-    let gaps = [&frames[..20], &frames[21..70], &frames[72..]].concat();
-    for (frames, missing) in [(&frames, 0), (&gaps, 3)] {
-        fs::write(folder.path().join("gaps.pcap"), classic(1, frames, 65_535)).unwrap();
-        let read = read_turn(&folder.path().join("gaps.pcap"), &mut Senders::default());
-        assert_eq!(read.unwrap().1.missing, missing);
+    // Of 1808 sequences, 12 or 6 of which fill a packet, the time of three packets is empty.
+    for returns in [Returns::Strongest, Returns::Dual] {
+        let frames = self::frames(&fs::read(capture(&folder.path().join("x"), returns)).unwrap());
+        let gaps = [&frames[..20], &frames[21..70], &frames[72..]].concat();
+        for (frames, missing) in [(&frames, 0), (&gaps, 3)] {
+            fs::write(folder.path().join("gaps.pcap"), classic(1, frames, 65_535)).unwrap();
+            let read = read_turn(&folder.path().join("gaps.pcap"), &mut Senders::default());
+            assert_eq!(read.unwrap().1.missing, missing, "{returns}");
+        }
     }
     let mut swapped = frames.clone();
     swapped.swap(7, 8);
@@ -325,6 +328,28 @@ fn a_turn_is_that_of_the_packets_times() {
     let gap = [&frames[..40], &frames[100..]].concat();
     let error = of_frames(&gap).unwrap_err().to_string();
     assert!(error.contains("degrees of one"), "{error}");
+}
+
+/// A head that turns by 0.21 degrees in a sequence of 55.296 us ends its turn 2/7 into the eleventh
+/// sequence of a packet, when 7 of 16 pairs of lasers have fired.
+#[test]
+fn a_turn_ends_within_a_packet() {
+    let folder = tempfile::tempdir().unwrap();
+    let headers = &frames(&fs::read(capture(folder.path(), Returns::Strongest)).unwrap())[0];
+    let frame = |number: u32| {
+        let mut packet = standing(0x28, 4);
+        for block in 0..12 {
+            let azimuth = (21 * (12 * number + block) % 36_000) as u16;
+            packet[100 * block as usize + 2..][..2].copy_from_slice(&azimuth.to_le_bytes());
+        }
+        let time_us = (f64::from(12 * number) * 55.296).round() as u32;
+        packet[1200..1204].copy_from_slice(&time_us.to_le_bytes());
+        [&headers[..PROTOCOLS], &packet].concat()
+    };
+    let path = folder.path().join("turn.pcap");
+    fs::write(&path, classic(1, &(0..150).map(frame).collect::<Vec<_>>(), 65_535)).unwrap();
+    let (scan, _) = read_turn(&path, &mut Senders::default()).unwrap();
+    assert_eq!(scan.len(), (142 * 12 + 10) * 32 + 14);
 }
 
 #[test]
