@@ -20,7 +20,7 @@ from ._dataset import Dataset
 from ._detect import Detection, detect
 from ._mesh import Mesh, box
 from ._scan import Scan
-from ._scene import Scene, scan_scene
+from ._scene import Batch, Scene, scan_scene
 from ._scenes import DrawnScene, Scenes
 from ._segment import segment
 from ._sensor import Sensor
@@ -28,6 +28,7 @@ from ._sensor import Sensor
 __version__ = _version("edgepuck")
 
 __all__ = [
+    "Batch",
     "Classifier",
     "Dataset",
     "Detection",

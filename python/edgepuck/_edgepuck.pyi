@@ -85,6 +85,13 @@ class Scene:
         attributes: Sequence[str] | None,
         seed: int | None,
     ) -> dict[str, Any]: ...
+    def cast(
+        self,
+        sensor: Sensor,
+        poses: NDArray[np.float64],
+        numbers: Sequence[int],
+        moved: NDArray[np.float64],
+    ) -> tuple[NDArray[np.float32], NDArray[np.uint32]]: ...
     def scan_all(self, adapter: str) -> list[tuple[str, dict[str, Any]]]: ...
 
 @final

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from . import _edgepuck, _scanning
 from ._arguments import whole
@@ -155,11 +156,79 @@ class Scene:
             seed=seed,
         )
 
+    def cast(
+        self,
+        sensor: Sensor,
+        poses: ArrayLike,
+        *,
+        move: tuple[Sequence[int], ArrayLike] | None = None,
+    ) -> Batch:
+        """The ranges of a sensor's beams from many poses, as learning loops want them.
+
+        Each pose sees a world of its own, in which the instances of `move` stand elsewhere. Nothing is
+        rebuilt, and the scene itself does not change. Row i has the ranges of `scan` at pose i; where the
+        scene's file has random effects, with its seed plus i.
+
+        Args:
+            sensor: The sensor.
+            poses: The poses of the sensor, [n, 4, 4], or [n, 7]: x, y, z and a quaternion w, x, y, z.
+            move: Numbers of k instances, and their poses for each pose of the sensor, [n, k, 4, 4] or
+                [n, k, 7].
+
+        Raises:
+            Error: A pose has a wrong shape or is not a rotation; there is no such instance.
+
+        >>> import edgepuck as ep
+        >>> scene = ep.Scene()
+        >>> cube = scene.add(ep.Mesh(*ep.box((1.0, 1.0, 1.0)), normalize="none"), position=(3, 0, 0))
+        >>> poses = np.tile(np.eye(4), (2, 1, 1))
+        >>> of_each = np.tile(np.eye(4), (2, 1, 1, 1))
+        >>> of_each[:, 0, 0, 3] = [3, 6]
+        >>> batch = scene.cast(ep.Sensor("vlp16"), poses, move=([cube], of_each))
+        >>> batch.ranges.shape, batch.ranges.min(axis=1).round(2).tolist()
+        ((2, 28935), [2.5, 5.5])
+        """
+        n, rows = _rows("poses", poses, ())
+        numbers: list[int] = []
+        moved = np.empty((0, 16))
+        if move is not None:
+            numbers = [whole("move", number, 0, 2**32 - 1) for number in move[0]]
+            _, moved = _rows("move", move[1], (n, len(numbers)))
+        ranges, objects = self._scene.cast(sensor_of(sensor), rows, numbers, moved)
+        # The largest number, of beams without a return, is -1.
+        return Batch(ranges, objects.view(np.int32), sensor)
+
     def __reduce__(self) -> tuple[Any, ...]:
         return _remade, (self._file, self._added, self._poses)
 
     def __repr__(self) -> str:
         return f"<Scene of {len(self)} instances>"
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """The ranges of a sensor's beams from many poses, of `Scene.cast`."""
+
+    ranges: NDArray[np.float32]
+    """Metres, infinite where nothing returns, [n, n_beams]; beams are in the order of `directions`."""
+    object: NDArray[np.int32]
+    """The number of the instance, -1 where nothing returns, [n, n_beams]."""
+    sensor: Sensor
+    """The sensor."""
+
+    def range_image(self) -> NDArray[np.float32]:
+        """The ranges as images, [n, rings, columns]: rings from below, columns in the order of firing.
+
+        A ring that fires less often than others in a revolution ends with infinite ranges.
+        """
+        rings, times = self.sensor.rings, self.sensor.times
+        order = np.lexsort((times, rings))
+        _, starts, rows, counts = np.unique(
+            rings[order], return_index=True, return_inverse=True, return_counts=True
+        )
+        image = np.full((len(self.ranges), len(starts), counts.max()), np.inf, np.float32)
+        image[:, rows, np.arange(len(order)) - starts[rows]] = self.ranges[:, order]
+        return image
 
 
 def scan_scene(file: str | os.PathLike[str], *, adapter: str = "cpu") -> dict[str, Scan]:
@@ -179,6 +248,40 @@ def _remade(
     for number, rows in poses.items():
         scene._scene.move(number, rows)
     return scene
+
+
+def _rows(name: str, poses: ArrayLike, shape: tuple[int, ...]) -> tuple[int, NDArray[np.float64]]:
+    """The number of `poses` and the rows of their matrices, [m, 16]. `shape` is that before the last
+    axes; without it, one axis of any length."""
+    found = np.asarray(poses, dtype=np.float64)
+    n_axes = len(shape) or 1
+    is_matrix, is_quaternion = found.shape[n_axes:] == (4, 4), found.shape[n_axes:] == (7,)
+    if not (is_matrix or is_quaternion) or (shape and found.shape[:n_axes] != shape):
+        before = ", ".join(map(str, shape)) or "n"
+        raise _edgepuck.Error(
+            f"{name}: expected shape [{before}, 4, 4] or [{before}, 7], found {list(found.shape)}"
+        )
+    if is_matrix:
+        return len(found), np.ascontiguousarray(found.reshape(-1, 16))
+    return len(found), _matrices(name, found.reshape(-1, 7)).reshape(-1, 16)
+
+
+def _matrices(name: str, poses: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The matrices of positions and quaternions w, x, y, z, [m, 4, 4]."""
+    at, (w, x, y, z) = poses[:, :3], poses[:, 3:].T
+    off = np.abs(w * w + x * x + y * y + z * z - 1)
+    if not (off < 1e-3).all():
+        worst = int(np.argmax(np.where(np.isnan(off), np.inf, off)))
+        raise _edgepuck.Error(
+            f"{name}[{worst}]: expected a quaternion of length 1, found {poses[worst, 3:].tolist()}"
+        )
+    s = 2 / (w * w + x * x + y * y + z * z)
+    matrices = np.tile(np.eye(4), (len(poses), 1, 1))
+    matrices[:, 0, :3] = np.stack([1 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)], -1)
+    matrices[:, 1, :3] = np.stack([s * (x * y + w * z), 1 - s * (x * x + z * z), s * (y * z - w * x)], -1)
+    matrices[:, 2, :3] = np.stack([s * (x * z - w * y), s * (y * z + w * x), 1 - s * (x * x + y * y)], -1)
+    matrices[:, :3, 3] = at
+    return matrices
 
 
 def _pose(pose: ArrayLike | None, position: ArrayLike | None) -> list[float]:

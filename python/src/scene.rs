@@ -7,10 +7,12 @@ use crate::process::{self, LazyCaster, lock};
 use crate::sensor::Sensor;
 use formats::scan::Attribute;
 use glam::{DMat3, DQuat, DVec3};
+use numpy::ndarray::{Array2, ArrayView1};
+use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use sim_gpu::Pose;
 use sim_gpu::internals::scene::check_object;
+use sim_gpu::{Moves, Pose};
 use std::path::PathBuf;
 use std::sync::Mutex;
 
@@ -114,6 +116,35 @@ impl Scene {
         arrays::scan(py, scan.map_err(raised)?.points)
     }
 
+    /// The ranges and objects of the sensor's beams from each pose, `[n, n_beams]`; `moved` has the poses
+    /// of the instances of these `numbers` for each pose.
+    fn cast<'py>(
+        &self,
+        py: Python<'py>,
+        sensor: &Sensor,
+        poses: PyReadonlyArray2<'py, f64>,
+        numbers: Vec<usize>,
+        moved: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<(Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u32>>)> {
+        let scene = lock(&self.scene).clone();
+        let ids: Vec<_> = scene.ids().collect();
+        let missing = |number: &usize| {
+            let n = ids.len();
+            raised(format!("expected the number of one of {n} instances, found {number}"))
+        };
+        let id = |number: &usize| ids.get(*number).copied().ok_or_else(|| missing(number));
+        let instances = numbers.iter().map(id).collect::<PyResult<Vec<_>>>()?;
+        let (poses, moved) = (poses_of("poses", &poses)?, poses_of("move", &moved)?);
+        sensor.sensor.rays(&scene.effects).map_err(raised)?;
+        let moves = Moves { instances: &instances, poses: &moved };
+        let batch = process::run(py, || scene.cast(&sensor.sensor, &poses, moves))?;
+        let (batch, shape) =
+            (batch.map_err(raised)?, (poses.len(), sensor.sensor.directions().len()));
+        let ranges = Array2::from_shape_vec(shape, batch.range_m).map_err(raised)?;
+        let objects = Array2::from_shape_vec(shape, batch.object).map_err(raised)?;
+        Ok((ranges.into_pyarray(py), objects.into_pyarray(py)))
+    }
+
     /// Scan it by each of the sensors of its file.
     fn scan_all<'py>(&self, py: Python<'py>, adapter: &str) -> PyResult<Vec<NamedScan<'py>>> {
         let (caster, scene) = (LazyCaster::new(adapter).open()?, lock(&self.scene).clone());
@@ -164,17 +195,40 @@ fn view([distance_m, elevation_deg, azimuth_deg]: [f64; 3]) -> PyResult<Pose> {
     Ok(Pose::looking_at_origin_deg(distance_m, elevation_deg, azimuth_deg))
 }
 
+/// The poses of matrices, one in each row; errors call the array `name`.
+fn poses_of(name: &str, rows: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Pose>> {
+    let rows = rows.as_array();
+    let pose = |(i, row): (usize, ArrayView1<'_, f64>)| {
+        let numbers: [f64; 16] = std::array::from_fn(|at| row[at]);
+        rigid(&numbers).map_err(|cause| raised(format!("{name}[{i}]: {cause}")))
+    };
+    rows.rows().into_iter().enumerate().map(pose).collect()
+}
+
 /// The pose of a matrix, row by row.
 fn pose_of(rows: &[f64; 16]) -> PyResult<Pose> {
+    rigid(rows).map_err(|cause| raised(format!("pose: {cause}")))
+}
+
+/// The pose of a matrix, row by row; or what it lacks.
+fn rigid(rows: &[f64; 16]) -> Result<Pose, String> {
     let [a, b, c, x, d, e, f, y, g, h, i, z, 0.0, 0.0, 0.0, 1.0] = *rows else {
-        let cause = "pose: expected a matrix of shape [4, 4] whose last row is 0, 0, 0, 1";
-        return Err(raised(cause));
+        let last = &rows[12..];
+        return Err(format!("expected a matrix whose last row is 0, 0, 0, 1, found {last:?}"));
     };
+    if let Some(number) = [x, y, z].into_iter().find(|number| !number.is_finite()) {
+        return Err(format!("expected a position of finite metres, found {number}"));
+    }
     let rotation = DMat3::from_cols_array(&[a, d, g, b, e, h, c, f, i]);
-    let is_rotation = (rotation * rotation.transpose()).abs_diff_eq(DMat3::IDENTITY, 1e-6)
-        && rotation.determinant() > 0.0;
+    let off = rotation * rotation.transpose() - DMat3::IDENTITY;
+    let off = off.to_cols_array().into_iter().map(f64::abs).fold(0.0, f64::max);
+    let is_rotation = off <= 1e-6 && rotation.determinant() > 0.0;
     if !is_rotation {
-        return Err(raised("pose: expected a rotation in the first three rows and columns"));
+        return Err(format!(
+            "expected a rotation in the first three rows and columns, found one that is off by {off:.2e}, \
+             with determinant {:.4}",
+            rotation.determinant()
+        ));
     }
     let rotation = DQuat::from_mat3(&rotation).normalize();
     Ok(Pose { position_m: DVec3::new(x, y, z), rotation })

@@ -53,7 +53,8 @@ mod target;
 mod weather;
 
 pub use api::{
-    Caster, Error, Instance, InstanceId, Mesh, MountedSensor, Scan, ScanBuilder, Scene, Sensor,
+    Batch, Caster, Error, Instance, InstanceId, Mesh, MountedSensor, Moves, NO_OBJECT, Scan,
+    ScanBuilder, Scene, Sensor,
 };
 pub use effects::Effects;
 pub use formats;

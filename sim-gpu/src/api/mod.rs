@@ -1,5 +1,6 @@
 //! The types that the root shows, over the modules that do the work.
 
+mod batch;
 mod caster;
 mod error;
 mod mesh;
@@ -10,6 +11,7 @@ mod scene;
 mod scene_file;
 mod sensor;
 
+pub use batch::{Batch, Moves, NO_OBJECT};
 pub use caster::Caster;
 pub use error::Error;
 pub use mesh::Mesh;

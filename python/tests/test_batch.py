@@ -1,0 +1,83 @@
+"""`Scene.cast`: ranges from many poses, each in a world of its own."""
+
+import numpy as np
+import pytest
+
+import edgepuck as ep
+
+SENSOR = ep.Sensor("vlp16")
+N = len(SENSOR.directions)
+
+
+def world() -> tuple[ep.Scene, int]:
+    """A room of 8 m by 6 m by 4 m around the sensor, and a box in it."""
+    scene = ep.Scene()
+    scene.add(ep.Mesh(*ep.box((8, 6, 4)), normalize="none"))
+    return scene, scene.add(ep.Mesh(*ep.box((0.5, 0.5, 0.5)), normalize="none"), position=(2, 0, 0))
+
+
+def at(*position: float) -> np.ndarray:
+    pose = np.eye(4)
+    pose[:3, 3] = position
+    return pose
+
+
+def test_a_row_is_the_scan_of_its_own_world() -> None:
+    scene, box = world()
+    poses = np.stack([at(0, 0.2 * i, 0) for i in range(4)])
+    of_each = np.stack([[at(1 + 0.5 * i, 0, 0)] for i in range(4)])
+    batch = scene.cast(SENSOR, poses, move=([box], of_each))
+    assert batch.ranges.shape == batch.object.shape == (4, N)
+    assert batch.ranges.dtype == np.float32
+    for i in range(4):
+        alone, moved = world()
+        alone.move(moved, of_each[i, 0])
+        scan = alone.scan(SENSOR, pose=poses[i])
+        ranges, objects = np.full(N, np.inf, np.float32), np.full(N, -1)
+        ranges[scan.beam], objects[scan.beam] = scan.range, scan.object
+        np.testing.assert_array_equal(batch.ranges[i], ranges)
+        np.testing.assert_array_equal(batch.object[i], objects)
+    # The walls of the room are 4, 3 and 2 m off, so that every beam ends on the nearest.
+    from_middle = scene.cast(SENSOR, np.eye(4)[None], move=([box], at(50, 0, 0)[None, None])).ranges[0]
+    expected = (np.array([4, 3, 2]) / np.maximum(np.abs(SENSOR.directions), 1e-9)).min(axis=1)
+    np.testing.assert_allclose(from_middle, expected, rtol=1e-6)
+
+
+def test_quaternions_are_poses_too() -> None:
+    scene, _ = world()
+    half = np.sqrt(0.5)
+    turned = np.array([[0.0, -1, 0, 1], [1, 0, 0, 0.5], [0, 0, 1, 0], [0, 0, 0, 1]])
+    both = [scene.cast(SENSOR, [turned]), scene.cast(SENSOR, [[1, 0.5, 0, half, 0, 0, half]])]
+    np.testing.assert_allclose(both[0].ranges, both[1].ranges, rtol=1e-6)
+
+
+def test_the_image_has_a_row_for_each_ring() -> None:
+    scene, _ = world()
+    batch = scene.cast(SENSOR, np.eye(4)[None])
+    image = batch.range_image()
+    counts = np.bincount(SENSOR.rings)
+    assert image.shape == (1, 16, counts.max()) and counts.min() < counts.max()
+    for ring in (0, 7, 15):
+        of_ring = np.flatnonzero(SENSOR.rings == ring)
+        in_time = of_ring[np.argsort(SENSOR.times[of_ring])]
+        np.testing.assert_array_equal(image[0, ring, : len(in_time)], batch.ranges[0, in_time])
+        assert np.isinf(image[0, ring, len(in_time) :]).all()
+
+
+@pytest.mark.parametrize(
+    ("poses", "move", "message"),
+    [
+        (np.eye(4), None, "poses: expected shape [n, 4, 4] or [n, 7], found [4, 4]"),
+        (2 * np.eye(4)[None], None, "poses[0]: expected a matrix whose last row is 0, 0, 0, 1, found [0.0, 0.0, 0.0, 2.0]"),
+        (np.diag([2.0, 1, 1, 1])[None], None, "poses[0]: expected a rotation in the first three rows and columns, found"),
+        ([[0, 0, 0, 1, 1, 0, 0]], None, "poses[0]: expected a quaternion of length 1"),
+        ([[0, 0, 0, np.nan, 0, 0, 0]], None, "poses[0]: expected a quaternion of length 1"),
+        (np.eye(4)[None], ([1], np.eye(4)[None]), "move: expected shape [1, 1, 4, 4] or [1, 1, 7]"),
+        (np.eye(4)[None], ([5], np.eye(4)[None, None]), "one of 2 instances, found 5"),
+    ],
+)
+def test_what_does_not_fit_is_named(poses, move, message: str) -> None:
+    scene, _ = world()
+    with pytest.raises(ep.Error) as caught:
+        scene.cast(SENSOR, poses, move=move)
+    assert message in str(caught.value)
