@@ -111,7 +111,7 @@ proptest! {
     ) {
         let start = if begins_as_off { &b"OFF\n3 1 0\n"[..] } else { b"" };
         let content = [start, &bytes].concat();
-        for format in [MeshFormat::Off, MeshFormat::Obj, MeshFormat::Ply, MeshFormat::Stl] {
+        for format in MeshFormat::ALL {
             if let Ok(parsed) = parse(&content, format) {
                 let n_vertices = parsed.mesh.vertices.len();
                 prop_assert!(parsed.mesh.triangles.iter().flatten().all(|&i| (i as usize) < n_vertices));

@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub struct Args {
-    /// Scene file (TOML), or meshes (OBJ, OFF, PLY or STL) where their files have them [default: two
+    /// Scene file (TOML), or meshes (OBJ, OFF, PLY, STL, glTF) where their files have them [default: two
     /// chairs, written to data/default-scene for you to edit]
     #[arg(value_name = "SCENE|MESH...")]
     inputs: Vec<PathBuf>,
@@ -179,8 +179,9 @@ fn scene(args: &Args) -> anyhow::Result<(Scene, String)> {
         [_, ..] => {
             let other = args.inputs.iter().find(|file| !is_mesh(file));
             let other = other.map(|file| file.display().to_string()).unwrap_or_default();
-            let cause =
-                format!("expected one scene, or meshes (.obj, .off, .ply, .stl), found {other}");
+            let cause = format!(
+                "expected one scene, or meshes (.obj, .off, .ply, .stl, .glb, .gltf), found {other}"
+            );
             return Err(Usage(cause).into());
         }
     };
@@ -195,7 +196,7 @@ fn scene(args: &Args) -> anyhow::Result<(Scene, String)> {
             true => "no extension".to_owned(),
             false => format!("the extension .{}", extension.display()),
         };
-        let cause = "expected a mesh (.obj, .off, .ply, .stl) or a scene (.toml)";
+        let cause = "expected a mesh (.obj, .off, .ply, .stl, .glb, .gltf) or a scene (.toml)";
         return Err(Usage(format!("{what}: {cause}, found {found}")).into());
     }
     if let Some(flag) = args.meshes.given().or(args.effects.given()) {

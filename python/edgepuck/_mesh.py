@@ -21,7 +21,7 @@ class Mesh(Remade):
     """A triangle mesh, z up.
 
     Args:
-        source: The path of an OBJ, OFF, PLY or STL file; vertices, of shape [n, 3]; or anything
+        source: The path of an OBJ, OFF, PLY, STL or glTF file; vertices, of shape [n, 3]; or anything
             with `vertices` and `faces`, such as a mesh of trimesh.
         faces: The indices of each triangle's vertices, of shape [m, 3], if `source` is vertices.
         normalize: `unit-sphere` moves the mean of the vertices to the origin and scales the

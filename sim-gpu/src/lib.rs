@@ -4,7 +4,7 @@
 //! use sim_gpu::{Caster, Mesh, Pose, Scene, Sensor};
 //!
 //! let mut scene = Scene::new();
-//! // A mesh (OBJ, OFF, PLY or STL), scaled to the unit sphere around the origin.
+//! // A mesh (OBJ, OFF, PLY, STL or glTF), scaled to the unit sphere around the origin.
 //! scene.add(Mesh::read("chair.obj")?.unit_sphere(), Pose::IDENTITY);
 //! // A sensor 3 m away, 20 degrees above the horizon, that looks at the origin.
 //! let sensor = Sensor::named("vlp32c")?;

@@ -407,7 +407,7 @@ fn what_cannot_be_used_is_named_and_nothing_is_written() {
             ("gen-scenes street --sensor vlp99 --out out", "vlp99"),
             (
                 "gen-scenes own.toml --out out",
-                "chairs: expected a folder with OBJ, OFF, PLY or STL files",
+                "chairs: expected a folder with OBJ, OFF, PLY, STL or glTF files",
             ),
             ("gen-scenes own.toml --meshes . --out out", "chairs: expected a folder with OBJ"),
             (

@@ -36,7 +36,7 @@ const DEFAULT_OUT: &str = "data/lidar-shapes";
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Folder of OBJ, OFF, PLY and STL files, as CLASS/{train,test}/NAME or in any other layout
+    /// Folder of OBJ, OFF, PLY, STL and glTF files, as CLASS/{train,test}/NAME or in any other layout
     /// [default: built-in procedural shapes, written to data/default-shapes-SEED]
     #[arg(value_name = "MESHES")]
     meshes: Option<PathBuf>,

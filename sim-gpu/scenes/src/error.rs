@@ -20,7 +20,7 @@ pub enum SceneError {
         file: PathBuf,
     },
     /// The recipe uses a folder of meshes that holds none.
-    #[error("{}: expected a folder with OBJ, OFF, PLY or STL files, {cause}", folder.display())]
+    #[error("{}: expected a folder with OBJ, OFF, PLY, STL or glTF files, {cause}", folder.display())]
     NoMeshes {
         /// The folder.
         folder: PathBuf,

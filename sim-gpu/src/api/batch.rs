@@ -173,7 +173,7 @@ mod tests {
     fn moves_that_do_not_fit_are_refused() {
         let (scene, moving) = world();
         let mut larger = scene.clone();
-        let other = larger.add(&scene[moving].mesh.clone(), Pose::IDENTITY);
+        let other = larger.add(scene[moving].mesh.clone(), Pose::IDENTITY);
         let sensor = Sensor::named("vlp16").unwrap();
         for (instances, n, expected) in [
             ([moving], 1, "moves.poses: expected 2 times 1 poses, 2, found 1"),

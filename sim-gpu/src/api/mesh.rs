@@ -50,7 +50,7 @@ struct Ready {
 }
 
 impl Mesh {
-    /// Reads an OBJ, OFF, PLY or STL file. An OBJ file's y axis points up, the z axis of all
+    /// Reads an OBJ, OFF, PLY, STL or glTF file. The y axis of OBJ and glTF points up, the z axis of all
     /// others. The file's unit is taken for a metre, and the mesh stays where the file has it.
     ///
     /// # Errors

@@ -19,6 +19,10 @@ formats::named! {
         Ply = "ply",
         /// Stereolithography, ASCII or binary.
         Stl = "stl",
+        /// glTF 2.0 in one binary file.
+        Glb = "glb",
+        /// glTF 2.0 as JSON, with its buffers in it or beside it.
+        Gltf = "gltf",
     }
 }
 
@@ -31,18 +35,18 @@ impl MeshFormat {
     }
 
     /// The axis that points up in most files of this format: z in OFF (ModelNet), STL and PLY
-    /// (CAD), y in OBJ.
+    /// (CAD), y in OBJ and, by its specification, in glTF.
     #[must_use]
     pub fn default_up(self) -> Up {
         match self {
             Self::Off | Self::Ply | Self::Stl => Up::Z,
-            Self::Obj => Up::Y,
+            Self::Obj | Self::Glb | Self::Gltf => Up::Y,
         }
     }
 }
 
 /// The extensions of all mesh formats, in lower case, without dots.
 #[must_use]
-pub fn mesh_extensions() -> [&'static str; 4] {
+pub fn mesh_extensions() -> [&'static str; 6] {
     MeshFormat::ALL.map(MeshFormat::name)
 }

@@ -11,7 +11,7 @@ use super::error::{Malformed, MeshError, ParseError};
 use super::format::MeshFormat;
 use super::tokens::without_mark;
 use super::triangle_mesh::{Parsed, TriangleMesh};
-use super::{obj, off, ply, stl};
+use super::{gltf, obj, off, ply, stl};
 
 /// A mesh as in its file, with the properties of the file.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,16 +41,23 @@ pub fn load_hashed(
         MeshFormat::from_path(path).ok_or_else(|| MeshError::UnknownFormat { path: path.into() });
     let bytes = read(path)?;
     let format = format?;
-    let Parsed { mesh, dropped_faces, warnings, .. } = parse(&bytes, format).map_err(|error| {
+    let parsed = parse_in(&bytes, format, path.parent());
+    let Parsed { mesh, dropped_faces, warnings, .. } = parsed.map_err(|error| {
         MeshError::Malformed { path: path.into(), line: error.line, cause: error.cause }
     })?;
     Ok((LoadedMesh { mesh, format, dropped_faces, warnings }, hashing.of_bytes(&bytes)))
 }
 
-/// Reads a mesh of `format` from a file's bytes.
+/// Reads a mesh of `format` from a file's bytes, which need no other file.
 pub fn parse(bytes: &[u8], format: MeshFormat) -> Result<Parsed, ParseError> {
-    let mut parsed = parse_as(bytes, format).map_err(|error| {
-        let is_other = |other: &MeshFormat| *other != format && parse_as(bytes, *other).is_ok();
+    parse_in(bytes, format, None)
+}
+
+/// As [`parse`], with the files in `folder` that this one names.
+fn parse_in(bytes: &[u8], format: MeshFormat, folder: Option<&Path>) -> Result<Parsed, ParseError> {
+    let mut parsed = parse_as(bytes, format, folder).map_err(|error| {
+        let is_other =
+            |other: &MeshFormat| *other != format && parse_as(bytes, *other, folder).is_ok();
         let expected = format.name().to_uppercase();
         match (foreign(bytes), MeshFormat::ALL.into_iter().find(is_other)) {
             (Some(found), _) => Malformed::Syntax(format!("expected a mesh, found {found}")).into(),
@@ -67,7 +74,7 @@ pub fn parse(bytes: &[u8], format: MeshFormat) -> Result<Parsed, ParseError> {
     Ok(parsed)
 }
 
-fn parse_as(bytes: &[u8], format: MeshFormat) -> Result<Parsed, ParseError> {
+fn parse_as(bytes: &[u8], format: MeshFormat, folder: Option<&Path>) -> Result<Parsed, ParseError> {
     let text = without_mark(bytes);
     let parsed = match format {
         _ if bytes.is_empty() => Err(Malformed::Empty.into()),
@@ -75,6 +82,7 @@ fn parse_as(bytes: &[u8], format: MeshFormat) -> Result<Parsed, ParseError> {
         MeshFormat::Obj => obj::parse(text),
         MeshFormat::Ply => ply::parse(text),
         MeshFormat::Stl => stl::parse(bytes),
+        MeshFormat::Glb | MeshFormat::Gltf => gltf::parse(bytes, folder),
     };
     parsed.and_then(|parsed| check(&parsed.mesh).map(|()| parsed))
 }
@@ -161,7 +169,7 @@ mod tests {
         assert_eq!(message("folder.off"), "folder.off: expected a mesh file, found a directory");
         assert_eq!(message("empty.off"), "empty.off: the file is empty");
         assert_eq!(message("bad.off"), "bad.off:3: expected a finite coordinate, found \"nan\"");
-        let extension = "notes.txt: expected one of the extensions off, obj, ply, stl";
+        let extension = "notes.txt: expected one of the extensions off, obj, ply, stl, glb, gltf";
         assert_eq!(message("notes.txt"), extension);
         assert!(message("missing.off").starts_with("missing.off: cannot be read: "));
     }

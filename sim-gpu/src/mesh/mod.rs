@@ -4,6 +4,7 @@ mod appearance;
 mod error;
 mod format;
 pub mod frame;
+mod gltf;
 mod load;
 mod obj;
 mod off;

@@ -23,9 +23,9 @@ const TRAIN_SHARE: f64 = 0.8;
 const LONGEST_NAME: usize = 180;
 
 /// The extensions of files that probably hold meshes, too: of other formats, and compressed.
-const OTHER_FORMATS: [&str; 24] = [
-    "3ds", "3mf", "7z", "blend", "brep", "bz2", "dae", "dxf", "fbx", "glb", "gltf", "gz", "iges",
-    "igs", "step", "stp", "tar", "usd", "usdz", "vtk", "wrl", "x3d", "xz", "zip",
+const OTHER_FORMATS: [&str; 22] = [
+    "3ds", "3mf", "7z", "blend", "brep", "bz2", "dae", "dxf", "fbx", "gz", "iges", "igs", "step",
+    "stp", "tar", "usd", "usdz", "vtk", "wrl", "x3d", "xz", "zip",
 ];
 
 /// The hexadecimal digits of the hash that distinguishes equal names.
@@ -598,7 +598,7 @@ mod tests {
     fn an_empty_or_missing_tree_is_named() {
         let (_folder, root) = tree(&["a/readme.txt"]);
         let message = discover(&root, 1).unwrap_err().to_string();
-        let expected = "data: no mesh found; looked for *.off, *.obj, *.ply, *.stl";
+        let expected = "data: no mesh found; looked for *.off, *.obj, *.ply, *.stl, *.glb, *.gltf";
         assert!(message.ends_with(expected), "{message}");
         let message = discover(&root.join("nowhere"), 1).unwrap_err().to_string();
         assert!(message.contains("nowhere: cannot be read: "), "{message}");
@@ -757,9 +757,9 @@ mod tests {
                 &["name of a split"],
             ),
             (
-                &[&sound[..], &["a/train/1.binvox", "b/3.glb", "c/train/a.STEP", "c/b.obj.gz"]]
+                &[&sound[..], &["a/train/1.binvox", "b/3.fbx", "c/train/a.STEP", "c/b.obj.gz"]]
                     .concat(),
-                &["3 files are ignored (.glb, .gz, .step); the class c has no mesh"],
+                &["3 files are ignored (.fbx, .gz, .step); the class c has no mesh"],
             ),
             (&ids, &["3 classes have 6 meshes"]),
             (&["train/a/1.off", "train/b/2.off", "test/a/3.off", "test/b/4.off"], &[]),

@@ -13,7 +13,7 @@ use std::fs;
 
 fuzz_target!(|bytes: &[u8]| {
     let Some((choice, content)) = bytes.split_first() else { return };
-    let Some(format) = MeshFormat::ALL.get(usize::from(choice % 5)) else {
+    let Some(format) = MeshFormat::ALL.get(usize::from(choice % 7)) else {
         return load_materials(content);
     };
     let Ok(parsed) = parse(content, *format) else { return };
