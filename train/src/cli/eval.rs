@@ -123,7 +123,7 @@ fn report_clouds(
     let numbers: Option<Vec<usize>> = clouds.classes.iter().map(by_name).collect();
     if let Some(numbers) = numbers {
         for label in &mut clouds.set.labels {
-            *label = numbers[*label as usize] as _;
+            *label = numbers[*label];
         }
         clouds.classes = names.to_vec();
     } else if names.starts_with(&clouds.classes) {
