@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -12,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _edgepuck, _scanning
 from ._arguments import whole
-from ._mesh import Mesh, native
+from ._mesh import Axis, Mesh, native
 from ._scan import Scan, scan_of
 from ._sensor import Sensor
 from ._sensor import native as sensor_of
@@ -50,6 +51,47 @@ class Scene:
         scene._file = os.path.abspath(file)
         scene._scene = _edgepuck.Scene.read(os.fspath(file))
         return scene
+
+    @classmethod
+    def of(cls, scene: Any, *, up: Axis = "z") -> Scene:
+        """The nodes of a `trimesh.Scene`, which reads glTF, DAE, 3MF and others, as instances.
+
+        Each node that has a mesh is an instance: its `name` is that of the node, and its `label` that of
+        the geometry. Nodes with one geometry share its data. Metres are taken for the unit.
+
+        Args:
+            scene: The scene, or anything with `graph.nodes_geometry` and `geometry` as trimesh has them.
+            up: The axis of the scene that points up, y or z: y in glTF.
+
+        Raises:
+            Error: There is no node with a mesh.
+        """
+        if up not in ("y", "z"):
+            raise _edgepuck.Error(f"up: expected one of y, z, found {up!r}")
+        found, meshes = cls(), {}
+        for node in scene.graph.nodes_geometry:
+            matrix, name = scene.graph[node]
+            geometry = scene.geometry[name]
+            if not hasattr(geometry, "faces"):
+                warnings.warn(f"{node}: left out, since it has no faces", stacklevel=2)
+                continue
+            # The basis turns (x, y, z) to (x, -z, y), as for meshes of files.
+            matrix = (_Y_UP if up == "y" else np.eye(4)) @ np.asarray(matrix, dtype=np.float64)
+            scale = np.linalg.norm(matrix[:3, :3], axis=0)
+            pose = matrix.copy()
+            pose[:3, :3] /= np.where(scale > 0, scale, 1)
+            off = np.abs(pose[:3, :3].T @ pose[:3, :3] - np.eye(3)).max()
+            if off < 1e-6 and np.linalg.det(pose[:3, :3]) > 0:
+                if name not in meshes:
+                    meshes[name] = Mesh(geometry, normalize="none")
+                found.add(meshes[name], _nearest_rotation(pose), scale=scale, name=node, label=name)
+            else:
+                # A mirror image or a sheared one is a mesh of its own.
+                corners = np.asarray(geometry.vertices) @ matrix[:3, :3].T + matrix[:3, 3]
+                found.add(Mesh(corners, geometry.faces, normalize="none"), name=node, label=name)
+        if len(found) == 0:
+            raise _edgepuck.Error("expected a scene with meshes, found none")
+        return found
 
     def __len__(self) -> int:
         """The number of instances."""
@@ -282,6 +324,19 @@ def _matrices(name: str, poses: NDArray[np.float64]) -> NDArray[np.float64]:
     matrices[:, 2, :3] = np.stack([s * (x * z - w * y), s * (y * z + w * x), 1 - s * (x * x + y * y)], -1)
     matrices[:, :3, 3] = at
     return matrices
+
+
+# (x, y, z) to (x, -z, y).
+_Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
+
+
+def _nearest_rotation(pose: NDArray[np.float64]) -> NDArray[np.float64]:
+    """`pose` with a rotation to the last bit: products of transforms drift from it."""
+    u, _, vt = np.linalg.svd(pose[:3, :3])
+    rigid = pose.copy()
+    rigid[:3, :3] = u @ vt
+    rigid[3] = [0, 0, 0, 1]
+    return rigid
 
 
 def _pose(pose: ArrayLike | None, position: ArrayLike | None) -> list[float]:
