@@ -1,9 +1,9 @@
 //! The command line of `edgepuck`, for the program and for the Python package.
 
 use crate::{
-    Outcome, adapters, card, cluster, corrupt, gen_dataset, gen_drive, gen_scenes, gen_shapes,
-    merge_dataset, outcome, preview_scan, profile, sample_surfaces, scan, segment, signals,
-    weather,
+    Outcome, adapters, calibrate, card, cluster, corrupt, gen_dataset, gen_drive, gen_scenes,
+    gen_shapes, merge_dataset, outcome, preview_scan, profile, sample_surfaces, scan, segment,
+    signals, weather,
 };
 #[cfg(feature = "models")]
 use crate::{advise, detect, export_onnx, import_weights};
@@ -46,6 +46,8 @@ enum Command {
     Preview(preview_scan::Args),
     /// List the built-in sensors, or check and describe a sensor profile
     Profile(profile::ProfileArgs),
+    /// Measure a sensor from captures or sweeps at rest, and write its profile
+    Calibrate(calibrate::CalibrateArgs),
     /// List the adapters (GPUs and CPU) that can cast rays
     Adapters,
     /// Merge the shards of a dataset into one dataset
@@ -132,6 +134,7 @@ fn run(command: &Command) -> anyhow::Result<Outcome> {
         Command::Detect(args) => detect::run(args),
         Command::Preview(args) => preview_scan::run(args),
         Command::Profile(args) => profile::run(args),
+        Command::Calibrate(args) => calibrate::run(args),
         Command::Adapters => adapters::run(),
         Command::MergeDataset(args) => merge_dataset::run(args),
         Command::Card(args) => card::run(args),

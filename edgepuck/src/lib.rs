@@ -4,6 +4,7 @@ mod adapters;
 #[cfg(feature = "models")]
 mod advise;
 mod brightness;
+mod calibrate;
 mod card;
 mod caster;
 pub mod cli;

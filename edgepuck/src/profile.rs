@@ -80,7 +80,14 @@ fn described(sensor: &SensorProfile, pattern: &BeamPattern) -> String {
     let quantum = range.quantum_m.map(|m| format!(", in steps of {m} m")).unwrap_or_default();
     line("range", format!("{} to {} m{quantum}", range.min_m, range.max_m));
     let stated = |found: Option<String>| found.unwrap_or_else(|| "not stated".to_owned());
-    line("noise", stated(sensor.noise.map(|noise| format!("{} m", noise.typical_sigma_m))));
+    let measured = |m| format!(", {m} m from turn to turn");
+    line(
+        "noise",
+        stated(sensor.noise.map(|noise| {
+            let measured = noise.repeatability_m.map(measured).unwrap_or_default();
+            format!("{} m{measured}", noise.typical_sigma_m)
+        })),
+    );
     line(
         "detects",
         stated(sensor.detection.map(|limit| {

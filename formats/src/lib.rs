@@ -84,6 +84,9 @@ pub mod streams;
 #[doc(hidden)]
 pub mod trajectory;
 #[doc(hidden)]
+#[cfg(feature = "pcap")]
+pub mod turns;
+#[doc(hidden)]
 #[cfg(feature = "dataset")]
 pub mod webdataset;
 #[doc(hidden)]

@@ -7,6 +7,7 @@ use std::path::Path;
 use formats::Senders;
 use formats::ouster::{Decoder, Header, Metadata, PacketError, Profile, read_frame};
 use formats::returns::{Kind, Return};
+use formats::turns::read_turns;
 use formats::velodyne;
 use proptest::prelude::*;
 use serde_json::{Value, json};
@@ -535,4 +536,42 @@ proptest! {
         let short = decoder.decode(&payload[1..], |_| ());
         prop_assert_eq!(short, Err(PacketError::Length { expected: size, found: size - 1 }));
     }
+}
+
+/// Turns are those of the returns' own azimuths, over frames and a gap of two packets.
+#[test]
+fn all_turns_of_a_capture_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("turns.pcap");
+    let metadata = parse(&flat(Profile::Dual)).unwrap();
+    let packets = (0..3).flat_map(|frame| (0..COLUMNS).step_by(4).map(move |at| (frame, at)));
+    let kept = packets.filter(|packet| ![(1, 8), (1, 12)].contains(packet));
+    let packets: Vec<_> = kept
+        .flat_map(|(frame, at)| frames(&packet(Profile::Dual, frame, at), at as u8, 1480))
+        .collect();
+    fs::write(&file, pcapng(&packets)).unwrap();
+    let mut found = Vec::new();
+    let read = read_turns(&file, Some(&metadata), &mut Senders::default(), |turned| {
+        found.push(*turned);
+        std::ops::ControlFlow::Continue(())
+    });
+    let (model, counts) = read.unwrap();
+    assert_eq!((model, counts.missing), (None, 2));
+    // One of two returns of each row.
+    assert_eq!(found.len(), (3 * usize::from(COLUMNS) - 8) * 3);
+    for turned in &found {
+        let [x, y, _] = turned.found.point_m.map(f64::from);
+        let azimuth = -y.atan2(x) / std::f64::consts::TAU;
+        assert!(((turned.turns - azimuth).rem_euclid(1.0) + 0.5).fract() - 0.5 < 1e-9);
+        // Ten turns a second, from a packet that starts behind.
+        let off = turned.turns - found[0].turns - 10.0 * turned.time_s;
+        assert!(off.abs() < 0.02, "{turned:?}: {off}");
+    }
+    let gaps = found.iter().map(|turned| turned.gaps).max();
+    assert_eq!((gaps, found[0].gaps), (Some(1), 0));
+    let error = read_turns(&file, None, &mut Senders::default(), |_| unreachable!()).unwrap_err();
+    assert!(
+        error.to_string().contains("or --metadata for an Ouster's, found none among"),
+        "{error}"
+    );
 }

@@ -4,6 +4,7 @@
 
 mod advise;
 mod bad_input;
+mod calibrate;
 mod cards;
 mod checkpoints;
 mod clusters;

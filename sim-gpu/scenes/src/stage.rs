@@ -67,7 +67,7 @@ impl Stage {
         let profiles = recipe.sensors(file)?;
         let mut sensors = Vec::with_capacity(profiles.len());
         for (choice, profile) in recipe.sensor.iter().zip(profiles) {
-            let typical_m = profile.noise.map_or(0.0, |noise| noise.typical_sigma_m);
+            let typical_m = profile.noise.map_or(0.0, |noise| noise.sigma_m());
             let sigma_m = choice.noise_m.unwrap_or(typical_m);
             let effects = Effects {
                 noise: Some(Noise { mean_m: 0.0, sigma_m, model: NoiseModel::Range }),

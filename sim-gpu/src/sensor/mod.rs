@@ -70,7 +70,7 @@ pub struct SensorProfile {
     pub sources: Vec<String>,
     /// The ranges it measures.
     pub range: RangeLimits,
-    /// The typical noise that the maker states, applied only on request.
+    /// The noise, applied only on request.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub noise: Option<TypicalNoise>,
     /// The detection limit, applied only with the detection effect.
@@ -116,12 +116,25 @@ pub struct RangeLimits {
     pub quantum_m: Option<f64>,
 }
 
-/// The noise that the maker of a sensor states.
+/// The noise of a sensor: what its maker states, and what was measured.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TypicalNoise {
-    /// Standard deviation of the range in metres.
+    /// Standard deviation of the range in metres: the accuracy that the maker states.
     pub typical_sigma_m: f64,
+    /// Standard deviation of the range from turn to turn, metres, if it was measured:
+    /// `edgepuck calibrate` does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub repeatability_m: Option<f64>,
+}
+
+impl TypicalNoise {
+    /// The standard deviation of simulated ranges where a recipe states none, metres: the measured
+    /// one, or else that of the maker.
+    #[must_use]
+    pub fn sigma_m(&self) -> f64 {
+        self.repeatability_m.unwrap_or(self.typical_sigma_m)
+    }
 }
 
 /// The arrangement of the beams.

@@ -80,6 +80,7 @@ impl Profile {
             _ => Ok(()),
         };
         let sigma_m = profile.noise.map(|noise| noise.typical_sigma_m);
+        let repeatability_m = profile.noise.and_then(|noise| noise.repeatability_m);
         let layout = only_layout([
             profile.rotating.map(Layout::Rotating),
             profile.uniform.map(Layout::Uniform),
@@ -91,6 +92,7 @@ impl Profile {
             name,
             check_range(&profile.range),
             within("noise.typical_sigma_m", sigma_m, 0.0..=f64::MAX),
+            within("noise.repeatability_m", repeatability_m, 0.0..=f64::MAX),
             profile.detection.map_or(Ok(()), |limit| limit.validate("detection")),
             profile.footprint.map_or(Ok(()), |footprint| footprint.validate("footprint")),
             profile.rings.as_ref().map_or(Ok(()), Rings::validate),
