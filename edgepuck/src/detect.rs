@@ -1,12 +1,11 @@
 //! `edgepuck detect`: detects and classifies the objects of a sweep.
 
-mod rule;
-
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use edgepuck_segment::{Hierarchy, Label, Node, OrientedBox, Segmenter, Settings, Sweep};
 use formats::{Scan, atomic};
+use infer_cpu::rule::{MARGIN_OF_WHOLES, Rule, WIDEST_M};
 use infer_cpu::{Classifier, ClassifierTeam, Options, Precision, Prediction};
 use plotters::style::RGBColor;
 use serde_json::{Value, json};
@@ -19,7 +18,6 @@ use crate::segment::tint;
 use crate::street::StreetClass;
 use crate::{Outcome, Usage, preview};
 use formats::outputs::{Overwrite, need_extension};
-use rule::{MARGIN_OF_WHOLES, Rule, WIDEST_M};
 
 /// The least confidence of an object, chosen by the false alarms on labelled sweeps
 /// (assets/reports/reality/frames.md).

@@ -57,6 +57,7 @@ mod options;
 mod precision;
 mod prediction;
 mod prefilter;
+pub mod rule;
 pub mod sampler;
 mod selection;
 mod source;

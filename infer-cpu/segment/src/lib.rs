@@ -16,9 +16,9 @@
 //! The points are sorted into a range image by ring and azimuth. In each column, the ground is
 //! followed from the lowest ring up. The ground returns give a polar grid of heights; every point
 //! just above that grid is ground. The other points are linked to their neighbours in the image,
-//! and linked points form a cluster. A [`Segmenter`] does this for whole sweeps, a [`Stream`] for
-//! returns as they arrive. Clouds without the structure of a scan are cut into connected components
-//! instead.
+//! and linked points form a cluster. A [`Segmenter`] does this for whole sweeps. It also links them
+//! by steps of several widths, to a [`Hierarchy`], and a [`Stream`] does so for returns as they
+//! arrive. Clouds without the structure of a scan are cut into connected components instead.
 
 mod angle;
 mod axes;
@@ -40,11 +40,11 @@ mod stream;
 mod sweep;
 
 pub use axes::doubtful_axes;
-pub use hierarchy::{Hierarchy, Node};
+pub use hierarchy::{BestCut, Hierarchy, Node};
 pub use label::Label;
 pub use oriented_box::OrientedBox;
 pub use segmentation::{Cluster, Segmentation};
 pub use segmenter::Segmenter;
 pub use settings::{Settings, SettingsError};
-pub use stream::{Dropped, Stream, StreamCluster};
+pub use stream::{Dropped, Stream, StreamCluster, StreamNode};
 pub use sweep::{SegmentError, Sweep};

@@ -44,8 +44,7 @@ pub fn link_column(image: &impl Cells, column: usize, settings: &Settings, links
 }
 
 /// The distances within which returns are linked.
-#[derive(Clone, Copy)]
-pub struct Limits {
+struct Limits {
     /// The width of a column, radians.
     column_width: f32,
     reach_m: f32,
@@ -53,7 +52,7 @@ pub struct Limits {
 }
 
 impl Limits {
-    pub fn new(settings: &Settings) -> Self {
+    fn new(settings: &Settings) -> Self {
         let column_width = settings.column_width_deg.to_radians();
         Self { column_width, reach_m: settings.reach_m, bridge_m: settings.bridge_m }
     }
@@ -64,17 +63,6 @@ impl Limits {
         let spacing_m = range_m * self.column_width;
         let limit_m = self.reach_m + spacing_m;
         (limit_m, ((limit_m / spacing_m) as usize).clamp(1, MOST_COLUMNS))
-    }
-
-    /// The most columns of lower numbers from which a return at this horizontal distance can be
-    /// linked.
-    ///
-    /// A return at the distance r' links over d(r') = reach + r' w, w being the width of a column.
-    /// The two distances differ by at most d(r'), so r' >= (r - reach) / (1 + w). The nearer a
-    /// return is, the more columns it searches. The factor 0.999 covers rounding.
-    pub fn most_columns(&self, range_m: f32) -> usize {
-        let nearest_m = 0.999 * (range_m - self.reach_m) / (1.0 + self.column_width);
-        if nearest_m > 0.0 { self.aside(nearest_m).1 } else { MOST_COLUMNS }
     }
 }
 

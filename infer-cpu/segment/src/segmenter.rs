@@ -86,7 +86,7 @@ impl Segmenter {
         assert_eq!(worths.len(), hierarchy.len(), "worths");
         segmentation.begin_cut();
         kept.clear();
-        hierarchy.cut(worths, margin, |node| kept.push(node));
+        kept.extend_from_slice(hierarchy.cut(worths, margin));
         kept.sort_unstable_by_key(|&node| hierarchy.node(node).points.iter().min().copied());
         for &node in &*kept {
             let Node { points, ground_z_m, .. } = hierarchy.node(node);

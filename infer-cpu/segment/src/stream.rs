@@ -1,25 +1,30 @@
-//! The segmentation of a continuous stream of returns: each cluster as soon as it is complete.
+//! The hierarchy of a continuous stream of returns: each cluster as soon as it is complete.
 
 use std::f32::consts::{PI, TAU};
 use std::ops::Range;
 
 use crate::ground::{GroundFinder, sector};
 use crate::height_grid::HeightGrid;
+use crate::hierarchy::{Steps, Tree, find_steps, most_columns};
 use crate::image::{self, Cells, Columns, Return};
-use crate::link::{Limits, MOST_COLUMNS, MOST_IN_CELL, link_column};
-use crate::open_sets::{NONE, OpenSets};
+use crate::link::{MOST_COLUMNS, MOST_IN_CELL};
+use crate::open_sets::{NONE, OpenSets, STEPS_PER_POINT};
 use crate::settings::{Settings, SettingsError};
 
-/// Columns that are kept for linking: those within reach of a return, and some to spare.
-const WINDOW: usize = 64;
-const _: () = assert!(MOST_COLUMNS + 2 < WINDOW);
+/// Columns that are kept for steps: those within reach of a return, on both sides.
+const WINDOW: usize = 2 * MOST_COLUMNS + 2;
+/// How far the beams turn until the clusters of a set that is too wide for one are looked for again,
+/// degrees.
+const PATIENCE_DEG: f32 = 10.0;
 
-/// Segments the returns of a sensor that turns clockwise, as they arrive.
+/// Finds the [`Hierarchy`](crate::Hierarchy) of the returns of a sensor that turns clockwise, as they
+/// arrive, up to the clusters of [`Settings::max_size_m`].
 ///
-/// A cluster is complete, and reported, when the beams have passed it by the largest distance that
-/// links: 1.8 degrees at 10 m. The ground is that of the previous turn; the clusters of the first
-/// turn are reported at its end. A set that extends all around the sensor, such as the walls of a
-/// small room, never ends and is not a cluster.
+/// A tree of clusters is complete, and reported, when the beams have passed it by the widest step
+/// and by what the search for steps spans: 12.6 degrees at 10 m. Of what joins it to wider ones it
+/// hears within ten degrees more. The ground is that of the previous turn; the clusters of the first
+/// turn are reported at its end. What extends all around the sensor, such as the walls of a small
+/// room, never ends and is not a cluster.
 ///
 /// ```
 /// use edgepuck_segment::{Settings, Stream};
@@ -35,6 +40,7 @@ const _: () = assert!(MOST_COLUMNS + 2 < WINDOW);
 ///         stream.advance(azimuth_rad, |cluster| {
 ///             n_clusters += 1;
 ///             assert_eq!(cluster.points.len(), 16);
+///             assert_eq!(cluster.nodes[0].points, 0..16);
 ///         });
 ///         if degrees == 90 {
 ///             // A post on the right, seen by every ring.
@@ -51,7 +57,6 @@ const _: () = assert!(MOST_COLUMNS + 2 < WINDOW);
 /// ```
 pub struct Stream<T> {
     settings: Settings,
-    limits: Limits,
     /// The row of each ring.
     rows: Vec<u16>,
     /// The first column that may still get returns. Columns are counted as the sensor turns,
@@ -66,6 +71,8 @@ pub struct Stream<T> {
     waiting: Vec<u32>,
     turn: Turn,
     window: Window,
+    /// The number of columns between the newest one and that from which steps are found.
+    lag: u64,
     /// For each column of the window, the first of the points that no later column can be linked
     /// to.
     due: [u32; WINDOW],
@@ -74,22 +81,75 @@ pub struct Stream<T> {
     /// The ground of the turn before last, whose memory is reused.
     spare_ground: HeightGrid,
     column: Vec<(u16, u64, u32)>,
-    members: Vec<(u64, u32)>,
-    positions: Vec<[f32; 3]>,
-    tags: Vec<T>,
+    look: Look,
+    complete: Complete<T>,
     dropped: Dropped,
 }
 
-/// Points that belong together, in the order in which they came.
+/// Clusters that are complete, and those of which they are made: parts of a
+/// [`Hierarchy`](crate::Hierarchy).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StreamCluster<'a, T> {
     /// Metres, in the sensor's frame.
     pub points: &'a [[f32; 3]],
     /// The tag of each point.
     pub tags: &'a [T],
+    /// A node comes after those of which it is made. No node holds those without a parent.
+    pub nodes: &'a [StreamNode],
+}
+
+/// A node of a [`StreamCluster`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct StreamNode {
+    /// The places of its points.
+    pub points: Range<usize>,
+    /// The place of the smallest node that holds this one and more.
+    pub parent: Option<usize>,
+    /// Whether it is of something too wide for a cluster, such as a wall.
+    pub is_part: bool,
     /// Height of the ground under the middle of the points' bounding box, in metres in the sensor's
     /// frame; `None` where it is unknown.
     pub ground_z_m: Option<f32>,
+}
+
+/// The tree of a set. Its memory is reused.
+struct Look {
+    /// The points of the set in the order in which they came.
+    members: Vec<(u64, u32)>,
+    /// The number of each point among them.
+    numbers: Vec<u32>,
+    positions: Vec<[f32; 3]>,
+    steps: Steps,
+    tree: Tree,
+    nodes: Vec<Looked>,
+    /// For each point, whether it is still needed, and from which level on its set is too wide.
+    fates: Vec<(bool, u8)>,
+}
+
+/// What is known of a node.
+#[derive(Clone, Copy)]
+struct Looked {
+    /// It is too wide for an object, or extends all around the sensor.
+    is_wide: bool,
+    /// No later return can be linked to it.
+    is_passed: bool,
+    /// `None` if it is not handed out.
+    handed: Option<Handed>,
+}
+
+/// A node that is handed out.
+#[derive(Clone, Copy)]
+struct Handed {
+    /// The place of its first point.
+    start: usize,
+    number: usize,
+    is_part: bool,
+}
+
+struct Complete<T> {
+    points: Vec<[f32; 3]>,
+    tags: Vec<T>,
+    nodes: Vec<StreamNode>,
 }
 
 /// The number of dropped returns, by cause.
@@ -155,7 +215,6 @@ impl<T: Copy + Default> Stream<T> {
         order.iter().zip(0..).for_each(|(&ring, row)| rows[ring] = row);
         let n_columns = image::n_columns(&settings);
         Ok(Self {
-            limits: Limits::new(&settings),
             window: Window::new(n_columns, elevations),
             rows,
             front: None,
@@ -168,14 +227,18 @@ impl<T: Copy + Default> Stream<T> {
                 returns: Vec::with_capacity(capacity as usize),
                 columns: vec![0..0; n_columns],
             },
+            lag: MOST_COLUMNS.min((n_columns - 1) / 2) as u64,
             due: [NONE; WINDOW],
             finder: GroundFinder::default(),
             ground: None,
             spare_ground: HeightGrid::default(),
             column: Vec::new(),
-            members: Vec::with_capacity(capacity as usize),
-            positions: Vec::with_capacity(capacity as usize),
-            tags: Vec::with_capacity(capacity as usize),
+            look: Look::new(capacity),
+            complete: Complete {
+                points: Vec::with_capacity(capacity as usize),
+                tags: Vec::with_capacity(capacity as usize),
+                nodes: Vec::with_capacity(capacity as usize),
+            },
             dropped: Dropped::default(),
             settings,
         })
@@ -211,8 +274,8 @@ impl<T: Copy + Default> Stream<T> {
         }
     }
 
-    /// States that all returns before `azimuth_rad` (clockwise from x) have come, and passes each
-    /// cluster that this completes to `each`. An azimuth behind the previous one has no effect. The
+    /// States that all returns before `azimuth_rad` (clockwise from x) have come, and passes the
+    /// clusters that this completes to `each`. An azimuth behind the previous one has no effect. The
     /// first call marks where the stream begins.
     pub fn advance(&mut self, azimuth_rad: f32, mut each: impl FnMut(StreamCluster<'_, T>)) {
         let n_columns = self.waiting.len();
@@ -310,8 +373,8 @@ impl<T: Copy + Default> Stream<T> {
         turn.columns[n_columns - 1 - at] = start..turn.returns.len();
     }
 
-    /// Copies the obstacles of a column from the turn into the window, links the previous column,
-    /// whose last neighbour this is, and reports the clusters that this completes.
+    /// Copies the obstacles of a column from the turn into the window, finds the steps from the
+    /// column whose last neighbour this is, and reports the clusters that this completes.
     fn open(&mut self, place: u64, each: &mut impl FnMut(StreamCluster<'_, T>)) {
         let Self { ground: Some(ground), points, turn, window, settings, .. } = self else {
             return;
@@ -319,6 +382,7 @@ impl<T: Copy + Default> Stream<T> {
         let n_columns = self.waiting.len();
         let column = image_column(place, n_columns);
         let sector = sector(n_columns, column);
+        let width = settings.column_width_deg.to_radians();
         window.begin(place);
         for this in turn.column(column) {
             let mut this = *this;
@@ -333,49 +397,88 @@ impl<T: Copy + Default> Stream<T> {
                 points.remove(this.point);
                 continue;
             }
-            let last_place = place + self.limits.most_columns(this.range_m) as u64;
+            let last_place = place + most_columns(&this, width) as u64;
             points.wait_until(this.point, last_place);
             let due = &mut self.due[last_place as usize % WINDOW];
             *points.link_mut(this.point) = std::mem::replace(due, this.point);
         }
         window.finish();
-        if let Some(before) = place.checked_sub(1) {
-            link_column(window, image_column(before, n_columns), settings, points);
+        if let Some(before) = place.checked_sub(self.lag) {
+            let column = image_column(before, n_columns);
+            find_steps(window, column, width, |level, pair| points.step(level, pair));
             self.complete(before, each);
         }
     }
 
     /// Reports the clusters that no column after `place` can be linked to.
     fn complete(&mut self, place: u64, each: &mut impl FnMut(StreamCluster<'_, T>)) {
+        let n_columns = self.waiting.len() as u64;
+        let patience = (PATIENCE_DEG / self.settings.column_width_deg) as u64;
         let mut next = std::mem::replace(&mut self.due[place as usize % WINDOW], NONE);
         while next != NONE {
             let point = next;
             next = self.points.slot(point).link;
             let Some(root) = self.points.root(point) else { continue };
             let set = self.points.set(root);
-            if set.last_place == place {
-                if !set.is_cut && set.extent.is_cluster(&self.settings) {
-                    self.hand_out(root, each);
-                }
+            let is_complete = set.last_place == place;
+            let is_wide = set.is_thinned
+                || set.extent.diagonal_m() > self.settings.max_size_m
+                || place >= set.first_place + n_columns;
+            if is_complete && set.extent.count < self.settings.min_points {
                 self.points.remove_set(root);
-            } else if place >= set.first_place + self.waiting.len() as u64 {
-                self.points.cut(root, place + 1 - (WINDOW as u64 - 2));
+            } else if is_complete || is_wide && place >= set.seen_place + patience {
+                self.look.at(&self.points, root, place, n_columns, &self.settings);
+                self.hand_out(each);
+                match is_complete {
+                    true => self.points.remove_set(root),
+                    false => self.look.thin(&mut self.points, place),
+                }
             }
         }
     }
 
-    fn hand_out(&mut self, root: u32, each: &mut impl FnMut(StreamCluster<'_, T>)) {
-        let Self { points, members, positions, tags, ground, .. } = self;
-        members.clear();
-        members.extend(points.members(root).map(|point| (points.slot(point).order, point)));
-        members.sort_unstable();
-        positions.clear();
-        positions.extend(members.iter().map(|&(_, point)| points.slot(point).position));
+    /// Hands out what is complete of the set that was looked at.
+    fn hand_out(&mut self, each: &mut impl FnMut(StreamCluster<'_, T>)) {
+        let Self { look, complete: Complete { points, tags, nodes }, ground, settings, .. } = self;
+        let Look { members, positions, tree, nodes: looked, .. } = look;
+        points.clear();
         tags.clear();
-        tags.extend(members.iter().map(|&(_, point)| points.slot(point).tag));
-        let [x, y] = points.set(root).extent.middle();
-        let ground_z_m = ground.as_ref().and_then(|ground| ground.z_m(x, y));
-        each(StreamCluster { points: positions, tags, ground_z_m });
+        nodes.clear();
+        for node in (0..looked.len()).rev() {
+            let extent = tree.extent(node);
+            if extent.count < settings.min_points {
+                continue;
+            }
+            looked[node].handed = match tree.parent(node) {
+                Some(above) if !looked[above].is_wide => looked[above].handed.map(|whole| {
+                    let start = whole.start + tree.first(node) - tree.first(above);
+                    Handed { start, ..whole }
+                }),
+                above => (looked[node].is_passed && !looked[node].is_wide).then(|| {
+                    let start = points.len();
+                    let own = tree.points(node).iter().map(|&point| point as usize);
+                    points.extend(own.clone().map(|point| positions[point]));
+                    tags.extend(own.map(|point| self.points.slot(members[point].1).tag));
+                    Handed { start, number: 0, is_part: above.is_some() }
+                }),
+            };
+        }
+        let handed = looked.iter_mut().filter_map(|looked| looked.handed.as_mut());
+        handed.zip(0..).for_each(|(handed, number)| handed.number = number);
+        for (node, known) in looked.iter().enumerate() {
+            let Some(Handed { start, is_part, .. }) = known.handed else { continue };
+            let [x, y] = tree.extent(node).middle();
+            let above = tree.parent(node).and_then(|above| looked[above].handed);
+            nodes.push(StreamNode {
+                points: start..start + tree.extent(node).count,
+                parent: above.map(|above| above.number),
+                is_part,
+                ground_z_m: ground.as_ref().and_then(|ground| ground.z_m(x, y)),
+            });
+        }
+        if !nodes.is_empty() {
+            each(StreamCluster { points, tags, nodes });
+        }
     }
 
     /// Finds the ground of the turn, for the next one. Then opens the columns of the first turn,
@@ -393,6 +496,98 @@ impl<T: Copy + Default> Stream<T> {
         }
         self.turn_start = self.front.unwrap_or(0);
         self.turn.clear();
+    }
+}
+
+impl Look {
+    fn new(capacity: u32) -> Self {
+        let n = capacity as usize;
+        let mut steps = Steps::default();
+        const { assert!(STEPS_PER_POINT == 3, "the room of `Steps`") };
+        steps.reset(n);
+        let mut tree = Tree::default();
+        tree.reserve(n);
+        Self {
+            members: Vec::with_capacity(n),
+            numbers: vec![0; n],
+            positions: Vec::with_capacity(n),
+            steps,
+            tree,
+            nodes: Vec::with_capacity(n),
+            fates: Vec::with_capacity(n),
+        }
+    }
+
+    /// Finds the nodes of the set of `root`, and what is needed of it after the column `place`.
+    fn at<T: Copy + Default>(
+        &mut self,
+        points: &OpenSets<T>,
+        root: u32,
+        place: u64,
+        n_columns: u64,
+        settings: &Settings,
+    ) {
+        let Self { members, numbers, positions, steps, tree, nodes, fates } = self;
+        members.clear();
+        members.extend(points.members(root).map(|point| (points.slot(point).order, point)));
+        members.sort_unstable();
+        positions.clear();
+        positions.extend(members.iter().map(|&(_, point)| points.slot(point).position));
+        for (&(_, point), number) in members.iter().zip(0..) {
+            numbers[point as usize] = number;
+        }
+        steps.reset(members.len());
+        for (&(_, point), number) in members.iter().zip(0..) {
+            for (level, other) in points.steps(point) {
+                steps.add(level, [number, numbers[other as usize]]);
+            }
+        }
+        tree.reset(positions);
+        // Small sets may still grow to nodes.
+        steps.levels().for_each(|pairs| tree.join_level(pairs, 2));
+        tree.finish();
+        nodes.clear();
+        for node in 0..tree.len() {
+            let slots =
+                tree.points(node).iter().map(|&point| points.slot(members[point as usize].1));
+            let (mut last, mut first, mut least) = (0, u64::MAX, u8::MAX);
+            for slot in slots {
+                last = last.max(slot.last_place);
+                first = first.min(slot.place);
+                least = least.min(slot.wide_from);
+            }
+            let is_wide = tree.extent(node).diagonal_m() > settings.max_size_m
+                || place >= first.saturating_add(n_columns)
+                || tree.level(node) >= least;
+            nodes.push(Looked { is_wide, is_passed: last <= place, handed: None });
+        }
+        fates.clear();
+        fates.extend(members.iter().map(|&(_, point)| {
+            let slot = points.slot(point);
+            (slot.last_place > place, slot.wide_from)
+        }));
+        // From the wholes to the parts.
+        for (node, known) in nodes.iter().enumerate().rev() {
+            let is_top = tree.parent(node).is_none_or(|above| nodes[above].is_wide);
+            for &point in tree.points(node) {
+                let (is_needed, wide_from) = &mut fates[point as usize];
+                if known.is_wide {
+                    *wide_from = tree.level(node).min(*wide_from);
+                } else if is_top {
+                    *is_needed = !known.is_passed;
+                }
+            }
+        }
+    }
+
+    /// Removes what is not needed any more of the set that was looked at.
+    fn thin<T: Copy + Default>(&self, points: &mut OpenSets<T>, place: u64) {
+        let members = self.members.iter().map(|&(_, point)| point);
+        let wide_from = |point: u32| {
+            let (is_needed, wide_from) = self.fates[self.numbers[point as usize] as usize];
+            is_needed.then_some(wide_from)
+        };
+        points.thin(members, wide_from, place);
     }
 }
 

@@ -1,8 +1,8 @@
 //! Classified and tracked objects from the packets of a LiDAR, while the sensor turns.
 //!
 //! A [`Pipeline`] takes packets one by one. It decodes each, passes the returns to
-//! [`edgepuck_segment::Stream`], classifies each complete cluster and assigns it to a track. An
-//! [`Object`] is the result for a cluster.
+//! [`edgepuck_segment::Stream`], classifies complete clusters at all widths, and assigns those that
+//! are recognised best to tracks. An [`Object`] is the result for a cluster.
 //!
 //! ```no_run
 //! use std::path::Path;

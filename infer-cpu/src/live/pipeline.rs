@@ -3,7 +3,7 @@ use std::ops::{Range, RangeInclusive};
 use std::sync::Arc;
 use std::time::{Instant, SystemTime};
 
-use edgepuck_segment::{OrientedBox, Settings, SettingsError, Stream, StreamCluster};
+use edgepuck_segment::{BestCut, OrientedBox, Settings, SettingsError, Stream, StreamCluster};
 use formats::ouster::Metadata;
 use formats::returns::Return;
 use glam::{DVec3, Vec3};
@@ -19,6 +19,7 @@ use crate::classifier::Classifier;
 use crate::classifier_team::ClassifierTeam;
 use crate::error::Error;
 use crate::prediction::{UNKNOWN, UnknownRule};
+use crate::rule::{MARGIN_OF_WHOLES, Rule};
 
 /// The capacity for returns of each ring: 1.5 times as many as a VLP-32C sends in its slowest turn
 /// with dual returns.
@@ -33,6 +34,11 @@ const MOST_FOREIGN: u32 = 300;
 
 /// The widest columns, degrees: the steps of a sensor are narrower, unless its packet is damaged.
 const WIDEST_DEG: f32 = 1.0;
+
+/// The most clusters and points that are usually complete at once: those of the first turn, whose
+/// ground is known at its end. More take more memory.
+const USUAL_NODES: usize = 4096;
+const USUAL_POINTS: usize = 1 << 17;
 
 /// The options of a pipeline.
 #[derive(Clone, Debug)]
@@ -143,28 +149,30 @@ struct Sensor {
     n_foreign: u32,
 }
 
-/// The time of a point.
-#[derive(Clone, Copy, Default)]
+/// The time and the ring of a point.
+#[derive(Clone, Copy, Debug, Default)]
 struct Tag {
     /// Unix time in seconds.
     time_s: f64,
     /// When its packet arrived.
     moment: Option<Instant>,
+    ring: u16,
 }
 
-/// Complete clusters that are not reported yet.
-#[derive(Default)]
+/// Trees of complete clusters that are not reported yet.
 struct Waiting {
     points: Vec<[f32; 3]>,
-    clusters: Vec<Cluster>,
+    tags: Vec<Tag>,
+    nodes: Vec<Node>,
 }
 
-struct Cluster {
+struct Node {
     points: Range<usize>,
+    parent: Option<usize>,
+    is_part: bool,
     ground_z_m: Option<f32>,
-    first_s: f64,
-    last_s: f64,
-    last_moment: Option<Instant>,
+    /// The time of the sensor's pose in whose frame the points are.
+    pose_s: f64,
     turn: u64,
 }
 
@@ -173,9 +181,16 @@ struct ObjectClassifier {
     classes: Vec<Arc<str>>,
     unknown: UnknownRule,
     unknown_name: Arc<str>,
-    /// The log-probabilities of all classes for each classified cluster.
+    rule: Rule,
+    best: BestCut,
+    /// The log-probabilities of all classes for each classified node.
     log_probabilities: Vec<f64>,
+    /// For each node, where those are, and the energy.
     views: Vec<Option<(Range<usize>, f64)>>,
+    worths: Vec<f64>,
+    is_known: Vec<bool>,
+    /// The nodes of the best cut, in the order in which the beams passed them.
+    chosen: Vec<usize>,
 }
 
 impl Pipeline {
@@ -185,21 +200,31 @@ impl Pipeline {
     /// Invalid settings; threads that cannot be started.
     pub fn new(classifier: Classifier, options: &LiveOptions) -> Result<Self, LiveError> {
         options.segmentation.check()?;
+        let n_classes = classifier.classes().len();
         let classifiers = ObjectClassifier {
             classes: classifier.classes().to_vec(),
             unknown: UnknownRule::new(classifier.card(), classifier.classes()),
             unknown_name: UNKNOWN.into(),
+            rule: Rule::new(&classifier),
             team: ClassifierTeam::new(classifier)?,
-            log_probabilities: Vec::new(),
-            views: Vec::new(),
+            best: BestCut::with_capacity(USUAL_NODES),
+            log_probabilities: Vec::with_capacity(USUAL_NODES * n_classes),
+            views: Vec::with_capacity(USUAL_NODES),
+            worths: Vec::with_capacity(USUAL_NODES),
+            is_known: Vec::with_capacity(USUAL_NODES),
+            chosen: Vec::with_capacity(USUAL_NODES),
         };
         Ok(Self {
             options: options.clone(),
             sensor: None,
             returns: Vec::new(),
             taken_s: None,
-            waiting: Waiting::default(),
-            tracker: Tracker::new(classifiers.classes.len()),
+            waiting: Waiting {
+                points: Vec::with_capacity(USUAL_POINTS),
+                tags: Vec::with_capacity(USUAL_POINTS),
+                nodes: Vec::with_capacity(USUAL_NODES),
+            },
+            tracker: Tracker::new(n_classes),
             classifiers,
             counts: Counts::default(),
             stats: Stats::new(),
@@ -250,7 +275,7 @@ impl Pipeline {
         }
         if self.is_in_order(succession, &facts) {
             self.taken_s = Some(time_s);
-            self.segment(&facts, Tag { time_s, moment: arrival.moment });
+            self.segment(&facts, Tag { time_s, moment: arrival.moment, ring: 0 });
         }
         self.stats.spend(Stage::Segment, decoded.elapsed());
         Ok(())
@@ -308,10 +333,10 @@ impl Pipeline {
         sensor.end(waiting, motion);
     }
 
-    /// Classifies and tracks the complete clusters, and passes each to `each`, in the order in
-    /// which the beams passed them.
+    /// Classifies the complete clusters at all widths, tracks those that are recognised best, and
+    /// passes each to `each`, in the order in which the beams passed them.
     pub fn answer(&mut self, mut each: impl FnMut(&Object)) {
-        if self.waiting.clusters.is_empty() {
+        if self.waiting.nodes.is_empty() {
             return;
         }
         let start = Instant::now();
@@ -319,16 +344,18 @@ impl Pipeline {
         self.classifiers.classify(&self.waiting, self.options.min_points);
         let classified = Instant::now();
         self.stats.spend(Stage::Classify, classified - start);
-        for (cluster, view) in self.waiting.clusters.iter().zip(&self.classifiers.views) {
-            let view = view.as_ref().map(|(range, energy)| {
+        for &node in &self.classifiers.chosen {
+            let view = self.classifiers.views[node].as_ref().map(|(range, energy)| {
                 (&self.classifiers.log_probabilities[range.clone()], *energy)
             });
+            let cluster = &self.waiting.nodes[node];
             let points = &self.waiting.points[cluster.points.clone()];
-            let pose = motion.map(|motion| motion.pose(cluster.last_s));
+            let [first, last] = self.waiting.span(node);
+            let pose = motion.map(|motion| motion.pose(cluster.pose_s));
             let sensor_m = pose.map_or([0.0; 2], |pose| pose.position_m.truncate().to_array());
             let place = Place::locate(points, pose);
             let track = self.tracker.observe(&Observation {
-                time_s: cluster.last_s,
+                time_s: last.time_s,
                 position_m: place.position_m,
                 size_m: [place.size_m[0], place.size_m[1]],
                 yaw_rad: place.yaw_deg.to_radians(),
@@ -336,7 +363,7 @@ impl Pipeline {
                 view,
             });
             let fused = self.classifiers.fused(&track.log_probabilities, track.energy);
-            let latency = cluster.last_moment.map(|moment| moment.elapsed());
+            let latency = last.moment.map(|moment| moment.elapsed());
             let confidence = view.zip(fused.as_ref());
             self.counts.clusters += 1;
             self.counts.unclassified += u64::from(view.is_none());
@@ -357,16 +384,15 @@ impl Pipeline {
                 velocity_m_s: track.velocity_m_s(),
                 points: points.len(),
                 range_m: place.range_m,
-                first_s: cluster.first_s,
-                last_s: cluster.last_s,
+                first_s: first.time_s,
+                last_s: last.time_s,
                 latency_ms: latency.map(|latency| latency.as_secs_f64() * 1e3),
             });
             latency
                 .into_iter()
                 .for_each(|latency| self.stats.answered_after(latency, cluster.turn));
         }
-        self.waiting.points.clear();
-        self.waiting.clusters.clear();
+        self.waiting.clear();
         self.stats.spend(Stage::Track, classified.elapsed());
     }
 
@@ -436,7 +462,8 @@ impl Sensor {
             waiting.push(&cluster, turn, motion);
         });
         for found in returns {
-            let tag = Tag { time_s: packet.time_s + found.after_us * 1e-6, ..packet };
+            let time_s = packet.time_s + found.after_us * 1e-6;
+            let tag = Tag { time_s, ring: found.ring, ..packet };
             stream.push(found.point_m, found.ring, tag);
         }
     }
@@ -466,27 +493,48 @@ impl Motion<'_> {
 }
 
 impl Waiting {
-    /// Adds a cluster of a turn. If the sensor moves, the points are transformed into its frame at
+    fn clear(&mut self) {
+        self.points.clear();
+        self.tags.clear();
+        self.nodes.clear();
+    }
+
+    /// Whether a node has points of several rings.
+    fn has_rings(&self, node: usize) -> bool {
+        let tags = &self.tags[self.nodes[node].points.clone()];
+        tags.iter().any(|tag| tag.ring != tags[0].ring)
+    }
+
+    /// The first and the last point of a node.
+    fn span(&self, node: usize) -> [Tag; 2] {
+        let tags = &self.tags[self.nodes[node].points.clone()];
+        let by_time = |a: &&Tag, b: &&Tag| a.time_s.total_cmp(&b.time_s);
+        [tags.iter().min_by(by_time), tags.iter().max_by(by_time)]
+            .map(|tag| tag.copied().unwrap_or_default())
+    }
+
+    /// Adds clusters of a turn. If the sensor moves, the points are transformed into its frame at
     /// the time of the last point.
     fn push(&mut self, cluster: &StreamCluster<'_, Tag>, turn: u64, motion: Option<Motion<'_>>) {
-        let (Some(first), Some(last)) = (cluster.tags.first(), cluster.tags.last()) else { return };
-        let start = self.points.len();
+        let (start, n_nodes) = (self.points.len(), self.nodes.len());
         self.points.extend_from_slice(cluster.points);
+        self.tags.extend_from_slice(cluster.tags);
+        let pose_s = cluster.tags.iter().fold(f64::NEG_INFINITY, |last, tag| last.max(tag.time_s));
         if let Some(motion) = motion {
-            let pose = motion.pose(last.time_s);
+            let pose = motion.pose(pose_s);
             for (point, tag) in self.points[start..].iter_mut().zip(cluster.tags) {
                 let in_world = motion.pose(tag.time_s).to_world(Vec3::from(*point).as_dvec3());
                 *point = pose.from_world(in_world).as_vec3().to_array();
             }
         }
-        self.clusters.push(Cluster {
-            points: start..self.points.len(),
-            ground_z_m: cluster.ground_z_m,
-            first_s: first.time_s,
-            last_s: last.time_s,
-            last_moment: last.moment,
+        self.nodes.extend(cluster.nodes.iter().map(|node| Node {
+            points: start + node.points.start..start + node.points.end,
+            parent: node.parent.map(|parent| n_nodes + parent),
+            is_part: node.is_part,
+            ground_z_m: node.ground_z_m,
+            pose_s,
             turn,
-        });
+        }));
     }
 }
 
@@ -498,35 +546,54 @@ struct Fused {
 }
 
 impl ObjectClassifier {
-    /// Classifies the clusters that have enough points.
+    /// Classifies the nodes that have enough points, and chooses the best cut.
     fn classify(&mut self, waiting: &Waiting, min_points: usize) {
-        let Self { team, log_probabilities, views, .. } = self;
+        let Self { team, rule, best, log_probabilities, views, worths, is_known, chosen, .. } =
+            self;
+        let nodes = &waiting.nodes;
         log_probabilities.clear();
         views.clear();
-        let is_enough = |cluster: &&Cluster| cluster.points.len() >= min_points;
-        let large = waiting.clusters.iter().filter(is_enough);
-        let clouds =
-            large.map(|cluster| (&waiting.points[cluster.points.clone()], cluster.ground_z_m));
+        views.resize(nodes.len(), None);
+        worths.clear();
+        worths.resize(nodes.len(), 0.0);
+        is_known.clear();
+        is_known.resize(nodes.len(), false);
+        // A single ring shows no shape: it belongs to what is next to it.
+        let is_asked = |&node: &usize| {
+            nodes[node].points.len() >= min_points
+                && (nodes[node].parent.is_none() || waiting.has_rings(node))
+        };
+        let mut asked = (0..nodes.len()).filter(is_asked);
+        let clouds = asked.clone().map(|node| {
+            let Node { points, ground_z_m, .. } = &nodes[node];
+            (&waiting.points[points.clone()], *ground_z_m)
+        });
         team.classify_many(clouds, |answer| {
-            let start = log_probabilities.len();
+            let Some(node) = asked.next() else { return };
             // A cluster has no view if the network overflows on it.
-            views.push(answer.ok().map(|answer| {
+            let answer = answer.ok();
+            worths[node] = rule.worth(nodes[node].points.len(), answer);
+            is_known[node] = answer.is_some_and(|answer| !answer.is_unknown);
+            views[node] = answer.map(|answer| {
+                let start = log_probabilities.len();
                 let n_classes = answer.logits.len();
                 let all = (0..n_classes).map(|class| answer.log_probability(class));
                 log_probabilities.extend(all);
                 (start..start + n_classes, answer.energy)
-            }));
+            });
         });
-        // This moves the views to the indices of their clusters; clusters of too few points have
-        // none.
-        let mut next = views.len();
-        views.resize(waiting.clusters.len(), None);
-        for at in (0..waiting.clusters.len()).rev() {
-            if is_enough(&&waiting.clusters[at]) {
-                next -= 1;
-                views.swap(at, next);
-            }
-        }
+        chosen.clear();
+        // Neither an unknown piece of a wall or a hedge is an object, nor one that shows no shape.
+        let is_object = |&&node: &&usize| {
+            let Node { is_part, parent, .. } = &nodes[node];
+            is_known[node] || !*is_part && (parent.is_none() || views[node].is_some())
+        };
+        let cut = best.find(worths, |node| nodes[node].parent, MARGIN_OF_WHOLES);
+        chosen.extend(cut.iter().filter(is_object));
+        chosen.sort_unstable_by(|&a, &b| {
+            let last_s = |node| waiting.span(node)[1].time_s;
+            last_s(a).total_cmp(&last_s(b)).then(a.cmp(&b))
+        });
     }
 
     /// The class of a track with these mean log-probabilities and this mean energy; `None` without

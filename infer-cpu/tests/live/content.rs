@@ -4,13 +4,14 @@
 use super::street::{PACKET, PACKET_S, PACKETS_PER_S, Thing, packets, street};
 use super::{START_S, on_time, run};
 use edgepuck_ros_messages::{self as ros, Message};
-use edgepuck_segment::{OrientedBox, Settings, Stream};
+use edgepuck_segment::{BestCut, OrientedBox, Settings, Stream, StreamNode};
 use formats::returns::Return;
 use formats::velodyne;
 use glam::{DQuat, DVec3, Vec3};
 use infer_cpu::live::{Arrival, EgoMotion, LiveOptions, Object, Pipeline, Pose, Recorder};
+use infer_cpu::rule::{MARGIN_OF_WHOLES, Rule};
 use infer_cpu::{Classifier, Options, Prediction};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -23,6 +24,21 @@ struct Found {
     ground_z_m: Option<f32>,
     times_s: Vec<f64>,
     turn: u64,
+    /// When the last of the points was measured that were handed out together.
+    pose_s: f64,
+}
+
+impl Found {
+    /// When its first and its last point were measured.
+    fn span_s(&self) -> [f64; 2] {
+        let times_s = || self.times_s.iter().copied();
+        [times_s().fold(f64::INFINITY, f64::min), times_s().fold(0.0, f64::max)]
+    }
+}
+
+/// Points of a sensor at rest.
+fn at_rest(point: [f32; 3], _: f64, _: f64) -> [f32; 3] {
+    point
 }
 
 /// The returns of each packet, with their times, as the pipeline reports them.
@@ -38,28 +54,75 @@ fn decoded(pipeline: &mut Pipeline, sent: &[[u8; PACKET]]) -> Vec<(f64, Vec<Retu
     decoded.collect()
 }
 
-/// The clusters of the packets of a VLP-16, in the order in which they are complete.
-fn clusters(sent: &[[u8; PACKET]], decoded: &[(f64, Vec<Return>)]) -> Vec<Found> {
+/// The best cut of the packets of a VLP-16 by the answers of `classifier`, in the order in which its
+/// clusters are complete. `moved` puts points into the frame of the sensor at the second time.
+fn clusters(
+    classifier: &mut Classifier,
+    sent: &[[u8; PACKET]],
+    decoded: &[(f64, Vec<Return>)],
+    moved: impl Fn([f32; 3], f64, f64) -> [f32; 3],
+) -> Vec<Found> {
+    let rule = Rule::new(classifier);
     let step_deg = 360.0 * 10.0 * 55.296e-6;
     let mut settings = Settings::default();
     settings.ring_elevations_deg = Some((0..16).map(|i| 2.0 * i as f32 - 15.0).collect());
     settings.column_width_deg = settings.column_width_deg.max(step_deg as f32);
-    let mut stream = Stream::new(settings, 200_000).unwrap();
+    let mut stream = Stream::<(f64, u16)>::new(settings, 200_000).unwrap();
     let mut all = Vec::new();
     for (packet, (time_s, returns)) in sent.iter().zip(decoded) {
         let azimuth = u16::from_le_bytes([packet[2], packet[3]]);
         let turn = stream.n_turns();
+        let (mut nodes, mut found) = (Vec::<StreamNode>::new(), Vec::new());
+        let mut shows_shape = Vec::new();
         // No laser of a VLP-16 is off the head's azimuth.
         stream.advance((f64::from(azimuth) * TAU / 36_000.0) as f32, |cluster| {
-            all.push(Found {
-                points: cluster.points.to_vec(),
-                ground_z_m: cluster.ground_z_m,
-                times_s: cluster.tags.to_vec(),
-                turn,
-            });
+            let n_before = nodes.len();
+            let pose_s = cluster.tags.iter().map(|tag| tag.0).fold(0.0, f64::max);
+            for node in cluster.nodes {
+                let own = node.points.clone().map(|i| (cluster.points[i], cluster.tags[i]));
+                let rings: BTreeSet<u16> = own.clone().map(|(_, (_, ring))| ring).collect();
+                shows_shape.push(node.parent.is_none() || rings.len() > 1);
+                found.push(Found {
+                    points: own.clone().map(|(at, (at_s, _))| moved(at, at_s, pose_s)).collect(),
+                    ground_z_m: node.ground_z_m,
+                    times_s: own.map(|(_, (at_s, _))| at_s).collect(),
+                    turn,
+                    pose_s,
+                });
+                let parent = node.parent.map(|parent| n_before + parent);
+                nodes.push(StreamNode { parent, ..node.clone() });
+            }
         });
+        let answers: Vec<Option<Prediction>> = found
+            .iter()
+            .zip(&shows_shape)
+            .map(|(found, shows_shape): (&Found, &bool)| {
+                let is_asked = found.points.len() >= 20 && *shows_shape;
+                let Found { points, ground_z_m, .. } = found;
+                is_asked
+                    .then(|| classifier.classify_on_ground(points, *ground_z_m).unwrap().clone())
+            })
+            .collect();
+        let worth = |(found, answer): (&Found, &Option<Prediction>)| {
+            answer.as_ref().map_or(0.0, |answer| rule.worth(found.points.len(), Some(answer)))
+        };
+        let worths: Vec<f64> = found.iter().zip(&answers).map(worth).collect();
+        let mut best = BestCut::default();
+        let cut = best.find(&worths, |node| nodes[node].parent, MARGIN_OF_WHOLES);
+        let mut kept: Vec<_> = found.into_iter().enumerate().collect();
+        kept.retain(|(node, _)| {
+            let StreamNode { is_part, parent, .. } = &nodes[*node];
+            let is_object = match &answers[*node] {
+                Some(answer) => !(answer.is_unknown && *is_part),
+                None => parent.is_none() && !*is_part,
+            };
+            cut.contains(node) && is_object
+        });
+        kept.sort_by(|(_, a), (_, b)| a.span_s()[1].total_cmp(&b.span_s()[1]));
+        all.extend(kept.into_iter().map(|(_, found)| found));
         for found in returns {
-            stream.push(found.point_m, found.ring, time_s + found.after_us * 1e-6);
+            let tag = (time_s + found.after_us * 1e-6, found.ring);
+            stream.push(found.point_m, found.ring, tag);
         }
     }
     all
@@ -142,9 +205,11 @@ fn an_answer_is_what_the_segmentation_and_the_classifier_say_of_its_cluster() {
     let sent = packets(&street(), 5_000, 2 * PACKETS_PER_S);
     let folder = tempfile::tempdir().unwrap();
     let new = |model: &Path| Pipeline::new(classifier(model), &LiveOptions::default()).unwrap();
-    let found = clusters(&sent, &decoded(&mut new(&street_model()), &sent));
+    let decoded = decoded(&mut new(&street_model()), &sent);
+    let found = clusters(&mut classifier(&street_model()), &sent, &decoded, at_rest);
     let most = median_energy(&found);
     let model = with_unknown_energy(folder.path(), most);
+    let found = clusters(&mut classifier(&model), &sent, &decoded, at_rest);
     let objects = answers(&mut new(&model), &sent);
     assert_eq!(objects.len(), found.len());
     let mut classifier = classifier(&model);
@@ -161,8 +226,7 @@ fn an_answer_is_what_the_segmentation_and_the_classifier_say_of_its_cluster() {
         assert_eq!(object.yaw_deg, f64::from(yaw_rad.to_degrees()));
         let flat_m = f64::from(centre_m[0]).hypot(f64::from(centre_m[1]));
         assert!((object.range_m - flat_m).abs() < 1e-5);
-        let times_s = [found.times_s[0], *found.times_s.last().unwrap()];
-        assert_eq!([object.first_s, object.last_s], times_s);
+        assert_eq!([object.first_s, object.last_s], found.span_s());
         assert_eq!(object.latency_ms, None);
         if found.points.len() < 20 {
             assert_eq!(object.confidence, None);
@@ -190,8 +254,8 @@ fn an_answer_is_what_the_segmentation_and_the_classifier_say_of_its_cluster() {
 fn the_height_above_the_ground_decides_the_class() {
     let sent = packets(&street(), 5_000, PACKETS_PER_S);
     let new = || Pipeline::new(classifier(&street_model()), &LiveOptions::default()).unwrap();
-    let found = clusters(&sent, &decoded(&mut new(), &sent));
     let mut classifier = classifier(&street_model());
+    let found = clusters(&mut classifier, &sent, &decoded(&mut new(), &sent), at_rest);
     let mut probability = |points: &[[f32; 3]], ground_z_m| {
         classifier.classify_on_ground(points, ground_z_m).unwrap().confidence()
     };
@@ -224,26 +288,20 @@ fn points_of_a_moving_sensor_are_those_of_its_last_moment_and_answers_are_in_the
     let new = |options: &LiveOptions| Pipeline::new(classifier(&street_model()), options).unwrap();
     let decoded = decoded(&mut new(&LiveOptions::default()), &sent);
     let objects = answers(&mut new(&options), &sent);
-    let found = clusters(&sent, &decoded);
+    // Points of the sensor at one time, as it sees them at another.
+    let moved = |point: [f32; 3], at_s: f64, pose_s: f64| {
+        let [at, last] = [at_s, pose_s].map(|time_s| driven(time_s - START_S));
+        let in_world = at.world_from_sensor * Vec3::from(point).as_dvec3() + at.position_m;
+        let back = last.world_from_sensor.inverse() * (in_world - last.position_m);
+        back.as_vec3().to_array()
+    };
+    let found = clusters(&mut classifier(&street_model()), &sent, &decoded, moved);
     assert_eq!(objects.len(), found.len());
     assert!(objects.len() > 20);
-    let mut moved_most_m = 0.0f64;
     for (object, found) in objects.iter().zip(&found) {
-        let last_s = found.times_s.last().unwrap() - START_S;
+        let last_s = found.pose_s - START_S;
         let last = driven(last_s);
-        let compensated: Vec<[f32; 3]> = found
-            .points
-            .iter()
-            .zip(&found.times_s)
-            .map(|(point, at_s)| {
-                let at = driven(at_s - START_S);
-                let in_world = at.world_from_sensor * Vec3::from(*point).as_dvec3() + at.position_m;
-                let back = last.world_from_sensor.inverse() * (in_world - last.position_m);
-                moved_most_m = moved_most_m.max(back.distance(Vec3::from(*point).as_dvec3()));
-                back.as_vec3().to_array()
-            })
-            .collect();
-        let OrientedBox { centre_m, size_m, yaw_rad } = OrientedBox::around(&compensated);
+        let OrientedBox { centre_m, size_m, yaw_rad } = OrientedBox::around(&found.points);
         let centre_m = Vec3::from(centre_m).as_dvec3();
         let at_m = last.world_from_sensor * centre_m + last.position_m;
         // f32 holds these points within 2 micrometres, and the times within 0.24 us of 30 m/s.
@@ -259,7 +317,8 @@ fn points_of_a_moving_sensor_are_those_of_its_last_moment_and_answers_are_in_the
         assert!(off_deg.abs() < 0.05 && object.yaw_deg.abs() <= 90.0, "{object:?}: {off_deg}");
     }
     // So that the first and the last pose of a cluster differ.
-    assert!(moved_most_m > 0.2, "{moved_most_m}");
+    let swept_s = found.iter().map(|found| found.pose_s - found.span_s()[0]).fold(0.0, f64::max);
+    assert!(swept_s * 30.0 > 0.2, "{swept_s}");
 }
 
 #[test]

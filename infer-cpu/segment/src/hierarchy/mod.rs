@@ -1,13 +1,15 @@
 //! The cuts of a sweep at several widths at once.
 
+mod best_cut;
 mod steps;
 mod tree;
 
 use crate::height_grid::HeightGrid;
 use crate::image::{Columns, RangeImage};
 use crate::settings::Settings;
-use steps::Steps;
-use tree::Tree;
+pub use best_cut::BestCut;
+pub(crate) use steps::{Steps, find_steps, most_columns};
+pub(crate) use tree::Tree;
 
 /// The clusters of a sweep at seven widths, from the narrowest to the widest: a tree, in which each
 /// cluster holds those of which it is made. Made by
@@ -22,10 +24,7 @@ pub struct Hierarchy {
     steps: Steps,
     /// For each node, the height of the ground under it.
     ground_z_m: Vec<Option<f32>>,
-    /// For each node, the worth of the best cut of its points, and whether that is the node itself.
-    best: Vec<(f64, bool)>,
-    /// Nodes to be looked at.
-    open: Vec<usize>,
+    best: BestCut,
 }
 
 /// A cluster of a hierarchy.
@@ -38,6 +37,8 @@ pub struct Node<'a> {
     pub ground_z_m: Option<f32>,
     /// The horizontal diagonal of that box, metres.
     pub diagonal_m: f32,
+    /// The number of the smallest node that holds this one and more.
+    pub parent: Option<usize>,
 }
 
 impl Hierarchy {
@@ -63,6 +64,7 @@ impl Hierarchy {
             points: self.tree.points(node),
             ground_z_m: self.ground_z_m[node],
             diagonal_m: self.tree.extent(node).diagonal_m(),
+            parent: self.tree.parent(node),
         }
     }
 
@@ -83,7 +85,8 @@ impl Hierarchy {
         let Self { tree, steps, ground_z_m, .. } = self;
         steps.reset(points.len());
         for column in 0..Columns::n_columns(image) {
-            steps.find(image, column, settings.column_width_deg.to_radians());
+            let width = settings.column_width_deg.to_radians();
+            find_steps(image, column, width, |level, pair| steps.add(level, pair));
         }
         tree.reset(points);
         steps.levels().for_each(|pairs| tree.join_level(pairs, settings.min_points));
@@ -96,26 +99,9 @@ impl Hierarchy {
         ground_z_m.extend((0..tree.len()).map(z_m));
     }
 
-    /// The nodes of the best cut, of which none holds another: a node is kept if its worth is at
-    /// least `1 + margin` times that of the best cut of those of which it is made.
-    pub(crate) fn cut(&mut self, worths: &[f64], margin: f64, mut each: impl FnMut(usize)) {
-        let Self { tree, best, open, .. } = self;
-        best.clear();
-        for (node, &own) in worths.iter().enumerate() {
-            let mut parts = tree.children(node).peekable();
-            let is_whole = parts.peek().is_none();
-            let of_parts: f64 = parts.map(|part| best[part].0).sum();
-            let is_kept = is_whole || own >= (1.0 + margin) * of_parts;
-            best.push((if is_kept { own } else { of_parts }, is_kept));
-        }
-        open.clear();
-        open.extend(tree.roots());
-        while let Some(node) = open.pop() {
-            if best[node].1 {
-                each(node);
-            } else {
-                open.extend(tree.children(node));
-            }
-        }
+    /// The nodes of the best cut, as [`BestCut::find`] has them.
+    pub(crate) fn cut(&mut self, worths: &[f64], margin: f64) -> &[usize] {
+        let Self { tree, best, .. } = self;
+        best.find(worths, |node| tree.parent(node), margin)
     }
 }

@@ -48,34 +48,56 @@ impl Steps {
         self.levels.iter().map(Vec::as_slice)
     }
 
-    /// Adds the steps from each return of `column` to the nearest return beside it, in columns of
-    /// higher numbers, and to the nearest ones above it, to the left and to the right. Columns are
-    /// `column_width` radians wide.
-    pub fn find(&mut self, image: &impl Cells, column: usize, column_width: f32) {
-        for row in 0..image.elevations().len() {
-            let cell = image.cell(column, row);
-            for (at, this) in cell.iter().enumerate() {
-                for other in cell[at + 1..].iter().take(MOST_IN_CELL) {
-                    self.add(this, other, square(this, other));
-                }
-                let search = Search { image, this, column, row, column_width };
-                for (aside, up) in [(1, false), (1, true), (-1, true)] {
-                    let nearest = search.nearest(aside, up);
-                    if let Some(other) = nearest.found {
-                        self.add(this, &other, nearest.square);
-                    }
+    pub fn add(&mut self, level: usize, pair: [u32; 2]) {
+        self.levels[level].push(pair);
+    }
+}
+
+/// Passes the steps from each return of `column`, with their levels, to `each`: to the nearest
+/// return beside it, in columns of higher numbers, and to the nearest ones above it, to the left and
+/// to the right. Columns are `column_width` radians wide.
+pub fn find_steps(
+    image: &impl Cells,
+    column: usize,
+    column_width: f32,
+    mut each: impl FnMut(usize, [u32; 2]),
+) {
+    let mut step = |a: &Return, b: &Return, square: f32| {
+        if let Some(level) = level(a, b, square) {
+            each(level, [a.point, b.point]);
+        }
+    };
+    for row in 0..image.elevations().len() {
+        let cell = image.cell(column, row);
+        for (at, this) in cell.iter().enumerate() {
+            for other in cell[at + 1..].iter().take(MOST_IN_CELL) {
+                step(this, other, square(this, other));
+            }
+            let search = Search { image, this, column, row, column_width };
+            for (aside, up) in [(1, false), (1, true), (-1, true)] {
+                let nearest = search.nearest(aside, up);
+                if let Some(other) = nearest.found {
+                    step(this, &other, nearest.square);
                 }
             }
         }
     }
+}
 
-    fn add(&mut self, a: &Return, b: &Return, square: f32) {
-        let base_m = base_m(distance_m(a).min(distance_m(b)));
-        let level = LEVELS.iter().position(|level| square <= (level * base_m).powi(2));
-        if let Some(level) = level {
-            self.levels[level].push([a.point, b.point]);
-        }
-    }
+/// The most columns between a return and one that a step links to it.
+///
+/// A return at a horizontal distance r is at least r sin(a) from one that is turned by a.
+pub fn most_columns(this: &Return, column_width: f32) -> usize {
+    // The factor covers rounding.
+    let sine = 1.001 * WIDEST * base_m(distance_m(this)) / this.range_m;
+    if sine < 1.0 { (sine.asin() / column_width) as usize + 2 } else { MOST_COLUMNS }
+        .min(MOST_COLUMNS)
+}
+
+/// The level of a step of this square length; `None` if it is wider than all.
+fn level(a: &Return, b: &Return, square: f32) -> Option<usize> {
+    let base_m = base_m(distance_m(a).min(distance_m(b)));
+    LEVELS.iter().position(|level| square <= (level * base_m).powi(2))
 }
 
 struct Search<'a, I> {
@@ -223,11 +245,8 @@ mod tests {
             (40.0, 2.39, Some(6)),
             (40.0, 2.41, None),
         ] {
-            let mut steps = Steps::default();
             let [a, b] = [at(range_m, 0.0, 0), at(range_m, step_m, 1)];
-            steps.add(&a, &b, square(&a, &b));
-            let level = steps.levels().position(|pairs| pairs == [[0, 1]]);
-            assert_eq!(level, expected, "{range_m} {step_m}");
+            assert_eq!(level(&a, &b, square(&a, &b)), expected, "{range_m} {step_m}");
         }
     }
 }

@@ -18,6 +18,8 @@ pub struct Tree {
     nodes: Vec<Record>,
     /// The points of all nodes. Those of a node are consecutive.
     members: Vec<u32>,
+    /// The number of levels so far.
+    n_levels: u8,
 }
 
 #[derive(Clone, Copy)]
@@ -34,11 +36,10 @@ struct Record {
     extent: Extent,
     /// Its first point; in the end, the place of that among the members.
     first: u32,
-    /// The first of its children.
-    child: u32,
-    /// The next child of the same parent.
+    /// The next node of the same parent, or [`NONE`].
     sibling: u32,
-    has_parent: bool,
+    parent: u32,
+    level: u8,
 }
 
 impl Tree {
@@ -55,13 +56,23 @@ impl Tree {
             Set { extent, first, last: first, nodes: [NONE; 2] }
         };
         self.sets.extend(points.iter().zip(numbers).map(set));
-        // Each node and each change joins two sets.
         self.joined.clear();
-        self.joined.reserve(points.len());
         self.members.clear();
-        self.members.reserve(points.len());
         self.nodes.clear();
-        self.nodes.reserve(points.len());
+        self.reserve(points.len());
+        self.n_levels = 0;
+    }
+
+    /// Makes room for the sets of `n` points.
+    pub fn reserve(&mut self, n: usize) {
+        let Self { parents, next, sets, joined, nodes, members, .. } = self;
+        for points in [parents, next, members] {
+            points.reserve(n.saturating_sub(points.len()));
+        }
+        sets.reserve(n.saturating_sub(sets.len()));
+        // Each node and each change joins two sets.
+        joined.reserve(n);
+        nodes.reserve(n);
     }
 
     /// Joins the sets of each pair. Sets that have changed and have `min_points` or more are nodes,
@@ -85,11 +96,13 @@ impl Tree {
             let Set { extent, first, .. } = *set;
             let mut at = child;
             while at != NONE {
-                self.nodes[at as usize].has_parent = true;
+                self.nodes[at as usize].parent = number;
                 at = self.nodes[at as usize].sibling;
             }
-            self.nodes.push(Record { extent, first, child, sibling: NONE, has_parent: false });
+            let level = self.n_levels;
+            self.nodes.push(Record { extent, first, sibling: NONE, parent: NONE, level });
         }
+        self.n_levels += 1;
     }
 
     /// Joins two sets. The points of each stay consecutive.
@@ -147,22 +160,24 @@ impl Tree {
 
     /// The points of a node.
     pub fn points(&self, node: usize) -> &[u32] {
-        let Record { first, extent, .. } = self.nodes[node];
-        &self.members[first as usize..first as usize + extent.count]
+        let first = self.first(node);
+        &self.members[first..first + self.nodes[node].extent.count]
     }
 
-    pub fn children(&self, node: usize) -> impl Iterator<Item = usize> {
-        let mut at = self.nodes[node].child;
-        std::iter::from_fn(move || {
-            let child = (at != NONE).then_some(at as usize)?;
-            at = self.nodes[child].sibling;
-            Some(child)
-        })
+    /// The place of a node's first point among those of all nodes: those of its parts lie within.
+    pub fn first(&self, node: usize) -> usize {
+        self.nodes[node].first as usize
     }
 
-    /// The nodes without a parent.
-    pub fn roots(&self) -> impl Iterator<Item = usize> {
-        (0..self.nodes.len()).filter(|&node| !self.nodes[node].has_parent)
+    /// The smallest node that holds this one and more.
+    pub fn parent(&self, node: usize) -> Option<usize> {
+        let parent = self.nodes[node].parent;
+        (parent != NONE).then_some(parent as usize)
+    }
+
+    /// The level of the steps that joined a node, from 0.
+    pub fn level(&self, node: usize) -> u8 {
+        self.nodes[node].level
     }
 }
 
@@ -219,7 +234,8 @@ mod tests {
             assert_eq!(found.len(), tree.len(), "a set is one node");
             for node in 0..tree.len() {
                 let whole = points(node);
-                let parts: Vec<_> = tree.children(node).collect();
+                let parts: Vec<_> =
+                    (0..tree.len()).filter(|&part| tree.parent(part) == Some(node)).collect();
                 assert!(parts.iter().all(|&part| part < node));
                 let held: Vec<_> = parts.iter().flat_map(|&part| points(part)).collect();
                 let distinct: BTreeSet<_> = held.iter().collect();
@@ -234,11 +250,10 @@ mod tests {
                         more != other && points(other).iter().all(|p| points(more).contains(p))
                     })
                 });
-                let mut sorted = parts.clone();
-                sorted.sort_unstable();
-                assert_eq!(sorted, largest.collect::<Vec<_>>());
+                assert_eq!(parts, largest.collect::<Vec<_>>());
             }
-            let roots: usize = tree.roots().map(|root| tree.points(root).len()).sum();
+            let roots = (0..tree.len()).filter(|&node| tree.parent(node).is_none());
+            let roots: usize = roots.map(|root| tree.points(root).len()).sum();
             let all: BTreeSet<_> = found.iter().flatten().collect();
             assert_eq!(roots, all.len());
         }

@@ -1,9 +1,9 @@
-//! A stream of returns gives the clusters of whole sweeps, each as soon as it is complete.
+//! A stream of returns gives the hierarchies of whole sweeps, each as soon as it is complete.
 
 use std::collections::BTreeSet;
 use std::f32::consts::{PI, TAU};
 
-use edgepuck_segment::{Dropped, Segmenter, Settings, Stream, Sweep};
+use edgepuck_segment::{Dropped, Segmenter, Settings, Stream, StreamCluster, StreamNode, Sweep};
 use test_support::{need, shared_data};
 
 use crate::frames::{Frame, paths};
@@ -39,7 +39,8 @@ impl Turn {
         }
     }
 
-    /// The clusters of the whole sweep, by the places of their points.
+    /// The clusters of the whole sweep's hierarchy that are not too wide, by the places of their
+    /// points.
     ///
     /// Within each cell of the range image, the returns are in the order of the stream, which may
     /// begin with the last ones of a turn: the order decides how sums are rounded.
@@ -59,16 +60,27 @@ impl Turn {
         let points: Vec<_> = (0..n).map(|i| self.points[place(i)]).collect();
         let rings: Vec<_> = (0..n).map(|i| self.rings[place(i)]).collect();
         let mut segmenter = Segmenter::new(settings.clone()).unwrap();
-        let found = segmenter.segment(&Sweep { points: &points, rings: Some(&rings) }).unwrap();
+        let found = segmenter.hierarchy(&Sweep { points: &points, rings: Some(&rings) }).unwrap();
         let sorted = |points: &[u32]| {
             let mut points: Vec<_> = points.iter().map(|&i| place(i as usize) as u32).collect();
             points.sort_unstable();
             points
         };
-        found.clusters().map(|cluster| sorted(cluster.points)).collect()
+        let nodes = found.nodes().filter(|node| node.diagonal_m <= settings.max_size_m);
+        nodes.map(|node| sorted(node.points)).collect()
     }
 
     fn stream(&self, settings: &Settings, n_turns: u32) -> (Vec<HandedOut>, Dropped) {
+        self.stream_some(settings, n_turns, |_| true)
+    }
+
+    /// Those nodes of the stream for which `is_asked` holds.
+    fn stream_some(
+        &self,
+        settings: &Settings,
+        n_turns: u32,
+        is_asked: fn(&StreamNode) -> bool,
+    ) -> (Vec<HandedOut>, Dropped) {
         let mut stream = Stream::new(settings.clone(), 300_000).unwrap();
         let mut found = Vec::new();
         let behind = OFFSETS_DEG[3].to_radians();
@@ -76,14 +88,34 @@ impl Turn {
             for i in 0..self.points.len() {
                 let at = self.encoder_rad[i] + turn as f32 * TAU;
                 stream.advance(self.encoder_rad[i] - behind, |cluster| {
-                    found.push((cluster.tags.to_vec(), at));
+                    found.extend(nodes(&cluster, is_asked).map(|tags| (tags, at)));
                 });
                 stream.push(self.points[i], self.rings[i], (turn, i as u32));
             }
         }
-        stream.end(|cluster| found.push((cluster.tags.to_vec(), n_turns as f32 * TAU)));
+        let at = n_turns as f32 * TAU;
+        stream.end(|cluster| found.extend(nodes(&cluster, is_asked).map(|tags| (tags, at))));
         (found, stream.dropped())
     }
+}
+
+/// The tags of the points of each node, ascending. Each node lies within its parent, which comes
+/// after it.
+fn nodes<'a>(
+    cluster: &'a StreamCluster<'_, (u32, u32)>,
+    is_asked: fn(&StreamNode) -> bool,
+) -> impl Iterator<Item = Vec<(u32, u32)>> + 'a {
+    let asked = cluster.nodes.iter().enumerate().filter(move |(_, node)| is_asked(node));
+    asked.map(|(number, node)| {
+        if let Some(parent) = node.parent {
+            let whole = &cluster.nodes[parent].points;
+            assert!(parent > number && whole.len() > node.points.len());
+            assert!(whole.start <= node.points.start && node.points.end <= whole.end);
+        }
+        let mut tags = cluster.tags[node.points.clone()].to_vec();
+        tags.sort_unstable();
+        tags
+    })
 }
 
 fn settings(elevations_deg: impl Iterator<Item = f64>) -> Settings {
@@ -110,7 +142,15 @@ fn assert_same(turn: &Turn, settings: &Settings) {
             })
             .collect();
         assert_eq!(begun.len(), clusters.len(), "a cluster was handed out twice");
-        assert!(clusters == expected, "turn {begun_in}: other clusters than the whole sweep's");
+        let (lost, new): (Vec<_>, Vec<_>) =
+            (expected.difference(&clusters).collect(), clusters.difference(&expected).collect());
+        assert!(
+            clusters == expected,
+            "turn {begun_in}: {} of {} clusters of the whole sweep are missing, and {} are new",
+            lost.len(),
+            expected.len(),
+            new.len()
+        );
     }
     assert_eq!(dropped, Dropped { late: dropped.late, overflow: 0 });
     assert!(dropped.late < 1000, "{dropped:?}: more than the first beams'");
@@ -158,12 +198,13 @@ fn a_cluster_is_handed_out_when_the_beams_have_passed_it() {
     let scan = scan(&VLP32C, &[flat(), block([0.0, -10.0], [1.0, 1.0], 0.0, 1.7)]);
     let turn = Turn::new(&scan.points, &scan.rings, 0.0);
     let (found, _) = turn.stream(&settings(VLP32C.into_iter()), 3);
-    for (tags, at_rad) in &found[1..3] {
+    for (tags, at_rad) in found.iter().filter(|(tags, _)| tags[0].0 > 0) {
         let (turn_number, last) = *tags.last().unwrap();
         let last_rad = turn.encoder_rad[last as usize] + turn_number as f32 * TAU;
-        // Twice the offset, which the last beam of the right edge may have, and 9 columns.
+        // Twice the offset, which the last beam of the right edge may have, the columns that are
+        // searched for steps, and a step of 0.8 m at 9.5 m with three columns.
         let waited_deg = (at_rad - last_rad).to_degrees();
-        assert!((0.0..=4.2 + 4.2 + 1.8).contains(&waited_deg), "{waited_deg}");
+        assert!((0.0..=4.2 + 4.2 + 8.0 + 4.9 + 0.6).contains(&waited_deg), "{waited_deg}");
     }
     // The cluster of the first turn waits for the ground.
     assert!(found[0].1 > TAU);
@@ -180,7 +221,8 @@ fn walls_all_around_are_no_cluster_and_take_no_room() {
     surfaces.extend(walls.map(wall));
     let scan = scan(&VLP32C, &surfaces);
     let turn = Turn::new(&scan.points, &scan.rings, 0.0);
-    let (found, dropped) = turn.stream(&settings(VLP32C.into_iter()), 12);
+    let settings = settings(VLP32C.into_iter());
+    let (found, dropped) = turn.stream_some(&settings, 12, |node| !node.is_part);
     assert_eq!(dropped.overflow, 0);
     for (tags, _) in found.iter().filter(|(tags, _)| (1..11).contains(&tags[0].0)) {
         let surfaces: BTreeSet<_> =
@@ -220,14 +262,16 @@ fn a_head_that_stands_still_fills_the_room_and_no_more() {
     assert_eq!(stream.dropped(), Dropped { late: 0, overflow: 90_000 });
     let mut sizes = vec![];
     stream.end(|cluster| sizes.push(cluster.points.len()));
+    let taken: usize = sizes.iter().sum();
     // A column holds as many as its cells compare: 16 of each ring.
-    assert_eq!(sizes, [16 * 32]);
+    assert_eq!(taken, 16 * 32);
     let not_opened = 10_000 - 16 * 32;
     assert_eq!(stream.dropped(), Dropped { late: 0, overflow: 90_000 + not_opened });
     stream.advance(0.0, |_| ());
     (0..20).for_each(|ring| stream.push([10.0, -1.0, 1.0], ring, ()));
     stream.end(|cluster| sizes.push(cluster.points.len()));
-    assert_eq!(sizes[1..], [20]);
+    // No step reaches the lowest ring, which lies 9 degrees below the others.
+    assert_eq!(sizes.last(), Some(&19));
 }
 
 #[test]

@@ -1,6 +1,7 @@
-//! Which cut of a sweep is taken: the one that its answers explain best.
+//! Which cut of a hierarchy is taken: the one that its answers explain best.
 
-use infer_cpu::{Classifier, Prediction};
+use crate::classifier::Classifier;
+use crate::prediction::Prediction;
 
 /// How much an unknown object counts beside a known one of the same probability.
 const WEIGHT_OF_UNKNOWN: f64 = 0.8;
@@ -20,6 +21,8 @@ pub struct Rule {
 }
 
 impl Rule {
+    /// The rule for the answers of this network.
+    #[must_use]
     pub fn new(classifier: &Classifier) -> Self {
         let unknown = &classifier.card().unknown_classes;
         let is_known = |class: &str| unknown.iter().all(|other| other != class);
@@ -28,6 +31,7 @@ impl Rule {
 
     /// The worth of a cluster of `n` points: how many of them the answer explains. Without an answer,
     /// it is unknown for sure.
+    #[must_use]
     pub fn worth(&self, n: usize, answer: Option<&Prediction>) -> f64 {
         // An answer that is unknown by its energy says nothing about the classes.
         let certain = |answer: &&Prediction| !(answer.is_unknown && self.is_known[answer.class]);
