@@ -76,13 +76,16 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     ensure!(args.format != SweepFormat::Las || cfg!(feature = "las"), Usage(cause));
     let mut recipe = read_recipe(&args.recipe)?;
     let preview = args.out.join("preview.png");
-    // The sweeps of an earlier run in another layout would stand beside those of this one.
-    let folders = ["packed", "sweeps"].into_iter().chain(Layout::ALL.iter().map(|of| of.name()));
-    let outputs: Vec<PathBuf> = folders.map(|folder| args.out.join(folder)).collect();
-    let outputs = || outputs.iter().map(PathBuf::as_path);
+    let mut folders = ["packed", "sweeps"].map(|folder| args.out.join(folder)).to_vec();
+    let set = args.layout.map(|layout| args.out.join(layout.name()));
+    folders.extend(set.clone());
+    let outputs = || folders.iter().map(PathBuf::as_path);
     args.overwrite.check_cleared(outputs(), is_written)?;
     args.overwrite.check([preview.as_path()])?;
-    let set = args.layout.map(|layout| args.out.join(layout.name()));
+    let layouts = Layout::ALL.iter().map(|layout| args.out.join(layout.name()));
+    for other in layouts.filter(|other| set.as_ref() != Some(other) && other.exists()) {
+        formats::say!("warning: {}: it is of another run, and stays", other.display());
+    }
     recipe.use_sensors(&args.sensor);
     let meshes = args.meshes.as_deref();
     let caster = args.caster.caster()?;

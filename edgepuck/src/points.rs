@@ -22,8 +22,8 @@ pub struct PointsArgs {
     #[arg(long, value_name = "FILE")]
     pub metadata: Option<PathBuf>,
 
-    /// Address of the sensor whose packets are used, of several at one address ADDRESS:PORT with its
-    /// source or destination port [default: the first sensor of the capture]
+    /// Sensor whose packets are used: ADDRESS, or of several at one address ADDRESS:PORT to which it
+    /// sends, or ADDRESS@PORT from which [default: the first sensor of the capture]
     #[arg(long, value_name = "ADDRESS")]
     pub from: Option<ChosenSender>,
 }

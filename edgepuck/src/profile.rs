@@ -128,7 +128,7 @@ fn slips(sensor: &SensorProfile, n_rays: usize) -> impl Iterator<Item = String> 
         found.push(Some(format!("views.distance_m = {views_m}: range.max_m is {most_m} m")));
     }
     if let Layout::Uniform(raster) = &sensor.layout
-        && (raster.azimuth_to_deg - raster.azimuth_from_deg).abs() >= 360.0
+        && (raster.azimuth_to_deg - raster.azimuth_from_deg).rem_euclid(360.0) == 0.0
         && raster.azimuth_steps > 1
     {
         let cause = "uniform: the first and the last azimuth are the same direction";

@@ -191,7 +191,8 @@ fn scene(args: &Args) -> anyhow::Result<(Scene, String)> {
         return Err(Usage(format!("{what}: {cause}")).into());
     }
     let extension = file.extension().unwrap_or_default();
-    if !extension.eq_ignore_ascii_case("toml") {
+    // A pipe has no name.
+    if !extension.eq_ignore_ascii_case("toml") && (file.is_file() || !extension.is_empty()) {
         let found = match extension.is_empty() {
             true => "no extension".to_owned(),
             false => format!("the extension .{}", extension.display()),

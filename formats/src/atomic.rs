@@ -200,10 +200,9 @@ impl Unfinished {
 
 impl<W: Write> Unfinished<W> {
     fn open(path: &Path, open: impl FnOnce(File) -> W) -> Result<Self, FormatError> {
-        let path = behind_links(path);
-        let (file, temporary) = Temporary::of(&path)?;
+        let (file, temporary) = Temporary::of(path)?;
         let writer = BufWriter::with_capacity(BUFFER, open(file));
-        Ok(Self { path, writer, temporary })
+        Ok(Self { path: path.to_path_buf(), writer, temporary })
     }
 
     /// Appends the output of `fill`.
@@ -225,13 +224,6 @@ impl<W: Write> Unfinished<W> {
         temporary.persist(&path).map_err(here)?;
         Ok(closed)
     }
-}
-
-/// The file that a symbolic link at `path` leads to, so that the link stays when the file is replaced;
-/// any other path as it is.
-fn behind_links(path: &Path) -> PathBuf {
-    let target = fs::canonicalize(path).ok().filter(|target| path.is_symlink() && target.is_file());
-    target.unwrap_or_else(|| path.to_path_buf())
 }
 
 /// As [`write()`], for bytes in memory.

@@ -1,7 +1,7 @@
 //! Reads captures of a sensor's packets and collects their returns in a scan.
 
 use std::fmt::{self, Display};
-use std::net::{AddrParseError, IpAddr, SocketAddr};
+use std::net::{IpAddr, SocketAddr};
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::str::FromStr;
@@ -21,36 +21,60 @@ pub struct Sender {
     pub ports: [u16; 2],
 }
 
-/// The address that a user chose, perhaps with one of the ports: `ADDRESS` or `ADDRESS:PORT`.
+/// The sensor that a user chose: by its address, or by a port, too: `ADDRESS:PORT` to which it sends, or
+/// `ADDRESS@PORT` from which.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ChosenSender {
     ip: IpAddr,
-    port: Option<u16>,
+    /// The index of the port among [`Sender::ports`], and the port.
+    port: Option<(usize, u16)>,
 }
 
 impl FromStr for ChosenSender {
-    type Err = AddrParseError;
+    type Err = String;
 
-    fn from_str(text: &str) -> Result<Self, AddrParseError> {
-        let with_port =
-            text.parse().map(|at: SocketAddr| Self { ip: at.ip(), port: Some(at.port()) });
-        with_port.or_else(|_| Ok(Self { ip: text.parse()?, port: None }))
+    fn from_str(text: &str) -> Result<Self, String> {
+        let to = || text.parse().ok().map(|at: SocketAddr| (at.ip(), Some((1, at.port()))));
+        let from = || {
+            let (ip, port) = text.split_once('@')?;
+            Some((ip.parse().ok()?, Some((0, port.parse().ok()?))))
+        };
+        let found = text.parse().ok().map(|ip| (ip, None)).or_else(to).or_else(from);
+        let (ip, port) = found.ok_or("expected ADDRESS, ADDRESS:PORT or ADDRESS@PORT")?;
+        Ok(Self { ip, port })
     }
 }
 
 impl Display for ChosenSender {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.port {
-            Some(port) => SocketAddr::new(self.ip, port).fmt(f),
+            Some((0, port)) => write!(f, "{}@{port}", self.ip),
+            Some((_, port)) => SocketAddr::new(self.ip, port).fmt(f),
             None => self.ip.fmt(f),
         }
     }
 }
 
 impl ChosenSender {
+    /// Whether a port is chosen.
+    #[must_use]
+    pub fn has_port(&self) -> bool {
+        self.port.is_some()
+    }
+
     fn is(self, sender: Sender) -> bool {
-        let is_port = |port| sender.ports == [0; 2] || sender.ports.contains(&port);
-        self.ip == sender.ip && self.port.is_none_or(is_port)
+        self.ip == sender.ip && self.port.is_none_or(|(which, port)| sender.ports[which] == port)
+    }
+
+    /// What chooses `sender` beside `other`.
+    fn of(sender: Sender, other: Sender) -> Self {
+        let [source, destination] = sender.ports;
+        let port = match (sender.ip == other.ip, destination == other.ports[1]) {
+            (false, _) => None,
+            (true, false) => Some((1, destination)),
+            (true, true) => Some((0, source)),
+        };
+        Self { ip: sender.ip, port }
     }
 }
 
@@ -117,23 +141,17 @@ impl Senders {
         if others.is_empty() {
             return None;
         }
-        // The ports are named where the addresses are the same: the one that differs.
-        let twin = others.iter().find(|(other, _)| other.ip == used.ip);
-        let port = twin.map(|(other, _)| usize::from(other.ports[1] != used.ports[1]));
-        let named = |sender: &Sender| match port {
-            None => sender.ip.to_string(),
-            Some(which) => SocketAddr::new(sender.ip, sender.ports[which]).to_string(),
-        };
         let of_others: Vec<_> = others
             .iter()
-            .map(|(other, data)| format!("{} ({data} so far)", named(other)))
+            .map(|(other, data)| format!("{} ({data} so far)", ChosenSender::of(*other, used)))
             .collect();
-        let from = if port.is_some() { "ADDRESS:PORT" } else { "ADDRESS" };
+        let first = others[0].0;
         Some(format!(
-            "expected packets of one sensor, found those of {}, which are used, and of {}, \
-             which are not; --from {from} chooses another",
-            named(&used),
-            of_others.join(", ")
+            "expected packets of one sensor, found those of {}, which are used, and of {}, which are \
+             not; --from {} chooses another",
+            ChosenSender::of(used, first),
+            of_others.join(", "),
+            ChosenSender::of(first, used)
         ))
     }
 }
@@ -141,12 +159,17 @@ impl Senders {
 /// What the packets of others explain, where those of the chosen one are missing.
 impl Display for Senders {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let used = self.used.map(|used| used.ip).or(self.chosen.map(|chosen| chosen.ip));
+        let all = |sender: Sender| ChosenSender { ip: sender.ip, port: Some((1, sender.ports[1])) };
+        let used = self.chosen.or(self.used.map(|used| ChosenSender { ip: used.ip, port: None }));
         let (n, Some(used)) = (self.n_dropped, used) else { return Ok(()) };
         if n == 0 {
             return Ok(());
         }
-        let others: Vec<_> = self.others.iter().map(|(other, _)| other.ip.to_string()).collect();
+        let name = |(other, _): &(Sender, u64)| match other.ip == used.ip {
+            true => all(*other).to_string(),
+            false => other.ip.to_string(),
+        };
+        let others: Vec<_> = self.others.iter().map(name).collect();
         write!(f, ", {n} of them from other addresses than {used}: {}", others.join(", "))
     }
 }

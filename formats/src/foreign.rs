@@ -81,8 +81,9 @@ pub(crate) fn or_foreign(
 
 /// As [`or_foreign`], for the file at `path`.
 pub(crate) fn or_foreign_file(path: &Path, expected: &str, error: FormatError) -> FormatError {
-    match File::open(path) {
-        Ok(file) => or_foreign(path, file, expected, error),
-        Err(_) => error,
+    // Opening a named pipe would wait for a writer.
+    match path.is_file().then(|| File::open(path)) {
+        Some(Ok(file)) => or_foreign(path, file, expected, error),
+        _ => error,
     }
 }

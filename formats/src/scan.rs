@@ -155,7 +155,7 @@ pub(crate) fn pose_of(numbers: &[f64]) -> Option<[f64; 16]> {
     // Poses of f32, multiplied some times, are rotations within this.
     let is_near = |a: f64, b: f64| (a - b).abs() < 1e-3;
     let is_rotation =
-        is_near(dot(x, x), 1.0) && is_near(dot(y, y), 1.0) && is_near(dot(cross, z), 1.0);
+        [x, y, z].iter().all(|row| is_near(dot(*row, *row), 1.0)) && is_near(dot(cross, z), 1.0);
     let is_pose =
         is_rotation && pose.iter().all(|x| x.is_finite()) && pose[12..] == [0.0, 0.0, 0.0, 1.0];
     is_pose.then_some(pose)

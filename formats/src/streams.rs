@@ -82,6 +82,9 @@ streams! {
     /// The beams on an instance that has no name.
     Instance { number: u32, at: StartTime, sensor: u32 } = "instance/{number}{at}", sensor;
 
+    /// The seed of the scan of a row of a batch.
+    BatchRow { row: u32 } = "batch row", row;
+
     /// A part of a generated shape.
     Shape { class: &'a str, part: &'a str, instance: u32 } = "shapes/{class}/{part}", instance;
     /// A generated object of a street, a room or a yard.

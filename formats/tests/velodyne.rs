@@ -428,7 +428,7 @@ fn of_two_sensors_one_is_read() {
     let n = both.len() as u64 / 3;
     let warning = format!(
         "expected packets of one sensor, found those of 192.168.1.201, which are used, and of \
-         10.0.0.7 ({n} so far), which are not; --from ADDRESS chooses another"
+         10.0.0.7 ({n} so far), which are not; --from 10.0.0.7 chooses another"
     );
     assert_eq!((senders.warning(), senders.n_dropped()), (Some(warning), 2 * n - 1));
     let mut chosen = Senders::new(Some("10.0.0.7".parse().unwrap()));
@@ -451,7 +451,11 @@ fn sensors_of_one_address_are_told_apart_by_their_ports() {
     let alone = capture(folder.path(), Returns::Strongest);
     let path = folder.path().join("two.pcapng");
     let expected = read_turn(&alone, &mut Senders::default()).unwrap().0;
-    for place in [34, 36] {
+    // The source port is the third word after the addresses, the destination port the fourth.
+    for (place, used, other) in [
+        (34, "192.168.1.201@2368", "192.168.1.201@2369"),
+        (36, "192.168.1.201:2368", "192.168.1.201:2369"),
+    ] {
         let mut both = Vec::new();
         for frame in frames(&fs::read(&alone).unwrap()) {
             let mut other = frame.clone();
@@ -465,13 +469,23 @@ fn sensors_of_one_address_are_told_apart_by_their_ports() {
         let mut senders = Senders::default();
         assert_eq!(read_turn(&path, &mut senders).unwrap().0, expected);
         let warning = senders.warning().unwrap();
-        let named =
-            "found those of 192.168.1.201:2368, which are used, and of 192.168.1.201:2369 (";
-        assert!(warning.contains(named), "{warning}");
-        assert!(warning.ends_with("--from ADDRESS:PORT chooses another"), "{warning}");
-        let mut chosen = Senders::new(Some("192.168.1.201:2369".parse().unwrap()));
-        assert_ne!(read_turn(&path, &mut chosen).unwrap().0, expected);
-        assert_eq!(chosen.warning(), None);
+        let named = format!("found those of {used}, which are used, and of {other} (");
+        assert!(warning.contains(&named), "{warning}");
+        assert!(warning.ends_with(&format!("--from {other} chooses another")), "{warning}");
+        for (name, is_first) in [(used, true), (other, false)] {
+            let mut chosen = Senders::new(Some(name.parse().unwrap()));
+            assert_eq!(read_turn(&path, &mut chosen).unwrap().0 == expected, is_first, "{name}");
+            assert_eq!(chosen.warning(), None);
+        }
+    }
+    let absent = "192.168.1.201:9999".parse().unwrap();
+    let error = read_turn(&path, &mut Senders::new(Some(absent))).unwrap_err().to_string();
+    let found =
+        "from other addresses than 192.168.1.201:9999: 192.168.1.201:2368, 192.168.1.201:2369";
+    assert!(error.ends_with(found), "{error}");
+    for wrong in ["192.168.1", "192.168.1.201:x", "@2368"] {
+        let error = wrong.parse::<formats::ChosenSender>().unwrap_err();
+        assert_eq!(error, "expected ADDRESS, ADDRESS:PORT or ADDRESS@PORT");
     }
 }
 

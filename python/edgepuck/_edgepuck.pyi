@@ -91,7 +91,8 @@ class Scene:
         poses: NDArray[np.float64],
         numbers: Sequence[int],
         moved: NDArray[np.float64],
-    ) -> tuple[NDArray[np.float32], NDArray[np.uint32]]: ...
+        seed: int | None,
+    ) -> tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.uint64]]: ...
     def scan_all(self, adapter: str) -> list[tuple[str, dict[str, Any]]]: ...
 
 @final

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _edgepuck, _scanning
+from ._arguments import seed as seed_of
 from ._arguments import whole
 from ._mesh import Axis, Mesh, native
 from ._scan import Scan, scan_of
@@ -204,16 +205,19 @@ class Scene:
         poses: ArrayLike,
         *,
         move: tuple[Sequence[int], ArrayLike] | None = None,
+        seed: int | None = None,
     ) -> Batch:
         """The ranges of a sensor's beams from many poses, as learning loops want them.
 
         Each pose sees a world of its own, in which the instances of `move` stand elsewhere. Nothing is
-        rebuilt, and the scene itself does not change. Row i has the ranges of `scan` at pose i; where the
-        scene's file has random effects, with its seed plus i.
+        rebuilt, and the scene itself does not change. A row has the ranges of `scan` at its pose and, where
+        the scene's file has random effects, with its seed of `seeds`.
 
         Args:
             sensor: The sensor.
             poses: The poses of the sensor, [n, 4, 4], or [n, 7]: x, y, z and a quaternion w, x, y, z.
+            seed: The seed of the batch; by default that of the scene's file, or 0. Give each step of a
+                loop its own.
             move: Numbers of k instances, and their poses for each pose of the sensor, [n, k, 4, 4] or
                 [n, k, 7].
 
@@ -236,9 +240,10 @@ class Scene:
         if move is not None:
             numbers = [whole("move", number, 0, 2**32 - 1) for number in move[0]]
             _, moved = _rows("move", move[1], (n, len(numbers)))
-        ranges, objects = self._scene.cast(sensor_of(sensor), rows, numbers, moved)
+        key = None if seed is None else seed_of(seed)
+        ranges, objects, seeds = self._scene.cast(sensor_of(sensor), rows, numbers, moved, key)
         # The largest number, of beams without a return, is -1.
-        return Batch(ranges, objects.view(np.int32), sensor)
+        return Batch(ranges, objects.view(np.int32), seeds, sensor)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _remade, (self._file, self._added, self._poses)
@@ -254,7 +259,9 @@ class Batch:
     ranges: NDArray[np.float32]
     """Metres, infinite where nothing returns, [n, n_beams]; beams are in the order of `directions`."""
     object: NDArray[np.int32]
-    """The number of the instance, -1 where nothing returns, [n, n_beams]."""
+    """The number of the instance; -1 where nothing returns, or something in the air, [n, n_beams]."""
+    seeds: NDArray[np.uint64]
+    """The seed of each row, [n]."""
     sensor: Sensor
     """The sensor."""
 

@@ -8,7 +8,7 @@ use crate::sensor::Sensor;
 use formats::scan::Attribute;
 use glam::{DMat3, DQuat, DVec3};
 use numpy::ndarray::{Array2, ArrayView1};
-use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use sim_gpu::internals::scene::check_object;
@@ -18,6 +18,10 @@ use std::sync::Mutex;
 
 /// A scan's columns and the name of its sensor.
 type NamedScan<'py> = (String, Bound<'py, PyDict>);
+
+/// Ranges, objects and the seeds of rows.
+type CastArrays<'py> =
+    (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u32>>, Bound<'py, PyArray1<u64>>);
 
 /// Meshes in the world, and the sensors of a scene's file.
 #[pyclass(module = "edgepuck._edgepuck", frozen)]
@@ -125,8 +129,10 @@ impl Scene {
         poses: PyReadonlyArray2<'py, f64>,
         numbers: Vec<usize>,
         moved: PyReadonlyArray2<'py, f64>,
-    ) -> PyResult<(Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u32>>)> {
-        let scene = lock(&self.scene).clone();
+        seed: Option<u64>,
+    ) -> PyResult<CastArrays<'py>> {
+        let mut scene = lock(&self.scene).clone();
+        scene.seed = seed.unwrap_or(scene.seed);
         let ids: Vec<_> = scene.ids().collect();
         let missing = |number: &usize| {
             let n = ids.len();
@@ -142,7 +148,7 @@ impl Scene {
             (batch.map_err(raised)?, (poses.len(), sensor.sensor.directions().len()));
         let ranges = Array2::from_shape_vec(shape, batch.range_m).map_err(raised)?;
         let objects = Array2::from_shape_vec(shape, batch.object).map_err(raised)?;
-        Ok((ranges.into_pyarray(py), objects.into_pyarray(py)))
+        Ok((ranges.into_pyarray(py), objects.into_pyarray(py), batch.seeds.into_pyarray(py)))
     }
 
     /// Scan it by each of the sensors of its file.

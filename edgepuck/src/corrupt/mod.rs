@@ -8,6 +8,7 @@ mod sweep;
 use crate::brightness::BrightnessArgs;
 use crate::points::{PlaceArgs, SweepArgs};
 use crate::{Outcome, Usage};
+use anyhow::Context;
 use formats::outputs::Overwrite;
 use plan::{Entry, Plan};
 use sim_gpu::Sensor;
@@ -82,7 +83,7 @@ pub fn run(args: &CorruptArgs) -> anyhow::Result<Outcome> {
         let cause = format!("{flag} applies to {other} only, and {} is {found}", sweep.display());
         return Err(Usage(cause).into());
     }
-    args.overwrite.check_cleared([args.out.as_path()], is_written)?;
+    args.overwrite.check_folder(&args.out)?;
     let input = SweepArgs { sweep, place: args.place.clone() };
     let sensor = Sensor::resolve(&args.profile)?;
     if input.sweep.is_dir() {
@@ -108,15 +109,20 @@ fn listed(plan: &Plan) -> String {
     text
 }
 
-/// Whether this command writes files of this name: the list, and scans and sets by the corruption and
-/// its severity, such as `fog-2.npz` and `jitter-1-test.npz`.
-fn is_written(file: &Path) -> bool {
-    let name = file.file_name().unwrap_or_default().to_string_lossy();
-    let Some(stem) = name.strip_suffix(".npz") else { return name == LIST };
-    let corruption = stem.strip_suffix("-test").unwrap_or(stem);
-    let severity =
-        corruption.rsplit_once('-').and_then(|(_, severity)| severity.parse::<u32>().ok());
-    severity.is_some() || stem == "clean-test"
+/// Removes what an earlier run wrote into `out`, which its list names, but for the `input`.
+fn remove_former(out: &Path, input: &Path) -> anyhow::Result<()> {
+    let list = out.join(LIST);
+    let Ok(mut csv) = csv::Reader::from_path(&list) else { return Ok(()) };
+    let names = csv.records().map(|record| Ok(record?.get(0).unwrap_or_default().to_owned()));
+    let input = input.canonicalize().ok();
+    for name in names.collect::<Result<Vec<_>, csv::Error>>()? {
+        let path = out.join(&name);
+        let is_plain = Path::new(&name).file_name().is_some_and(|own| own == name.as_str());
+        if is_plain && path.is_file() && path.canonicalize().ok() != input {
+            std::fs::remove_file(&path).with_context(|| path.display().to_string())?;
+        }
+    }
+    std::fs::remove_file(&list).with_context(|| list.display().to_string())
 }
 
 /// The list of what was written.

@@ -1,5 +1,5 @@
 use super::plan::{Plan, chosen};
-use super::{CorruptArgs, Written, ended, is_written, usage, write_list};
+use super::{CorruptArgs, Written, ended, remove_former, usage, write_list};
 use crate::Outcome;
 use crate::flags::first_given;
 use crate::gen_dataset::{listed, print_notes, report_failures};
@@ -69,7 +69,7 @@ pub(super) fn run(
     let (out, seed) = (&*args.out, args.seed);
     let corrupted = Corrupted { out, sensor, views, up, points, seed };
     let progress = Progress::default();
-    args.overwrite.clear([out], is_written)?;
+    remove_former(out, folder)?;
     let written = corrupted.write(&meshes, &sets, &progress, || bar.inc(1))?;
     bar.finish_and_clear();
     print_notes(&progress.notes());

@@ -1,5 +1,5 @@
 use super::plan::{Plan, chosen};
-use super::{CorruptArgs, Written, ended, is_written, usage, write_list};
+use super::{CorruptArgs, Written, ended, remove_former, usage, write_list};
 use crate::Outcome;
 use crate::points::SweepArgs;
 use edgepuck_segment::{Label, Segmenter, Settings, Sweep, doubtful_axes};
@@ -38,7 +38,7 @@ pub(super) fn run(
         false => Vec::new(),
     };
 
-    args.overwrite.clear([args.out.as_path()], is_written)?;
+    remove_former(&args.out, &input.sweep)?;
     let begun = UnfinishedFolder::begin_new(&args.out);
     let is_dark = brightness.is_none();
     let (mut written, mut too_weak_before) = (Vec::new(), 0);

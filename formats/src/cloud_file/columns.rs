@@ -32,8 +32,8 @@ const INTENSITIES: [(&str, Unit); 4] = [
     ("reflectivity", Unit::Percent),
 ];
 
-/// The usual names of the column of rings. CloudCompare writes the second, VeloView the last.
-const RINGS: [&str; 3] = ["ring", "scalar_ring", "laser_id"];
+/// The usual names of the column of rings. CloudCompare writes the second.
+const RINGS: [&str; 2] = ["ring", "scalar_ring"];
 
 /// The columns of intensities and rings, which `column` finds by their names.
 pub(super) fn find<T>(mut column: impl FnMut(&str) -> Option<T>) -> Vec<(T, Extra)> {

@@ -67,7 +67,8 @@ impl CloudFormat {
     /// The format of the file at `path` by its first bytes, if these are unmistakable.
     pub(super) fn of_signature(path: &Path) -> Option<Self> {
         let mut start = [0; SIGNED_SIZE];
-        let mut file = std::fs::File::open(path).ok().filter(|_| path.is_file())?;
+        // Opening a named pipe would wait for a writer.
+        let mut file = path.is_file().then(|| std::fs::File::open(path).ok()).flatten()?;
         let n = records::fill(&mut file, &mut start).ok()?;
         let found = Self::of_content(&start[..n], path).ok()?;
         // Of other archives than NumPy's, the first file has another name.

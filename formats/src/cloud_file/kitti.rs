@@ -190,7 +190,7 @@ pub(super) fn write(
     let loss_m = precision::loss(points);
     if loss_m > COARSEST_M && Precision::tolerable(points) == Precision::Double {
         let cause = format!(
-            "f32, the format's only type, changes coordinates by {loss_m:.2} m: move the origin near the \
+            "f32, the format's only type, changes coordinates by {loss_m:.4} m: move the origin near the \
              points, or choose another format"
         );
         return Err(FormatError::malformed(path, "points", cause));

@@ -64,8 +64,8 @@ pub struct Cloud {
     /// nuScenes. They are as in the file, except for those of LAS, of which 65535 is 1 unless all are
     /// below 256, and reflectivities of whole numbers up to 255, of which 100 is 1.
     pub intensities: Option<Vec<f32>>,
-    /// The ring of each point, if the file has them: the column `ring`, `scalar_ring` or
-    /// `laser_id`, or nuScenes' fifth. A column that holds anything else is none of rings.
+    /// The ring of each point, if the file has them: the column `ring` or
+    /// `scalar_ring`, or nuScenes' fifth. A column that holds anything else is none of rings.
     pub rings: Option<Vec<u16>>,
     /// The pose of the sensor, a matrix of 4 by 4 row by row: `pose` of an NPZ or PLY file, or the
     /// VIEWPOINT of a PCD file, unless it is the identity.

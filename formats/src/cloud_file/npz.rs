@@ -3,8 +3,9 @@
 use std::io::{self, Read, Seek, Write};
 use std::path::Path;
 
+use super::columns::{self, Extra};
 use super::precision::Precision;
-use super::{Cloud, columns, npy};
+use super::{Cloud, npy};
 use crate::archive::{NpzReader, NpzWriter};
 use crate::decoding::invalid;
 use crate::error::FormatError;
@@ -33,8 +34,8 @@ pub(super) fn read(reader: impl Read + Seek, name: &Path) -> Result<Cloud, Forma
     let is_record = cloud.intensities.is_some() || cloud.rings.is_some();
     for (key, extra) in columns::find(key).into_iter().filter(|_| !is_record) {
         let n = cloud.points.len();
-        // Anything may be called `i`: only an array with a number for each point has intensities.
-        let is_short = key.len() == 1;
+        // Anything may be called `i`, or hold rings of something else.
+        let is_short = key.len() == 1 || matches!(extra, Extra::Ring);
         let values = npz.entry(key, |header, _, elements| {
             match crate::npy::check_columns(&header, 1, n) {
                 Err(_) if is_short => return Ok(None),

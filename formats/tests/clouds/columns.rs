@@ -72,7 +72,7 @@ fn columns_of_rings_are_known_by_their_names() {
     for (name, bytes, expected) in [
         ("a.pcd", pcd([31, 0]), Some([31, 0])),
         ("a.pcd", pcd([0, 0]), Some([0, 0])),
-        ("a.csv", b"x,y,z,laser_id,intensity\n1,2,3,31,0\n4,5,6,0,0\n".into(), Some([31, 0])),
+        ("a.csv", b"x,y,z,scalar_Ring,intensity\n1,2,3,31,0\n4,5,6,0,0\n".into(), Some([31, 0])),
         ("a.csv", b"x,y,z,ring\n1,2,3,0.5\n4,5,6,1\n".into(), None),
         (
             "a.npz",

@@ -100,6 +100,7 @@ fn what_is_no_cloud_is_refused() {
             "FIELDS x y\nSIZE 4 4\nTYPE F F\nPOINTS 1\nDATA ascii\n",
             "FIELDS: expected a field z, found `x y`",
         ),
+        ("VIEWPOINT nan 0 0 1 0 0 0\n", "line 3: expected finite numbers, or no line VIEWPOINT"),
         ("FIELDS x y z\nSIZE 4 4\n", "line 4: expected 3 words, one for each of FIELDS, found 2"),
         ("FIELDS x y z\nSIZE 4 4 -4\n", "line 4: expected a count, found `-4`"),
         (

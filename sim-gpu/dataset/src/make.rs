@@ -13,9 +13,10 @@ use crate::record::Entry;
 use crate::retract::retract;
 use crate::verify::first_problem;
 use formats::atomic;
+use rayon::prelude::*;
 use sim_gpu::Caster;
 use sim_gpu::internals::mesh::tree::MeshEntry;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::atomic::Ordering::SeqCst;
 
@@ -96,12 +97,12 @@ fn check_finished(
     meshes: &[MeshEntry],
 ) -> Result<(), DatasetError> {
     let hashing = manifest.config.hash;
-    let found = |mesh: &&MeshEntry| {
-        let entry = Entry::from(*mesh);
-        let record = manifest.meshes.iter().find(|record| record.entry == entry);
+    let records: BTreeMap<&Entry, _> = manifest.meshes.iter().map(|r| (&r.entry, r)).collect();
+    let is_changed = |mesh: &&MeshEntry| {
+        let record = records.get(&Entry::from(*mesh));
         record.is_some_and(|record| !is_current(record, mesh, hashing))
     };
-    let changed = meshes.iter().find(found);
+    let changed = meshes.par_iter().find_first(is_changed);
     let changed = changed.map(|mesh| format!("{} has changed since", mesh.path.display()));
     match changed.or_else(|| first_problem(out, manifest).map(|problem| problem.to_string())) {
         None => Ok(()),

@@ -4,6 +4,7 @@ use super::{Error, InstanceId, Scene, Sensor};
 use crate::config::InvalidValue;
 use crate::pose::Pose;
 use formats::scan::Attribute;
+use formats::streams::Stream;
 use rayon::prelude::*;
 
 /// The object of a beam that returns nothing.
@@ -25,25 +26,31 @@ pub struct Moves<'a> {
 pub struct Batch {
     /// Metres; infinite where no return comes back.
     pub range_m: Vec<f32>,
-    /// The number of the instance; [`NO_OBJECT`] where no return comes back.
+    /// The number of the instance; [`NO_OBJECT`] where no return comes back, or one from the air.
     pub object: Vec<u32>,
+    /// The seed of each row.
+    pub seeds: Vec<u64>,
 }
 
 impl Scene {
     /// The ranges that `sensor` measures at each of `poses`, on all threads of the CPU. Each pose sees a
     /// world of its own, in which the instances of `moves` stand elsewhere: nothing is rebuilt.
     ///
-    /// Row `i` has the ranges of [`Scene::scan`] at this pose, with the seed of the scene plus `i`, to
-    /// the bit. Of several returns of a beam it has the first.
+    /// A row has the ranges of [`Scene::scan`] at its pose and with its seed, to the bit. Of several
+    /// returns of a beam it has the first. Rows, and batches of other seeds, have other noise.
     ///
     /// # Errors
     /// As [`ScanBuilder::run`](super::ScanBuilder::run); another number of poses in `moves` than poses
-    /// times instances; an instance of another scene.
+    /// times instances; an instance of another scene; more ranges than the memory holds.
     pub fn cast(&self, sensor: &Sensor, poses: &[Pose], moves: Moves<'_>) -> Result<Batch, Error> {
         self.check_moves(poses.len(), moves)?;
         let (n_beams, n_moved) = (sensor.directions().len(), moves.instances.len());
-        let n = n_beams * poses.len();
-        let mut batch = Batch { range_m: vec![f32::INFINITY; n], object: vec![NO_OBJECT; n] };
+        let rows = 0..poses.len() as u32;
+        let mut batch = Batch {
+            range_m: filled(poses.len(), n_beams, f32::INFINITY)?,
+            object: filled(poses.len(), n_beams, NO_OBJECT)?,
+            seeds: rows.map(|row| row_seed(self.seed, row)).collect(),
+        };
         if n_beams == 0 {
             return Ok(batch);
         }
@@ -55,7 +62,7 @@ impl Scene {
                 for (&instance, &pose) in moves.instances.iter().zip(of_this) {
                     world[instance].pose = pose;
                 }
-                let scan = world.scan(sensor, pose).seed(self.seed.wrapping_add(i as u64));
+                let scan = world.scan(sensor, pose).seed(row_seed(self.seed, i as u32));
                 let scan = scan.attributes([Attribute::Range, Attribute::Beam, Attribute::Object]);
                 let found = scan.run()?.points;
                 let column = "invariant: the scan was asked for it";
@@ -89,6 +96,23 @@ impl Scene {
     }
 }
 
+fn row_seed(seed: u64, row: u32) -> u64 {
+    let [low, high, ..] = Stream::BatchRow { row }.key(seed).words([0; 4]);
+    u64::from(low) | u64::from(high) << 32
+}
+
+/// A number for each beam of each pose, if the memory holds them.
+fn filled<T: Copy>(n_poses: usize, n_beams: usize, value: T) -> Result<Vec<T>, InvalidValue> {
+    let mut all = Vec::new();
+    let n = n_poses.checked_mul(n_beams).filter(|_| u32::try_from(n_poses).is_ok());
+    let Some(n) = n.filter(|n| all.try_reserve_exact(*n).is_ok()) else {
+        let cause = format!("expected fewer: no memory for {n_poses} times {n_beams} ranges");
+        return Err(InvalidValue::new("poses", cause));
+    };
+    all.resize(n, value);
+    Ok(all)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -96,7 +120,7 @@ mod tests {
     use crate::effects::{Effects, Noise};
     use glam::DVec3;
 
-    /// A wall 10 m ahead and a box before it.
+    /// A wall 10 m ahead and a plate before it.
     fn world() -> (Scene, InstanceId) {
         let wall = vec![[10.0, -9.0, -9.0], [10.0, 9.0, -9.0], [10.0, 9.0, 9.0], [10.0, -9.0, 9.0]];
         let wall = Mesh::from_triangles(wall, vec![[0, 2, 1], [0, 3, 2]]).unwrap();
@@ -132,8 +156,11 @@ mod tests {
                 let wall = hits(10.0, 9.0).map(|range| (range as f32, 0));
                 match plate.or(wall) {
                     Some((range_m, object)) => {
-                        // One unit in the last place of f32 at 16 m.
-                        assert!((found.0 - range_m).abs() <= 1e-6 * range_m, "{found:?} {range_m}");
+                        // Both are rounded to f32 once: one unit in the last place, at most 2^-23.
+                        assert!(
+                            (found.0 - range_m).abs() <= range_m * f32::EPSILON,
+                            "{found:?} {range_m}"
+                        );
                         assert_eq!(found.1, object);
                         n_plates += usize::from(object == moving.number());
                     }
@@ -156,17 +183,23 @@ mod tests {
         let batch = scene.cast(&sensor, &poses, Moves::default()).unwrap();
         let n = sensor.directions().len();
         for (i, &pose) in poses.iter().enumerate() {
-            let alone = scene.scan(&sensor, pose).seed(7 + i as u64).run().unwrap().points;
+            let alone = scene.scan(&sensor, pose).seed(batch.seeds[i]).run().unwrap().points;
             let mut expected = vec![f32::INFINITY; n];
             for (range_m, beam) in alone.range_m.unwrap().into_iter().zip(alone.beam.unwrap()) {
                 expected[beam as usize] = range_m;
             }
             assert!(expected == batch.range_m[i * n..(i + 1) * n], "pose {i}");
-            // One pose alone gives the same row as in the batch, for the first of its seeds.
-            scene.seed = 7 + i as u64;
-            assert!(scene.cast(&sensor, &[pose], Moves::default()).unwrap().range_m == expected);
-            scene.seed = 7;
         }
+        // Neither rows nor batches of successive seeds share their noise.
+        let mut seeds = batch.seeds.clone();
+        for seed in 0..9 {
+            scene.seed = seed;
+            seeds.extend(scene.cast(&sensor, &poses, Moves::default()).unwrap().seeds);
+        }
+        seeds.sort_unstable();
+        seeds.dedup();
+        // The seed 7 is there twice.
+        assert_eq!(seeds.len(), 9 * poses.len());
     }
 
     #[test]

@@ -27,7 +27,11 @@ const STAND_INS: [&str; 8] =
     ["1", "\"x\"", "true", "[1, 1, 1]", "[1, 1]", "[1, 1, 1, 1]", "[]", "{}"];
 
 /// Everything that is wrong with a file, sorted by line.
-pub(super) struct Mistakes(Vec<Mistake>);
+pub(super) struct Mistakes {
+    all: Vec<Mistake>,
+    /// How many of them a message has.
+    most: usize,
+}
 
 struct Mistake {
     /// The line, from 1; `None` where the key's table is the file itself.
@@ -50,7 +54,8 @@ impl Mistakes {
                 invalid: InvalidValue::new("", error.message()),
             };
             // Of a file that is no TOML, each line is an error.
-            return Err(Self::sorted(errors.iter().take(MOST_OF_SYNTAX).map(mistake)));
+            let Self { all, .. } = Self::sorted(errors.iter().map(mistake));
+            return Err(Self { all, most: MOST_OF_SYNTAX });
         }
         let read = |root| T::deserialize(Deserializer::from(root));
         let found = match read(root.clone()) {
@@ -79,20 +84,20 @@ impl Mistakes {
     fn sorted(all: impl Iterator<Item = Mistake>) -> Self {
         let mut all: Vec<Mistake> = all.collect();
         all.sort_by_key(|mistake| mistake.line);
-        Self(all)
+        Self { all, most: MOST }
     }
 }
 
 impl fmt::Display for Mistakes {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if let [only] = &self.0[..] {
+        if let [only] = &self.all[..] {
             return only.fmt(f);
         }
-        write!(f, "{} mistakes:", self.0.len())?;
-        for mistake in self.0.iter().take(MOST) {
+        write!(f, "{} mistakes:", self.all.len())?;
+        for mistake in self.all.iter().take(self.most) {
             write!(f, "\n  {}", mistake.to_string().replace('\n', "\n  "))?;
         }
-        match self.0.len().saturating_sub(MOST) {
+        match self.all.len().saturating_sub(self.most) {
             0 => Ok(()),
             more => write!(f, "\n  and {more} more"),
         }

@@ -3,6 +3,7 @@
 //! The crate reads and checks the JSON. Positions and indices are read here, because its readers of
 //! accessors do not check their bounds. The format is in metres with y up.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use base64::Engine;
@@ -13,6 +14,7 @@ use gltf::mesh::Mode;
 use gltf::{Accessor, Document, Gltf, Node, Primitive};
 
 use super::error::{Malformed, ParseError};
+use super::load::read;
 use super::triangle_mesh::Parsed;
 
 /// Extensions that change where triangles are, and are not read.
@@ -43,7 +45,8 @@ pub(super) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Parsed, Parse
     }
     let document = Document::from_json(json).map_err(|error| wrong(error.to_string()))?;
     let file = Gltf { document, blob };
-    let buffers = file.buffers().map(|buffer| content(&buffer, &file, folder));
+    let blob = file.blob.as_deref().unwrap_or_default();
+    let buffers = file.buffers().map(|buffer| content(&buffer, blob, folder));
     let mut reader = Reader {
         buffers: buffers.collect::<Result<_, _>>().map_err(wrong)?,
         parsed: Parsed::default(),
@@ -58,24 +61,24 @@ pub(super) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Parsed, Parse
 }
 
 /// The bytes of a buffer: of the file itself, in base64, or of another file.
-fn content(
+fn content<'a>(
     buffer: &gltf::Buffer<'_>,
-    file: &Gltf,
+    blob: &'a [u8],
     folder: Option<&Path>,
-) -> Result<Vec<u8>, String> {
+) -> Result<Cow<'a, [u8]>, String> {
     let place = format!("buffers[{}]", buffer.index());
     let found = match buffer.source() {
-        gltf::buffer::Source::Bin => file.blob.clone().unwrap_or_default(),
+        gltf::buffer::Source::Bin => Cow::Borrowed(blob),
         gltf::buffer::Source::Uri(uri) => match (uri.strip_prefix("data:"), folder) {
             (Some(data), _) => {
                 let text = data.split_once(";base64,").map(|(_, text)| text);
                 let decoded = text.and_then(|text| STANDARD.decode(text).ok());
-                decoded.ok_or_else(|| format!("{place}: expected base64, found something else"))?
+                let wrong = || format!("{place}: expected base64, found something else");
+                Cow::Owned(decoded.ok_or_else(wrong)?)
             }
             (None, Some(folder)) => {
-                let path = folder.join(uri.replace("%20", " "));
-                std::fs::read(&path)
-                    .map_err(|error| format!("{place}: {}: {error}", path.display()))?
+                let bytes = read(&folder.join(unescaped(uri)));
+                Cow::Owned(bytes.map_err(|error| format!("{place}: {error}"))?)
             }
             (None, None) => {
                 return Err(format!("{place}: expected its bytes, found the file {uri}"));
@@ -88,14 +91,30 @@ fn content(
     }
 }
 
-struct Reader {
-    buffers: Vec<Vec<u8>>,
+/// `uri` with the bytes that `%XX` stands for (RFC 3986, 2.1).
+fn unescaped(uri: &str) -> String {
+    let mut bytes = Vec::with_capacity(uri.len());
+    let mut rest = uri.as_bytes();
+    while let [first, others @ ..] = rest {
+        let byte = (*first == b'%').then(|| others.get(..2)).flatten();
+        let byte = byte.and_then(|hex| u8::from_str_radix(std::str::from_utf8(hex).ok()?, 16).ok());
+        bytes.push(byte.unwrap_or(*first));
+        rest = if byte.is_some() { &others[2..] } else { others };
+    }
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+/// More vertices take more than 6 GB: a few nodes may place one mesh any number of times.
+const MOST_VERTICES: usize = 1 << 28;
+
+struct Reader<'a> {
+    buffers: Vec<Cow<'a, [u8]>>,
     parsed: Parsed,
     /// The nodes that a scene or a parent has named: each is part of one tree.
     is_seen: Vec<bool>,
 }
 
-impl Reader {
+impl Reader<'_> {
     /// Adds a node and those below it; `parent` is the transform of the node above.
     fn add(&mut self, root: &Node<'_>, parent: DMat4) -> Result<(), String> {
         let mut open = vec![(root.clone(), parent)];
@@ -135,16 +154,26 @@ impl Reader {
         }
         let positions = primitive.get(&gltf::Semantic::Positions);
         let positions = positions.ok_or("expected the attribute POSITION, found none")?;
-        let first = self.parsed.mesh.vertices.len() as u64;
+        let first = self.parsed.mesh.vertices.len() as u32;
         let mut vertices = Vec::new();
         self.each(&positions, Dimensions::Vec3, |at| {
             vertices.push(world.transform_point3(DVec3::new(at[0], at[1], at[2])));
         })?;
         let n = vertices.len();
         self.parsed.mesh.vertices.append(&mut vertices);
-        Malformed::check_vertex_count(first + n as u64).map_err(|error| error.to_string())?;
+        let all = self.parsed.mesh.vertices.len();
+        if all > MOST_VERTICES {
+            return Err(format!(
+                "expected at most {MOST_VERTICES} vertices of all nodes, found more"
+            ));
+        }
         let mut indices = Vec::new();
         match primitive.indices() {
+            Some(accessor) if !is_index(accessor.data_type()) || accessor.normalized() => {
+                return Err(
+                    "expected indices of whole numbers without sign, found others".to_owned()
+                );
+            }
             Some(accessor) => {
                 self.each(&accessor, Dimensions::Scalar, |number| indices.push(number[0] as u32))?;
             }
@@ -153,11 +182,17 @@ impl Reader {
         if let Some(outside) = indices.iter().find(|index| **index as usize >= n) {
             return Err(format!("expected indices of {n} vertices, found {outside}"));
         }
-        let mut face = |corners: [u32; 3]| {
-            self.parsed.add_face(&corners.map(|corner| first as u32 + corner));
+        // Of a mirror image, the outside stays outside.
+        let is_mirrored = world.determinant() < 0.0;
+        let mut face = |[a, b, c]: [u32; 3]| {
+            let corners = if is_mirrored { [a, c, b] } else { [a, b, c] };
+            self.parsed.add_face(&corners.map(|corner| first + corner));
         };
         match mode {
-            Mode::TriangleStrip => indices.windows(3).for_each(|w| face([w[0], w[1], w[2]])),
+            // Every other triangle of a strip runs the other way round (glTF 2.0, 3.7.2.1).
+            Mode::TriangleStrip => indices.windows(3).enumerate().for_each(|(i, w)| {
+                face(if i % 2 == 0 { [w[0], w[1], w[2]] } else { [w[0], w[2], w[1]] });
+            }),
             Mode::TriangleFan => {
                 indices.windows(2).skip(1).for_each(|w| face([indices[0], w[0], w[1]]));
             }
@@ -194,7 +229,9 @@ impl Reader {
         let n = accessor.count();
         // The last element needs no whole stride.
         let last = n.saturating_sub(1).checked_mul(stride);
-        let end = last.and_then(|last| last.checked_add(accessor.offset() + size * width));
+        let end = last
+            .and_then(|last| last.checked_add(size * width))
+            .and_then(|end| end.checked_add(accessor.offset()));
         if n > 0 && end.is_none_or(|end| end > bytes.len()) {
             return Err(format!(
                 "{place}: expected {n} elements, found an end of the buffer view before"
@@ -210,6 +247,10 @@ impl Reader {
         }
         Ok(())
     }
+}
+
+fn is_index(kind: DataType) -> bool {
+    matches!(kind, DataType::U8 | DataType::U16 | DataType::U32)
 }
 
 /// A number, little-endian; a `normalized` one of whole numbers is a share of the largest
@@ -296,10 +337,13 @@ mod tests {
         let twice = r#"{"children": [1, 2]}, {"mesh": 0}, {"mesh": 0, "translation": [0, 0, 5]}"#;
         let parsed = parse(&glb(&json(twice, 4, 3), &buffer()), None).unwrap();
         assert_eq!((parsed.mesh.vertices.len(), parsed.mesh.triangles.len()), (8, 2));
-        for (mode, expected) in [(5, [[0, 1, 2], [1, 2, 3]]), (6, [[0, 1, 2], [0, 2, 3]])] {
+        for (mode, expected) in [(5, [[0, 1, 2], [1, 3, 2]]), (6, [[0, 1, 2], [0, 2, 3]])] {
             let parsed = parse(&glb(&json(NODE, mode, 4), &buffer()), None).unwrap();
             assert_eq!(parsed.mesh.triangles, expected);
         }
+        let mirrored = r#"{"mesh": 0, "scale": [-1, 1, 1]}"#;
+        let parsed = parse(&glb(&json(mirrored, 4, 3), &buffer()), None).unwrap();
+        assert_eq!(parsed.mesh.triangles, [[0, 2, 1]]);
         let lines = parse(&glb(&json(NODE, 1, 4), &buffer()), None).unwrap();
         assert!(
             lines.mesh.triangles.is_empty() && lines.warnings[0].starts_with("points and lines")
@@ -309,9 +353,9 @@ mod tests {
     #[test]
     fn buffers_may_be_in_base64_or_beside_the_file() {
         let folder = tempfile::tempdir().unwrap();
-        std::fs::write(folder.path().join("a b.bin"), buffer()).unwrap();
+        std::fs::write(folder.path().join("a b\u{f6}.bin"), buffer()).unwrap();
         let inline = format!("data:application/octet-stream;base64,{}", STANDARD.encode(buffer()));
-        for uri in ["a%20b.bin", &inline] {
+        for uri in ["a%20b%C3%B6.bin", &inline] {
             let text = json(NODE, 4, 3)
                 .replace(r#""byteLength": 56"#, &format!(r#""byteLength": 56, "uri": "{uri}""#));
             let parsed = parse(text.as_bytes(), Some(folder.path())).unwrap();
@@ -347,6 +391,14 @@ mod tests {
             (b"{}".to_vec(), "expected glTF 2.0: "),
             (swap(r#""scenes": [{"nodes": [0]}]"#, r#""scenes": []"#), "scene"),
             (swap(r#""mesh": 0"#, r#""mesh": 7"#), "nodes[0].mesh"),
+            (
+                swap(
+                    r#""bufferView": 0, "#,
+                    r#""bufferView": 0, "byteOffset": 18446744073709551604, "#,
+                ),
+                "accessors[0]: expected 4 elements",
+            ),
+            (swap("5123", "5126"), "expected indices of whole numbers without sign"),
             (
                 swap(r#""count": 3"#, r#""count": 99"#),
                 "meshes[0].primitives[0]: accessors[1]: expected 99 elements",

@@ -82,7 +82,7 @@ fn parse_as(bytes: &[u8], format: MeshFormat, folder: Option<&Path>) -> Result<P
         MeshFormat::Obj => obj::parse(text),
         MeshFormat::Ply => ply::parse(text),
         MeshFormat::Stl => stl::parse(bytes),
-        MeshFormat::Glb | MeshFormat::Gltf => gltf::parse(bytes, folder),
+        MeshFormat::Glb | MeshFormat::Gltf => gltf::parse(text, folder),
     };
     parsed.and_then(|parsed| check(&parsed.mesh).map(|()| parsed))
 }

@@ -126,8 +126,6 @@ fn report_clouds(
             *label = numbers[*label];
         }
         clouds.classes = names.to_vec();
-    } else if names.starts_with(&clouds.classes) {
-        clouds.classes = names.to_vec();
     }
     // `confusion` checks that the model and the data have the same number of classes.
     let found = confusion(&args.model, &clouds, &options(args))?;

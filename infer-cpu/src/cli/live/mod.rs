@@ -88,8 +88,8 @@ pub struct LiveArgs {
     #[arg(long)]
     stats: bool,
 
-    /// Address of the sensor whose packets are used, of several at one address ADDRESS:PORT with its
-    /// source or destination port [default: the first sensor that sends]
+    /// Sensor whose packets are used: ADDRESS, or of several at one address ADDRESS:PORT to which it
+    /// sends, or ADDRESS@PORT from which [default: the first sensor that sends]
     #[arg(long, value_name = "ADDRESS")]
     from: Option<ChosenSender>,
 
@@ -329,6 +329,11 @@ impl LiveArgs {
             (Some(file), _) => {
                 let timeline = self.realtime.then(|| Box::new(Timeline::new(options)));
                 Ok(Source::Capture { file: file.clone(), sensor, timeline })
+            }
+            (None, _) if self.from.is_some_and(|from| from.has_port()) => {
+                let cause =
+                    "--from: expected an address alone with --udp, whose port is one already";
+                Err(Usage(cause.to_owned()).into())
             }
             (None, port) => {
                 let address = (self.interface, port.unwrap_or_default()).into();
