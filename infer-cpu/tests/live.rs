@@ -26,6 +26,13 @@ use street::{
 /// Unix time at the first packet, seconds.
 const START_S: f64 = 1.7e9;
 
+/// Options that report an object when it is seen for the first time.
+fn all() -> LiveOptions {
+    let mut options = LiveOptions::default();
+    options.min_turns = 1;
+    options
+}
+
 fn pipeline(options: &LiveOptions) -> Pipeline {
     let weights = concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/weights");
     let model = Path::new(weights).join("street-128.safetensors");
@@ -88,11 +95,34 @@ fn last_of_tracks<'a>(objects: &'a [Object], things: &[Thing], least: usize) -> 
 #[test]
 fn each_object_keeps_its_track_and_has_its_velocity() {
     let sent = packets(&street(), 5_000, 3 * PACKETS_PER_S);
-    let objects = run(&mut pipeline(&LiveOptions::default()), on_time(&sent));
+    let objects = run(&mut pipeline(&all()), on_time(&sent));
     for last in last_of_tracks(&objects, &street(), 29) {
         assert!(last.frame == "sensor" && last.points >= 20 && last.class.is_some());
         assert!((last.last_s - START_S - 3.0).abs() < 0.15, "{last:?}");
         assert!((0.0..0.1).contains(&(last.last_s - last.first_s)));
+    }
+}
+
+#[test]
+fn an_object_is_reported_from_the_sighting_that_is_asked_for() {
+    let sent = packets(&street(), 5_000, PACKETS_PER_S);
+    let objects = run(&mut pipeline(&all()), on_time(&sent));
+    assert_eq!(LiveOptions::default().min_turns, 2);
+    for min_turns in [2, 4] {
+        let mut options = all();
+        options.min_turns = min_turns;
+        let mut seen = BTreeMap::<u64, u64>::new();
+        let expected: Vec<&Object> = objects
+            .iter()
+            .filter(|object| {
+                let n = seen.entry(object.track).or_default();
+                *n += 1;
+                *n >= min_turns
+            })
+            .collect();
+        let found = run(&mut pipeline(&options), on_time(&sent));
+        assert!(found.iter().eq(expected.iter().copied()), "{min_turns}");
+        assert!(found.len() < objects.len() && !found.is_empty(), "{min_turns}");
     }
 }
 
@@ -107,7 +137,7 @@ fn an_ouster_sees_the_same_street() {
     for (last_column, n_sent) in [(1023, 64), (511, 32)] {
         let window = format!("\"column_window\": [0, {last_column}], \"pixels_per_column\"");
         let metadata = ouster_metadata().replace("\"pixels_per_column\"", &window);
-        let mut options = LiveOptions::default();
+        let mut options = all();
         options.ouster = Some(Metadata::parse(&metadata, Path::new("os.json")).unwrap());
         let mut pipeline = pipeline(&options);
         let coming = sent.iter().enumerate().filter(|(i, _)| !lost(*i) && i % 64 < n_sent);
@@ -132,7 +162,7 @@ fn lost_packets_are_counted_and_answers_go_on() {
     for (share, most_tracks) in [(0.01, 1), (0.1, 3), (0.5, 6)] {
         let comes = |i: usize| i == 0 || key.unit(i as u64) >= share || i + 1 == sent.len();
         let coming = on_time(&sent).enumerate().filter(|(i, _)| comes(*i)).map(|(_, p)| p);
-        let mut pipeline = pipeline(&LiveOptions::default());
+        let mut pipeline = pipeline(&all());
         let objects = run(&mut pipeline, coming);
         let n_lost = (0..sent.len()).filter(|&i| !comes(i)).count() as u64;
         let counts = pipeline.counts();
@@ -148,8 +178,8 @@ fn lost_packets_are_counted_and_answers_go_on() {
 #[test]
 fn packets_that_come_twice_or_late_change_nothing() {
     let sent = packets(&street(), 5_000, PACKETS_PER_S);
-    let expected = run(&mut pipeline(&LiveOptions::default()), on_time(&sent));
-    let mut pipeline = pipeline(&LiveOptions::default());
+    let expected = run(&mut pipeline(&all()), on_time(&sent));
+    let mut pipeline = pipeline(&all());
     let again = on_time(&sent).enumerate().flat_map(|(i, packet)| {
         let late = (i >= 3 && i % 10 == 0).then(|| (packet.0, &sent[i - 3][..]));
         let twice = (i % 7 == 0).then_some(packet);
@@ -166,7 +196,7 @@ fn a_sensor_that_restarts_and_clocks_that_jump_begin_a_new_stream() {
     let [before, after] = [3_000_000_000, 0].map(|stamp| packets(&things, stamp, PACKETS_PER_S));
     // The sensor is off for five seconds; or its clock is set; or the host's is.
     for (pause_s, after) in [(5.0, &after), (0.0, &after), (-100.0, &before)] {
-        let mut pipeline = pipeline(&LiveOptions::default());
+        let mut pipeline = pipeline(&all());
         let later = on_time(after).map(|(since_s, packet)| (since_s + 1.0 + pause_s, packet));
         let objects = run(&mut pipeline, on_time(&before).chain(later));
         let counts = pipeline.counts();
@@ -181,7 +211,7 @@ fn a_sensor_that_restarts_and_clocks_that_jump_begin_a_new_stream() {
 #[test]
 fn time_that_runs_backwards_answers_nothing_and_harms_nothing() {
     let sent = packets(&street(), 5_000, PACKETS_PER_S);
-    let mut pipeline = pipeline(&LiveOptions::default());
+    let mut pipeline = pipeline(&all());
     let backwards = sent.iter().rev().enumerate();
     let coming = backwards.map(|(i, packet)| (i as f64 * PACKET_S, &packet[..]));
     run(&mut pipeline, coming.chain(on_time(&sent).map(|(since_s, p)| (since_s + 10.0, p))));
@@ -201,8 +231,8 @@ fn foreign_packets_are_counted_and_each_kind_is_told_once() {
     unknown_model[1205] = 0x77;
     let foreign: [&[u8]; 6] =
         [&[], &sent[0][..700], &[7; 65_507], &noise, &other_model, &unknown_model];
-    let mut pipeline = pipeline(&LiveOptions::default());
-    let expected = run(&mut self::pipeline(&LiveOptions::default()), on_time(&sent));
+    let mut pipeline = pipeline(&all());
+    let expected = run(&mut self::pipeline(&all()), on_time(&sent));
     let mixed = on_time(&sent).enumerate().flat_map(|(i, packet)| {
         let foreign = foreign.get(i % 20).map(|bytes| (packet.0, *bytes));
         [Some(packet), foreign].into_iter().flatten()
@@ -226,7 +256,7 @@ fn a_sensor_that_is_replaced_by_another_model_is_taken_after_a_while() {
     let sent = packets(&street(), 5_000, 2 * PACKETS_PER_S);
     let mut stranger = sent[0];
     stranger[1205] = 0x28;
-    let mut pipeline = pipeline(&LiveOptions::default());
+    let mut pipeline = pipeline(&all());
     let objects = run(&mut pipeline, [(0.0, &stranger[..])].into_iter().chain(on_time(&sent)));
     let counts = pipeline.counts();
     assert_eq!((counts.foreign, counts.restarts), (300, 1));
@@ -241,7 +271,7 @@ fn with_the_sensors_motion_what_stands_still_stands_still() {
     let things: Vec<_> =
         street()[..1].iter().map(|thing| Thing { velocity: [-4.0, 0.0], ..*thing }).collect();
     let sent = packets(&things, 5_000, 2 * PACKETS_PER_S);
-    let mut options = LiveOptions::default();
+    let mut options = all();
     options.ego_motion =
         Some(EgoMotion::Twist { linear_m_s: DVec3::X * 4.0, angular_rad_s: DVec3::ZERO });
     let objects = run(&mut pipeline(&options), on_time(&sent));
@@ -252,7 +282,7 @@ fn with_the_sensors_motion_what_stands_still_stands_still() {
         let [x, y, _] = object.velocity_m_s.unwrap();
         assert!(object.frame == "world" && x.hypot(y) < 0.5, "{object:?}");
     }
-    let relative = run(&mut pipeline(&LiveOptions::default()), on_time(&sent));
+    let relative = run(&mut pipeline(&all()), on_time(&sent));
     let last = relative.iter().rfind(|object| object.velocity_m_s.is_some()).unwrap();
     assert!((last.velocity_m_s.unwrap()[0] + 4.0).abs() < 0.5, "{last:?}");
 }
@@ -260,7 +290,7 @@ fn with_the_sensors_motion_what_stands_still_stands_still() {
 #[test]
 fn clusters_of_few_points_are_reported_and_not_guessed() {
     let sent = packets(&street(), 5_000, PACKETS_PER_S);
-    let mut options = LiveOptions::default();
+    let mut options = all();
     options.min_points = 1_000_000;
     let mut pipeline = pipeline(&options);
     let objects = run(&mut pipeline, on_time(&sent));

@@ -116,7 +116,8 @@ impl From<LiveError> for Failure {
 /// stands for the defaults), one cluster per thread; clusters of fewer than min_points points are
 /// not classified. The sensor is a Velodyne VLP-16 or VLP-32C, or an Ouster if metadata is the path
 /// of its metadata file (JSON) instead of null. Writes the pipeline to out, or null if it fails.
-/// Pass it to edgepuck_live_close in the end.
+/// Objects are reported from the second turn in which they are seen. Pass it to edgepuck_live_close in
+/// the end.
 ///
 /// # Safety
 ///

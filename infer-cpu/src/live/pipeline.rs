@@ -46,6 +46,8 @@ const USUAL_POINTS: usize = 1 << 17;
 pub struct LiveOptions {
     /// The fewest points of a cluster that is classified.
     pub min_points: usize,
+    /// In how many clusters an object has been seen when it is first reported; at least 1.
+    pub min_turns: u64,
     /// The settings of the segmentation. The elevations of the rings come from the sensor.
     pub segmentation: Settings,
     /// The motion of the sensor, if known.
@@ -61,6 +63,7 @@ impl Default for LiveOptions {
     fn default() -> Self {
         Self {
             min_points: 20,
+            min_turns: 2,
             segmentation: Settings::default(),
             ego_motion: None,
             ouster: None,
@@ -362,6 +365,9 @@ impl Pipeline {
                 sensor_m,
                 view,
             });
+            if track.n_seen < self.options.min_turns {
+                continue;
+            }
             let fused = self.classifiers.fused(&track.log_probabilities, track.energy);
             let latency = last.moment.map(|moment| moment.elapsed());
             let confidence = view.zip(fused.as_ref());

@@ -13,7 +13,7 @@ use crate::program::{Folder, card};
 use crate::street::{PACKET_S, PACKETS_PER_S, Thing, capture, capture_of, packets, street};
 use crate::tiny_model;
 
-pub const LIVE: &str = "live --model m.safetensors --threads 1";
+pub const LIVE: &str = "live --model m.safetensors --threads 1 --min-turns 1";
 
 /// The order of keys is part of the format.
 const KEYS: [&str; 17] = [

@@ -2,7 +2,7 @@
 //! same packets, against closed forms of the sensor's motion, and across the hour of the stamps.
 
 use super::street::{PACKET, PACKET_S, PACKETS_PER_S, Thing, packets, street};
-use super::{START_S, on_time, run};
+use super::{START_S, all, on_time, run};
 use edgepuck_ros_messages::{self as ros, Message};
 use edgepuck_segment::{BestCut, OrientedBox, Settings, Stream, StreamNode};
 use formats::returns::Return;
@@ -204,7 +204,7 @@ fn median_energy(found: &[Found]) -> f64 {
 fn an_answer_is_what_the_segmentation_and_the_classifier_say_of_its_cluster() {
     let sent = packets(&street(), 5_000, 2 * PACKETS_PER_S);
     let folder = tempfile::tempdir().unwrap();
-    let new = |model: &Path| Pipeline::new(classifier(model), &LiveOptions::default()).unwrap();
+    let new = |model: &Path| Pipeline::new(classifier(model), &all()).unwrap();
     let decoded = decoded(&mut new(&street_model()), &sent);
     let found = clusters(&mut classifier(&street_model()), &sent, &decoded, at_rest);
     let most = median_energy(&found);
@@ -253,7 +253,7 @@ fn an_answer_is_what_the_segmentation_and_the_classifier_say_of_its_cluster() {
 #[test]
 fn the_height_above_the_ground_decides_the_class() {
     let sent = packets(&street(), 5_000, PACKETS_PER_S);
-    let new = || Pipeline::new(classifier(&street_model()), &LiveOptions::default()).unwrap();
+    let new = || Pipeline::new(classifier(&street_model()), &all()).unwrap();
     let mut classifier = classifier(&street_model());
     let found = clusters(&mut classifier, &sent, &decoded(&mut new(), &sent), at_rest);
     let mut probability = |points: &[[f32; 3]], ground_z_m| {
@@ -281,12 +281,12 @@ fn driven(after_s: f64) -> Pose {
 #[test]
 fn points_of_a_moving_sensor_are_those_of_its_last_moment_and_answers_are_in_the_world() {
     let sent = packets(&street(), 5_000, PACKETS_PER_S);
-    let mut options = LiveOptions::default();
+    let mut options = all();
     let known_s = [-1.0, 3.0];
     let poses = known_s.map(|after_s| (START_S + after_s, driven(after_s)));
     options.ego_motion = Some(EgoMotion::Poses(poses.to_vec()));
     let new = |options: &LiveOptions| Pipeline::new(classifier(&street_model()), options).unwrap();
-    let decoded = decoded(&mut new(&LiveOptions::default()), &sent);
+    let decoded = decoded(&mut new(&all()), &sent);
     let objects = answers(&mut new(&options), &sent);
     // Points of the sensor at one time, as it sees them at another.
     let moved = |point: [f32; 3], at_s: f64, pose_s: f64| {
@@ -323,7 +323,7 @@ fn points_of_a_moving_sensor_are_those_of_its_last_moment_and_answers_are_in_the
 
 #[test]
 fn a_stream_across_the_hour_of_the_stamps_is_as_any_other() {
-    let new = || super::pipeline(&LiveOptions::default());
+    let new = || super::pipeline(&all());
     let [plain, across] = [5_000, 3_599_500_000].map(|stamp_us| {
         let mut pipeline = new();
         let sent = packets(&street(), stamp_us, PACKETS_PER_S);
@@ -358,7 +358,7 @@ fn an_object_that_was_hidden_for_a_while_keeps_its_track_although_another_one_ap
             _ => both[i],
         })
         .collect();
-    let objects = run(&mut super::pipeline(&LiveOptions::default()), on_time(&sent));
+    let objects = run(&mut super::pipeline(&all()), on_time(&sent));
     let near = |object: &&Object, thing: &Thing| {
         let since_s = object.last_s - START_S;
         let at = [0, 1].map(|axis| thing.at[axis] + since_s * thing.velocity[axis]);
@@ -379,7 +379,7 @@ fn an_object_that_was_hidden_for_a_while_keeps_its_track_although_another_one_ap
 fn a_latency_counts_from_the_packet_with_the_last_point() {
     let sent = packets(&street(), 5_000, PACKETS_PER_S / 2);
     let start = Instant::now().checked_sub(Duration::from_secs(10)).unwrap();
-    let mut pipeline = super::pipeline(&LiveOptions::default());
+    let mut pipeline = super::pipeline(&all());
     let mut n_objects = 0;
     for (since_s, packet) in on_time(&sent) {
         let moment = Some(start + Duration::from_secs_f64(since_s));
@@ -452,7 +452,7 @@ fn assert_time(found_ns: u64, expected_s: f64) {
 #[test]
 fn a_recording_has_the_points_the_pose_and_the_objects_of_each_turn() {
     let sent = packets(&street(), 5_000, PACKETS_PER_S);
-    let mut options = LiveOptions::default();
+    let mut options = all();
     let poses = [-1.0, 3.0].map(|after_s| (START_S + after_s, driven(after_s)));
     options.ego_motion = Some(EgoMotion::Poses(poses.to_vec()));
     let mut pipeline = Pipeline::new(classifier(&street_model()), &options).unwrap();
@@ -541,9 +541,9 @@ fn after_a_long_gap_all_that_came_before_is_answered_first() {
     let all: Vec<(f64, &[u8])> = on_time(&sent).collect();
     // Turn 3 is at 0.38 s when 0.26 of a turn is lost.
     let (gap, lost) = (290, 20);
-    let mut whole = super::pipeline(&LiveOptions::default());
+    let mut whole = super::pipeline(&super::all());
     let before = run(&mut whole, all[..gap].iter().copied());
-    let mut pipeline = super::pipeline(&LiveOptions::default());
+    let mut pipeline = super::pipeline(&super::all());
     let mut objects = Vec::new();
     for &(since_s, packet) in all[..gap].iter().chain(&all[gap + lost..=gap + lost]) {
         pipeline.take(packet, Arrival { time_s: START_S + since_s, moment: None });

@@ -120,6 +120,11 @@ pub struct LiveArgs {
     #[arg(long, default_value_t = 20, value_name = "N")]
     min_points: usize,
 
+    /// Turns in which an object has been seen when it is first reported: 1 reports all, also what is
+    /// seen once
+    #[arg(long, default_value_t = 2, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    min_turns: u64,
+
     #[command(flatten)]
     model: ModelArgs,
 
@@ -260,6 +265,7 @@ impl LiveArgs {
         };
         Ok(LiveOptions {
             min_points: self.min_points,
+            min_turns: self.min_turns,
             ego_motion,
             ouster: self.metadata.as_deref().map(Metadata::read).transpose()?,
             is_recorded: self.pcap.is_some(),
