@@ -73,6 +73,9 @@ pub mod outcome;
 #[cfg(feature = "cli")]
 pub mod outputs;
 #[doc(hidden)]
+#[cfg(feature = "pcap")]
+pub mod packets;
+#[doc(hidden)]
 #[cfg(feature = "ply")]
 pub mod ply;
 #[doc(hidden)]

@@ -6,9 +6,9 @@ use std::path::Path;
 
 use crate::capture::{Senders, each_packet};
 use crate::error::FormatError;
+use crate::packets::{Decoder, Facts, PacketError};
 use crate::pcap::Counts;
 use crate::returns::{Kind, Return};
-use crate::vlp32c::{AZIMUTH_UNIT_DEG, HOUR_US, Returns};
 use crate::{ouster, velodyne};
 
 /// A return, and how far the head had turned.
@@ -38,16 +38,11 @@ pub fn read_turns(
     senders: &mut Senders,
     mut each: impl FnMut(&TurnedReturn) -> ControlFlow<()>,
 ) -> Result<(Option<velodyne::Model>, Counts), FormatError> {
-    let mut decoder = metadata.map(|metadata| Decoder::Ouster {
-        decoder: Box::new(ouster::Decoder::new(metadata)),
-        yaw: metadata.yaw_rad() / TAU,
-    });
-    let size = match &decoder {
-        Some(Decoder::Ouster { decoder, .. }) => decoder.packet_size(),
-        _ => crate::vlp32c::packet::PAYLOAD_SIZE,
+    let size = match metadata {
+        Some(metadata) => ouster::Decoder::new(metadata).packet_size(),
+        None => crate::vlp32c::packet::PAYLOAD_SIZE,
     };
-    let sends_all = metadata.is_none_or(|metadata| metadata.n_columns_unsent() == 0);
-    let (mut head, mut lost) = (None::<Head>, 0);
+    let (mut decoder, mut head, mut lost) = (None::<Decoder>, None::<Head>, 0);
     let mut found = Vec::new();
     let is_data = |payload: &[u8]| payload.len() == size;
     let mut counts = each_packet(path, senders, is_data, |payload| {
@@ -56,31 +51,36 @@ pub fn read_turns(
         }
         let decoder = match &mut decoder {
             Some(decoder) => decoder,
-            None => decoder.insert(Decoder::of_velodyne(payload)?),
+            None => decoder.insert(Decoder::new(metadata, payload)?),
         };
-        let packet = decoder.decode(payload, &mut found)?;
-        let Some(now) = head.map_or(Some(Head::first(packet)), |head| head.advanced(packet)) else {
+        let facts = decoder.decode(payload, &mut found)?;
+        // Of two returns of a beam, the strongest is used, or the first of an Ouster.
+        let is_last_only = found.iter().all(|found| found.kind == Kind::Last);
+        let is_used = |kind| kind != Kind::Second && (kind != Kind::Last || is_last_only);
+        found.retain(|found| is_used(found.kind));
+        let Some(now) =
+            head.map_or(Some(Head::first(facts)), |head| head.advanced(facts, decoder.wraps_us()))
+        else {
             return Ok(ControlFlow::Continue(()));
         };
         if let Some(before) = head
             && now.gaps > before.gaps
-            && sends_all
         {
-            let step = (now.time_us - before.time_us) / before.packet.duration_us;
-            lost += (step.round() as u64).saturating_sub(1);
+            let step = (now.time_us - before.time_us) / before.facts.duration_us;
+            lost += (step.round() as u64).saturating_sub(1 + facts.n_unsent);
         }
         head = Some(now);
         for &found in &found {
             let [x, y, _] = found.point_m.map(f64::from);
             // Adding 1.5 makes the whole numbers round to the nearest.
-            let ahead = (-y.atan2(x) / TAU - packet.phase + 1.5).rem_euclid(1.0) - 0.5;
+            let ahead = ((-y.atan2(x) - facts.azimuth_rad) / TAU + 1.5).rem_euclid(1.0) - 0.5;
             let time_s = (now.time_us + found.after_us) * 1e-6;
             let turned = TurnedReturn { found, turns: now.turns + ahead, time_s, gaps: now.gaps };
             if each(&turned).is_break() {
                 return Ok(ControlFlow::Break(()));
             }
         }
-        Ok::<_, String>(ControlFlow::Continue(()))
+        Ok::<_, PacketError>(ControlFlow::Continue(()))
     })?;
     if head.is_none() {
         let n = counts.packets;
@@ -92,105 +92,39 @@ pub fn read_turns(
         return Err(FormatError::malformed(path, "packets", cause));
     }
     counts.missing = lost;
-    Ok((decoder.and_then(|decoder| decoder.model()), counts))
-}
-
-enum Decoder {
-    Velodyne(velodyne::Decoder),
-    Ouster {
-        decoder: Box<ouster::Decoder>,
-        /// The yaw of the lidar in the sensor's frame, turns counterclockwise.
-        yaw: f64,
-    },
-}
-
-/// When a packet was sent, and where the head was.
-#[derive(Clone, Copy)]
-struct Packet {
-    stamp_us: f64,
-    duration_us: f64,
-    /// The azimuth of the head, turns clockwise from x.
-    phase: f64,
-    turns_per_us: f64,
-    /// The period of the stamps, microseconds.
-    wraps_us: Option<f64>,
-}
-
-impl Decoder {
-    fn of_velodyne(payload: &[u8]) -> Result<Self, String> {
-        let header = velodyne::Header::parse(payload).map_err(|error| error.to_string())?;
-        Ok(Self::Velodyne(velodyne::Decoder::new(header.model)))
-    }
-
-    fn model(&self) -> Option<velodyne::Model> {
-        match self {
-            Self::Velodyne(decoder) => Some(decoder.model()),
-            Self::Ouster { .. } => None,
-        }
-    }
-
-    /// Decodes a packet into `returns`, one of each beam.
-    fn decode(&self, payload: &[u8], returns: &mut Vec<Return>) -> Result<Packet, String> {
-        returns.clear();
-        match self {
-            Self::Velodyne(decoder) => {
-                let header = decoder.decode(payload, |found| returns.push(*found));
-                let header = header.map_err(|error| error.to_string())?;
-                if header.returns == Returns::Dual {
-                    returns.retain(|found| found.kind != Kind::Last);
-                }
-                let unit = AZIMUTH_UNIT_DEG / 360.0;
-                Ok(Packet {
-                    stamp_us: f64::from(header.time_us),
-                    duration_us: header.duration_us(),
-                    phase: f64::from(header.azimuth) * unit,
-                    turns_per_us: header.units_per_us * unit,
-                    wraps_us: Some(HOUR_US as f64),
-                })
-            }
-            Self::Ouster { decoder, yaw } => {
-                let header = decoder.decode(payload, |found| returns.push(*found));
-                let header = header.map_err(|error| error.to_string())?;
-                returns.retain(|found| found.kind != Kind::Second);
-                let per_turn = f64::from(header.columns_per_frame);
-                Ok(Packet {
-                    stamp_us: header.time_ns as f64 * 1e-3,
-                    duration_us: header.duration_us,
-                    phase: f64::from(header.measurement_id) / per_turn - yaw,
-                    turns_per_us: f64::from(header.columns) / per_turn / header.duration_us,
-                    wraps_us: None,
-                })
-            }
-        }
-    }
+    let model = match decoder {
+        Some(Decoder::Velodyne(decoder)) => Some(decoder.model()),
+        _ => None,
+    };
+    Ok((model, counts))
 }
 
 /// How far the head had turned at the start of a packet.
 #[derive(Clone, Copy)]
 struct Head {
-    packet: Packet,
+    facts: Facts,
     turns: f64,
     time_us: f64,
     gaps: u32,
 }
 
 impl Head {
-    fn first(packet: Packet) -> Self {
-        Self { packet, turns: packet.phase, time_us: 0.0, gaps: 0 }
+    fn first(facts: Facts) -> Self {
+        Self { facts, turns: facts.azimuth_rad / TAU, time_us: 0.0, gaps: 0 }
     }
 
     /// The head at a later packet; `None` if it is not later.
-    fn advanced(&self, packet: Packet) -> Option<Self> {
-        let mut step_us = packet.stamp_us - self.packet.stamp_us;
-        if let Some(wraps_us) = packet.wraps_us {
+    fn advanced(&self, facts: Facts, wraps_us: Option<f64>) -> Option<Self> {
+        let mut step_us = facts.stamp_us - self.facts.stamp_us;
+        if let Some(wraps_us) = wraps_us {
             step_us = (step_us + wraps_us / 2.0).rem_euclid(wraps_us) - wraps_us / 2.0;
         }
         // Whole turns in a gap are those at the speed before it.
-        let turned = packet.phase - self.packet.phase;
-        let whole = (self.packet.turns_per_us * step_us - turned).round();
-        let is_gap = step_us > 1.5 * self.packet.duration_us;
+        let turned = (facts.azimuth_rad - self.facts.azimuth_rad) / TAU;
+        let whole = (self.facts.speed_rad_us / TAU * step_us - turned).round();
+        let is_gap = step_us > 1.5 * self.facts.duration_us;
         (step_us > 0.0).then(|| Self {
-            packet,
+            facts,
             turns: self.turns + turned + whole,
             time_us: self.time_us + step_us,
             gaps: self.gaps + u32::from(is_gap),

@@ -51,7 +51,6 @@ pub struct Recording {
     pub n_turns: usize,
     /// The sensor that its packets name.
     pub model: Option<Model>,
-    pub warnings: Vec<String>,
 }
 
 /// Reads captures, one after the other, or sweeps of one turn each.
@@ -67,13 +66,13 @@ pub fn read(files: &[PathBuf], points: &PointsArgs) -> anyhow::Result<Recording>
         )));
     }
     let mut recorded = Vec::new();
-    let (mut model, mut warnings) = (None, Vec::new());
+    let mut model = None;
     let whole = match is_sweeps {
         true => read_sweeps(files, points, &mut recorded)?,
-        false => read_captures(files, points, &mut recorded, &mut model, &mut warnings)?,
+        false => read_captures(files, points, &mut recorded, &mut model)?,
     };
     if !whole {
-        warnings.push(format!("the first {MOST_TURNS} turns are used"));
+        formats::say!("warning: only the first {MOST_TURNS} turns are used");
     }
     let rings = (0..).zip(recorded).map(|(ring, all)| Ring::of(ring, all));
     let rings: Vec<_> = rings.filter_map(Result::transpose).collect::<Result<_, _>>()?;
@@ -86,7 +85,7 @@ pub fn read(files: &[PathBuf], points: &PointsArgs) -> anyhow::Result<Recording>
     let last = ends(|firings| firings.last()).fold(f64::NEG_INFINITY, f64::max);
     // The last firing of a turn is a step before its end.
     let n_turns = (last - start + 0.02).max(0.0) as usize;
-    Ok(Recording { rings, start, n_turns, model, warnings })
+    Ok(Recording { rings, start, n_turns, model })
 }
 
 /// Reads captures into the firings of each ring. Returns whether they were read to their ends.
@@ -95,7 +94,6 @@ fn read_captures(
     points: &PointsArgs,
     rings: &mut Vec<Vec<Firing>>,
     model: &mut Option<Model>,
-    warnings: &mut Vec<String>,
 ) -> anyhow::Result<bool> {
     let metadata = points.metadata.as_deref().map(ouster::Metadata::read).transpose()?;
     // A Velodyne tells the brightness of a white surface as 100, an Ouster as 255.
@@ -130,12 +128,14 @@ fn read_captures(
             ControlFlow::Continue(())
         })?;
         let name = file.display();
-        warnings.extend(senders.warning().map(|warning| format!("{name}: {warning}")));
+        if let Some(warning) = senders.warning() {
+            formats::say!("warning: {name}: {warning}");
+        }
         if counts.missing > 0 {
-            warnings.push(format!("{name}: {} packets are probably missing", counts.missing));
+            formats::say!("warning: {name}: {} packets are probably missing", counts.missing);
         }
         if counts.first_unread.is_some() {
-            warnings.push(format!("{name}: {} UDP packets{counts}", counts.packets));
+            formats::say!("warning: {name}: {} UDP packets{counts}", counts.packets);
         }
         if let (Some(expected), Some(found)) = (*model, found)
             && expected != found

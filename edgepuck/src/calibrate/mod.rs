@@ -58,7 +58,6 @@ pub fn run(args: &CalibrateArgs) -> anyhow::Result<Outcome> {
     args.overwrite.check([&*args.out])?;
     let named = args.sensor.as_deref().map(SensorProfile::resolve).transpose()?;
     let recording = firings::read(&args.inputs, &args.points)?;
-    recording.warnings.iter().for_each(|warning| formats::say!("warning: {warning}"));
     let base = match named {
         Some(base) => base,
         None => recorded_sensor(args, &recording)?,

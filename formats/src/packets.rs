@@ -1,0 +1,148 @@
+//! Decodes the packets of the supported sensors.
+
+use std::f64::consts::TAU;
+
+use crate::returns::Return;
+use crate::vlp32c::SEQUENCE_US;
+use crate::{ouster, velodyne};
+
+/// Why a payload is not the sensor's data.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PacketError {
+    /// An error of a Velodyne packet.
+    #[error(transparent)]
+    Velodyne(#[from] velodyne::PacketError),
+    /// An error of an Ouster packet.
+    #[error(transparent)]
+    Ouster(#[from] ouster::PacketError),
+}
+
+/// Decodes the packets of one sensor.
+pub enum Decoder {
+    /// A VLP-16 or VLP-32C.
+    Velodyne(velodyne::Decoder),
+    /// An OS0, OS1 or OS2.
+    Ouster {
+        /// Its decoder.
+        decoder: Box<ouster::Decoder>,
+        /// The yaw of the lidar in the sensor's frame, radians counterclockwise.
+        yaw_rad: f64,
+        /// The packets of each turn that are not sent, because their columns are outside of the
+        /// azimuth window.
+        n_unsent: u64,
+        /// The first column of the packet before.
+        before: u16,
+    },
+}
+
+/// The header of a packet, for all sensors.
+#[derive(Clone, Copy, Debug)]
+pub struct Facts {
+    /// The sensor's stamp, microseconds.
+    pub stamp_us: f64,
+    /// The duration of its firings, microseconds.
+    pub duration_us: f64,
+    /// The azimuth of the head at its first firing, radians clockwise from x.
+    pub azimuth_rad: f64,
+    /// The speed of the head, radians per microsecond.
+    pub speed_rad_us: f64,
+    /// The packets between the previous one and this that the sensor does not send.
+    pub n_unsent: u64,
+}
+
+impl Decoder {
+    /// A decoder for the sensor of `metadata`, or else for the Velodyne that sent `payload`.
+    ///
+    /// # Errors
+    /// A payload that is not a packet of the sensor.
+    pub fn new(metadata: Option<&ouster::Metadata>, payload: &[u8]) -> Result<Self, PacketError> {
+        let Some(metadata) = metadata else {
+            let header = velodyne::Header::parse(payload)?;
+            return Ok(Self::Velodyne(velodyne::Decoder::new(header.model)));
+        };
+        let decoder = Box::new(ouster::Decoder::new(metadata));
+        let before = decoder.header(payload)?.measurement_id;
+        let unsent = metadata.n_columns_unsent() / metadata.columns_per_packet();
+        let yaw_rad = metadata.yaw_rad();
+        Ok(Self::Ouster { decoder, yaw_rad, n_unsent: unsent.into(), before })
+    }
+
+    /// Decodes a packet into `returns`.
+    ///
+    /// # Errors
+    /// A payload that is not a packet of the sensor.
+    pub fn decode(
+        &mut self,
+        payload: &[u8],
+        returns: &mut Vec<Return>,
+    ) -> Result<Facts, PacketError> {
+        returns.clear();
+        match self {
+            Self::Velodyne(decoder) => {
+                let header = decoder.decode(payload, |found| returns.push(*found))?;
+                Ok(Facts {
+                    stamp_us: f64::from(header.time_us),
+                    duration_us: header.duration_us(),
+                    azimuth_rad: f64::from(header.azimuth) * UNIT_RAD,
+                    speed_rad_us: header.units_per_us * UNIT_RAD,
+                    n_unsent: 0,
+                })
+            }
+            Self::Ouster { decoder, yaw_rad, n_unsent, before } => {
+                let header = decoder.decode(payload, |found| returns.push(*found))?;
+                let column_rad = TAU / f64::from(header.columns_per_frame);
+                let is_new_turn = header.measurement_id < *before;
+                *before = header.measurement_id;
+                Ok(Facts {
+                    stamp_us: header.time_ns as f64 * 1e-3,
+                    duration_us: header.duration_us,
+                    azimuth_rad: f64::from(header.measurement_id) * column_rad - *yaw_rad,
+                    speed_rad_us: f64::from(header.columns) * column_rad / header.duration_us,
+                    n_unsent: if is_new_turn { *n_unsent } else { 0 },
+                })
+            }
+        }
+    }
+
+    /// The largest azimuth offset of a beam from the head, radians.
+    #[must_use]
+    pub fn most_offset_rad(&self) -> f64 {
+        match self {
+            Self::Velodyne(decoder) => decoder.most_offset_rad(),
+            Self::Ouster { decoder, .. } => decoder.most_offset_rad(),
+        }
+    }
+
+    /// The elevations of its rings, degrees.
+    #[must_use]
+    pub fn elevations_deg(&self) -> Vec<f32> {
+        let radians = match self {
+            Self::Velodyne(decoder) => decoder.elevations_rad(),
+            Self::Ouster { decoder, .. } => decoder.elevations_rad(),
+        };
+        radians.into_iter().map(f32::to_degrees).collect()
+    }
+
+    /// The period of the time stamps in microseconds; `None` if they practically never wrap around.
+    #[must_use]
+    pub fn wraps_us(&self) -> Option<f64> {
+        match self {
+            // Velodyne counts microseconds past the hour.
+            Self::Velodyne(_) => Some(3.6e9),
+            Self::Ouster { .. } => None,
+        }
+    }
+
+    /// The azimuth step from one firing of all beams to the next, radians.
+    #[must_use]
+    pub fn step_rad(&self, facts: &Facts) -> f64 {
+        let step_us = match self {
+            Self::Velodyne(_) => SEQUENCE_US,
+            Self::Ouster { decoder, .. } => facts.duration_us / f64::from(decoder.columns()),
+        };
+        step_us * facts.speed_rad_us
+    }
+}
+
+/// The unit of a Velodyne's azimuths, radians.
+const UNIT_RAD: f64 = TAU / 36_000.0;
