@@ -108,17 +108,24 @@ impl PointsArgs {
             Some(path) => ouster::read_frame(file, &ouster::Metadata::read(path)?, &mut senders)?,
             None => velodyne::read_turn(file, &mut senders)?,
         };
-        if let Some(warning) = senders.warning() {
-            formats::say!("warning: {}: {warning}", file.display());
-        }
-        if counts.missing > 0 {
-            let (file, n) = (file.display(), counts.missing);
-            formats::say!("warning: {file}: {n} packets of the turn are probably missing");
-        }
-        if counts.first_unread.is_some() {
-            formats::say!("warning: {}: {} UDP packets{counts}", file.display(), counts.packets);
-        }
+        warn_of_packets(file, &senders, &counts);
         Ok(scan)
+    }
+}
+
+/// Prints warnings of the packets in the capture `file` that were not used, or are missing in the
+/// turns that were read.
+pub fn warn_of_packets(file: &Path, senders: &Senders, counts: &pcap::Counts) {
+    let file = file.display();
+    if let Some(warning) = senders.warning() {
+        formats::say!("warning: {file}: {warning}");
+    }
+    if counts.missing > 0 {
+        let n = counts.missing;
+        formats::say!("warning: {file}: {n} packets of the turn are probably missing");
+    }
+    if counts.first_unread.is_some() {
+        formats::say!("warning: {file}: {} UDP packets{counts}", counts.packets);
     }
 }
 

@@ -11,7 +11,7 @@ use formats::{Scan, Senders, ouster, pcap};
 use glam::{DMat3, DVec3};
 
 use crate::Usage;
-use crate::points::PointsArgs;
+use crate::points::{PointsArgs, warn_of_packets};
 
 /// The most turns that are used, so that long captures fit into the memory.
 const MOST_TURNS: usize = 100;
@@ -128,15 +128,7 @@ fn read_captures(
             ControlFlow::Continue(())
         })?;
         let name = file.display();
-        if let Some(warning) = senders.warning() {
-            formats::say!("warning: {name}: {warning}");
-        }
-        if counts.missing > 0 {
-            formats::say!("warning: {name}: {} packets are probably missing", counts.missing);
-        }
-        if counts.first_unread.is_some() {
-            formats::say!("warning: {name}: {} UDP packets{counts}", counts.packets);
-        }
+        warn_of_packets(file, &senders, &counts);
         if let (Some(expected), Some(found)) = (*model, found)
             && expected != found
         {
