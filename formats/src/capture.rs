@@ -7,19 +7,9 @@ use std::path::Path;
 use std::str::FromStr;
 
 use crate::error::FormatError;
-use crate::pcap::{self, Counts};
+use crate::pcap::{self, Counts, Sender};
 use crate::returns::Return;
 use crate::scan::Scan;
-
-/// What tells the sensors apart that send to one program: the address, and in captures the ports, since
-/// sensors behind a relay have one address.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Sender {
-    /// The address.
-    pub ip: IpAddr,
-    /// The source and the destination port; 0 where they do not matter.
-    pub ports: [u16; 2],
-}
 
 /// The sensor that a user chose: by its address, or by a port, too: `ADDRESS:PORT` to which it sends, or
 /// `ADDRESS@PORT` from which.

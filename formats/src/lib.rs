@@ -118,7 +118,7 @@ mod python_literal;
 mod records;
 
 #[cfg(feature = "pcap")]
-pub use capture::{ChosenSender, Sender, Senders};
+pub use capture::{ChosenSender, Senders};
 pub use error::FormatError;
 pub use scan::{Attribute, AttributeSet, Scan};
 pub use split::Split;

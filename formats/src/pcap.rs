@@ -22,7 +22,6 @@ use etherparse::{
 use pcap_parser::traits::PcapNGPacketBlock;
 use pcap_parser::{Block, Linktype, PIB_MAGIC, PcapBlockOwned, PcapError, create_reader};
 
-use crate::capture::Sender;
 use crate::error::FormatError;
 use crate::foreign::or_foreign_file;
 
@@ -77,6 +76,16 @@ pub(crate) fn write_packet(
 
 /// Bytes of the reader's buffer. No frame is longer than 64 KiB.
 const CAPACITY: usize = 256 * 1024;
+
+/// What tells the sensors apart that send to one program: the address, and in captures the ports, since
+/// sensors behind a relay have one address.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sender {
+    /// The address.
+    pub ip: IpAddr,
+    /// The source and the destination port; 0 where they do not matter.
+    pub ports: [u16; 2],
+}
 
 /// A UDP packet of a capture.
 #[derive(Clone, Debug, PartialEq)]

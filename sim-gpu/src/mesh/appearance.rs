@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use formats::foreign::foreign;
 
 use super::error::{Malformed, MeshError, ParseError};
+use super::file::read;
 use super::format::MeshFormat;
-use super::load::read;
 use super::obj::{self, for_each_line, index, words};
 use super::polygon::fan;
 use super::tokens::without_mark;

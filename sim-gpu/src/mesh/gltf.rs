@@ -14,7 +14,7 @@ use gltf::mesh::Mode;
 use gltf::{Accessor, Document, Gltf, Node, Primitive};
 
 use super::error::{Malformed, ParseError};
-use super::load::read;
+use super::file::read;
 use super::triangle_mesh::Parsed;
 
 /// Extensions that change where triangles are, and are not read.

@@ -1,6 +1,5 @@
 //! Loads meshes from files, and checks them.
 
-use std::fs;
 use std::path::Path;
 
 use formats::foreign::foreign;
@@ -8,6 +7,7 @@ use formats::hash::{FileHash, Hashing};
 use glam::DVec3;
 
 use super::error::{Malformed, MeshError, ParseError};
+use super::file::read;
 use super::format::MeshFormat;
 use super::tokens::without_mark;
 use super::triangle_mesh::{Parsed, TriangleMesh};
@@ -101,16 +101,6 @@ pub fn flat(mesh: &TriangleMesh) -> Option<String> {
     (!mesh.triangles.iter().any(has_area)).then(|| NO_AREA.to_owned())
 }
 
-pub(super) fn read(path: &Path) -> Result<Vec<u8>, MeshError> {
-    let failed = |source| MeshError::Read { path: path.into(), source };
-    let kind = fs::metadata(path).map_err(failed)?;
-    if !kind.is_file() {
-        let what = if kind.is_dir() { "a directory" } else { "a pipe or device" };
-        return Err(MeshError::NotAFile { path: path.into(), what });
-    }
-    fs::read(path).map_err(failed)
-}
-
 /// Checks that `mesh` has the properties of [`LoadedMesh::mesh`].
 pub fn check(mesh: &TriangleMesh) -> Result<(), ParseError> {
     let n_vertices = mesh.vertices.len() as u64;
@@ -133,6 +123,7 @@ pub fn check(mesh: &TriangleMesh) -> Result<(), ParseError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
 
     const TRIANGLE: &str = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
 

@@ -2,6 +2,7 @@
 
 mod appearance;
 mod error;
+mod file;
 mod format;
 pub mod frame;
 mod gltf;

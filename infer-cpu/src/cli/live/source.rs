@@ -15,7 +15,8 @@ use std::time::{Duration, Instant};
 use crate::live::{Arrival, Timeline};
 use anyhow::Context;
 use formats::ouster::{self, Metadata};
-use formats::{ChosenSender, Sender, Senders, pcap, velodyne};
+use formats::pcap::{self, Sender};
+use formats::{ChosenSender, Senders, velodyne};
 use socket2::{Domain, Protocol, Socket, Type};
 
 /// The most packets in the queue: two thirds of a second of a VLP-32C.
