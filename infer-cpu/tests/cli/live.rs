@@ -170,7 +170,7 @@ fn of_two_sensors_one_is_used_and_the_other_is_told_of_once() {
     let ran = folder.run(&format!("{LIVE} --pcap two.pcap --json --stats"));
     assert_eq!((ran.code, ran.out), (0, alone));
     let warning = "warning: expected packets of one sensor, found those of 192.168.1.201, which \
-                   are used, and of 192.168.1.202 (1 so far), which are not; --from ADDRESS";
+                   are used, and of 192.168.1.202 (1 so far), which are not; --from 192.168.1.202";
     assert_eq!((ran.err.starts_with(warning), ran.err.matches("warning").count()), (true, 1));
     assert!(ran.err.contains("754 from other addresses"), "{}", ran.err);
     let alone = folder.run(&format!("{LIVE} --pcap other.pcap")).out;
