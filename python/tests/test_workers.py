@@ -134,8 +134,8 @@ def test_what_is_doubtful_about_a_mesh_is_told_once(tmp_path: Path) -> None:
 def test_what_is_doubtful_about_a_folder_is_told(tmp_path: Path, shapes: Path) -> None:
     shutil.copytree(shapes, tmp_path / "meshes")
     (tmp_path / "meshes/bus").mkdir()
-    (tmp_path / "meshes/bus/a.glb").write_bytes(b"glTF")
-    with pytest.warns(UserWarning, match=r"1 file is ignored \(.glb\); the class bus has no mesh"):
+    (tmp_path / "meshes/bus/a.fbx").write_bytes(b"Kaydara")
+    with pytest.warns(UserWarning, match=r"1 file is ignored \(.fbx\); the class bus has no mesh"):
         ep.Dataset(tmp_path / "meshes")
 
 
