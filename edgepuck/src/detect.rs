@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use edgepuck_segment::{Hierarchy, Label, Node, OrientedBox, Segmenter, Settings, Sweep};
 use formats::{Scan, atomic};
-use infer_cpu::rule::{MARGIN_OF_WHOLES, Rule, WIDEST_M};
+use infer_cpu::rule::{MARGIN_OF_WHOLES, Rule};
 use infer_cpu::{Classifier, ClassifierTeam, Options, Precision, Prediction};
 use plotters::style::RGBColor;
 use serde_json::{Value, json};
@@ -123,6 +123,8 @@ pub(crate) fn run(args: &DetectArgs) -> anyhow::Result<Outcome> {
 /// Detects and classifies objects in sweeps.
 pub struct Detector {
     segmenter: Segmenter,
+    /// Wider clusters are no object, metres.
+    widest_m: f32,
     team: ClassifierTeam,
     rule: Rule,
     /// The least confidence of an object; clusters below count as unknown.
@@ -158,18 +160,19 @@ impl Detector {
         }
         let mut settings = Settings::default();
         settings.min_points = min_points;
+        let widest_m = settings.max_size_m;
         let segmenter = Segmenter::new(settings).map_err(|error| Usage(error.to_string()))?;
         let rule = Rule::new(&classifier);
         let team = ClassifierTeam::new(classifier)?;
-        Ok(Self { segmenter, team, rule, min_confidence: LEAST_CONFIDENCE })
+        Ok(Self { segmenter, widest_m, team, rule, min_confidence: LEAST_CONFIDENCE })
     }
 
     /// Cuts `scan`, in the sensor's frame, into the clusters that are recognised best.
     pub fn detect(&mut self, scan: &Scan) -> anyhow::Result<Detections> {
-        let Self { segmenter, team, rule, min_confidence } = self;
+        let Self { segmenter, widest_m, team, rule, min_confidence } = self;
         let sweep = Sweep { points: &scan.positions, rings: scan.ring.as_deref() };
         let hierarchy = segmenter.hierarchy(&sweep)?;
-        let mut answers = answers(team, hierarchy, &scan.positions)?;
+        let mut answers = answers(team, hierarchy, &scan.positions, *widest_m)?;
         let worth = |(node, answer): (Node<'_>, &Option<Prediction>)| {
             rule.worth(node.points.len(), answer.as_ref())
         };
@@ -197,8 +200,9 @@ fn answers(
     team: &mut ClassifierTeam,
     hierarchy: &Hierarchy,
     points: &[[f32; 3]],
+    widest_m: f32,
 ) -> anyhow::Result<Vec<Option<Prediction>>> {
-    let is_asked = |node: &Node<'_>| node.diagonal_m <= WIDEST_M;
+    let is_asked = |node: &Node<'_>| node.diagonal_m <= widest_m;
     let asked = hierarchy.nodes().filter(is_asked);
     let clouds: Vec<_> =
         asked.map(|node| (positions(points, node.points), node.ground_z_m)).collect();

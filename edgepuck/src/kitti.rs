@@ -4,9 +4,10 @@ use anyhow::Context;
 use edgepuck_segment::OrientedBox;
 use formats::FormatError;
 use formats::foreign::read_text;
+use formats::periodic::shorter_way;
 use glam::{DMat3, DMat4, DQuat, DVec3};
 use sim_gpu::glam;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 use std::path::Path;
 
 use crate::street::StreetClass;
@@ -130,7 +131,7 @@ pub fn line(
         at = camera.rect_from_lidar.transform_point3(base);
         // About the camera's y axis, which points downwards.
         rotation = (-along.z).atan2(along.x);
-        alpha = (rotation - at.x.atan2(at.z) + PI).rem_euclid(TAU) - PI;
+        alpha = shorter_way(rotation - at.x.atan2(at.z), TAU);
     }
     let [left, top, right, bottom] = bounds.unwrap_or([-1.0; 4]);
     let [x, y, z] = at.to_array();

@@ -70,8 +70,7 @@ impl PointsArgs {
             );
             return Err(FormatError::malformed(file, "name", cause));
         }
-        let is_capture = pcap::is_capture(file);
-        if is_capture && (self.metadata.is_some() || self.format.is_none()) {
+        if self.is_capture(file) {
             return self.read_capture(file);
         }
         for (flag, is_given) in
@@ -100,6 +99,11 @@ impl PointsArgs {
             scan.intensity = scan.intensity.or(intensities);
         }
         Ok(scan)
+    }
+
+    /// Whether `file` is read as a capture.
+    pub fn is_capture(&self, file: &Path) -> bool {
+        (self.metadata.is_some() || self.format.is_none()) && pcap::is_capture(file)
     }
 
     fn read_capture(&self, file: &Path) -> Result<Scan, FormatError> {

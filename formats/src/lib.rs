@@ -41,6 +41,7 @@ pub mod packed;
 #[cfg(feature = "pcap")]
 pub mod pcap;
 #[cfg(feature = "pcap")]
+pub mod periodic;
 pub mod returns;
 pub mod rng;
 pub mod scan;

@@ -44,6 +44,13 @@ impl StreamKey {
         philox4x32_10(counter, self.0)
     }
 
+    /// The first 64 bits of the stream, as the seed of others.
+    #[must_use]
+    pub fn seed(self) -> u64 {
+        let [low, high, ..] = self.words([0; 4]);
+        u64::from(high) << 32 | u64::from(low)
+    }
+
     /// An unbiased integer in `0..bound`, number `n` of the stream (Lemire
     /// 2019, rejection on the fourth counter word). `bound` must not be 0.
     #[must_use]

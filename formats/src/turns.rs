@@ -8,6 +8,7 @@ use crate::capture::{Senders, each_packet};
 use crate::error::FormatError;
 use crate::packets::{Decoder, Facts, PacketError};
 use crate::pcap::Counts;
+use crate::periodic::shorter_way;
 use crate::returns::{Kind, Return};
 use crate::{ouster, velodyne};
 
@@ -115,10 +116,8 @@ impl Head {
 
     /// The head at a later packet; `None` if it is not later.
     fn advanced(&self, facts: Facts, wraps_us: Option<f64>) -> Option<Self> {
-        let mut step_us = facts.stamp_us - self.facts.stamp_us;
-        if let Some(wraps_us) = wraps_us {
-            step_us = (step_us + wraps_us / 2.0).rem_euclid(wraps_us) - wraps_us / 2.0;
-        }
+        let step_us = facts.stamp_us - self.facts.stamp_us;
+        let step_us = wraps_us.map_or(step_us, |wraps_us| shorter_way(step_us, wraps_us));
         // Whole turns in a gap are those at the speed before it.
         let turned = (facts.azimuth_rad - self.facts.azimuth_rad) / TAU;
         let whole = (self.facts.speed_rad_us / TAU * step_us - turned).round();

@@ -10,10 +10,6 @@ const WEIGHT_OF_UNKNOWN: f64 = 0.8;
 /// chosen on labelled sweeps of KITTI and Argoverse 2 (assets/reports/reality/frames.md).
 pub const MARGIN_OF_WHOLES: f64 = 0.1;
 
-/// Clusters with a larger diagonal are no object, metres: an articulated bus is 18 m long and 2.55 m
-/// wide.
-pub const WIDEST_M: f32 = 20.0;
-
 /// The worth of clusters by what a network answers.
 pub struct Rule {
     /// For each class of the network, whether it is a known one.

@@ -300,8 +300,8 @@ def _remade(
 
 
 def _rows(name: str, poses: ArrayLike, shape: tuple[int, ...]) -> tuple[int, NDArray[np.float64]]:
-    """The number of `poses` and the rows of their matrices, [m, 16]. `shape` is that before the last
-    axes; without it, one axis of any length."""
+    """The number of `poses` and their numbers in rows, [m, 16] or [m, 7]. `shape` is that before the
+    last axes; without it, one axis of any length."""
     found = np.asarray(poses, dtype=np.float64)
     n_axes = len(shape) or 1
     is_matrix, is_quaternion = found.shape[n_axes:] == (4, 4), found.shape[n_axes:] == (7,)
@@ -310,27 +310,7 @@ def _rows(name: str, poses: ArrayLike, shape: tuple[int, ...]) -> tuple[int, NDA
         raise _edgepuck.Error(
             f"{name}: expected shape [{before}, 4, 4] or [{before}, 7], found {list(found.shape)}"
         )
-    if is_matrix:
-        return len(found), np.ascontiguousarray(found.reshape(-1, 16))
-    return len(found), _matrices(name, found.reshape(-1, 7)).reshape(-1, 16)
-
-
-def _matrices(name: str, poses: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The matrices of positions and quaternions w, x, y, z, [m, 4, 4]."""
-    at, (w, x, y, z) = poses[:, :3], poses[:, 3:].T
-    off = np.abs(w * w + x * x + y * y + z * z - 1)
-    if not (off < 1e-3).all():
-        worst = int(np.argmax(np.where(np.isnan(off), np.inf, off)))
-        raise _edgepuck.Error(
-            f"{name}[{worst}]: expected a quaternion of length 1, found {poses[worst, 3:].tolist()}"
-        )
-    s = 2 / (w * w + x * x + y * y + z * z)
-    matrices = np.tile(np.eye(4), (len(poses), 1, 1))
-    matrices[:, 0, :3] = np.stack([1 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)], -1)
-    matrices[:, 1, :3] = np.stack([s * (x * y + w * z), 1 - s * (x * x + z * z), s * (y * z - w * x)], -1)
-    matrices[:, 2, :3] = np.stack([s * (x * z - w * y), s * (y * z + w * x), 1 - s * (x * x + y * y)], -1)
-    matrices[:, :3, 3] = at
-    return matrices
+    return len(found), np.ascontiguousarray(found.reshape(-1, 16 if is_matrix else 7))
 
 
 # (x, y, z) to (x, -z, y).

@@ -201,12 +201,16 @@ fn view([distance_m, elevation_deg, azimuth_deg]: [f64; 3]) -> PyResult<Pose> {
     Ok(Pose::looking_at_origin_deg(distance_m, elevation_deg, azimuth_deg))
 }
 
-/// The poses of matrices, one in each row; errors call the array `name`.
+/// The poses in rows of matrices, of 16 numbers, or of positions and quaternions w, x, y, z, of 7; errors
+/// call the array `name`.
 fn poses_of(name: &str, rows: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Pose>> {
     let rows = rows.as_array();
     let pose = |(i, row): (usize, ArrayView1<'_, f64>)| {
-        let numbers: [f64; 16] = std::array::from_fn(|at| row[at]);
-        rigid(&numbers).map_err(|cause| raised(format!("{name}[{i}]: {cause}")))
+        let found = match row.len() {
+            7 => posed(std::array::from_fn(|at| row[at])),
+            _ => rigid(&std::array::from_fn(|at| row[at])),
+        };
+        found.map_err(|cause| raised(format!("{name}[{i}]: {cause}")))
     };
     rows.rows().into_iter().enumerate().map(pose).collect()
 }
@@ -216,15 +220,32 @@ fn pose_of(rows: &[f64; 16]) -> PyResult<Pose> {
     rigid(rows).map_err(|cause| raised(format!("pose: {cause}")))
 }
 
+/// The pose of a position and a quaternion w, x, y, z; or what it lacks.
+fn posed([x, y, z, qw, qx, qy, qz]: [f64; 7]) -> Result<Pose, String> {
+    let position_m = position(x, y, z)?;
+    let rotation = DQuat::from_xyzw(qx, qy, qz, qw);
+    // What is not a number is not within either.
+    if !((rotation.length_squared() - 1.0).abs() < 1e-3) {
+        let found = [qw, qx, qy, qz];
+        return Err(format!("expected a quaternion of length 1, found {found:?}"));
+    }
+    Ok(Pose { position_m, rotation: rotation.normalize() })
+}
+
+fn position(x: f64, y: f64, z: f64) -> Result<DVec3, String> {
+    match [x, y, z].into_iter().find(|number| !number.is_finite()) {
+        Some(number) => Err(format!("expected a position of finite metres, found {number}")),
+        None => Ok(DVec3::new(x, y, z)),
+    }
+}
+
 /// The pose of a matrix, row by row; or what it lacks.
 fn rigid(rows: &[f64; 16]) -> Result<Pose, String> {
     let [a, b, c, x, d, e, f, y, g, h, i, z, 0.0, 0.0, 0.0, 1.0] = *rows else {
         let last = &rows[12..];
         return Err(format!("expected a matrix whose last row is 0, 0, 0, 1, found {last:?}"));
     };
-    if let Some(number) = [x, y, z].into_iter().find(|number| !number.is_finite()) {
-        return Err(format!("expected a position of finite metres, found {number}"));
-    }
+    let position_m = position(x, y, z)?;
     let rotation = DMat3::from_cols_array(&[a, d, g, b, e, h, c, f, i]);
     let off = rotation * rotation.transpose() - DMat3::IDENTITY;
     let off = off.to_cols_array().into_iter().map(f64::abs).fold(0.0, f64::max);
@@ -237,5 +258,5 @@ fn rigid(rows: &[f64; 16]) -> Result<Pose, String> {
         ));
     }
     let rotation = DQuat::from_mat3(&rotation).normalize();
-    Ok(Pose { position_m: DVec3::new(x, y, z), rotation })
+    Ok(Pose { position_m, rotation })
 }

@@ -1,4 +1,5 @@
-//! What is wrong in meaning is told: stale and damaged files, flags and columns that say nothing.
+//! Commands tell the user what is wrong in meaning: stale and damaged files, flags and columns without
+//! effect.
 
 use crate::Folder;
 

@@ -1,6 +1,7 @@
 //! What a sensor measured in each direction, turn after turn.
 
 use super::firings::{Firing, Ring};
+use super::median::median;
 
 /// The closest firing of a turn lies within this share of a step.
 const NEAR: f64 = 0.55;
@@ -65,11 +66,7 @@ pub fn directions(ring: &Ring, start: f64, n_turns: usize, first_block: usize) -
             }
             series.push(range_at(angle, pair, ring.step));
         }
-        let middle = ranges.len() / 2;
-        let range_m = match ranges.is_empty() {
-            true => f64::NAN,
-            false => *ranges.select_nth_unstable_by(middle, f64::total_cmp).1,
-        };
+        let range_m = median(&mut ranges).unwrap_or(f64::NAN);
         let known: Vec<f64> = series.iter().flatten().map(|[range, _]| *range).collect();
         means.push(known.iter().sum::<f64>() / known.len() as f64);
         let differences_m = series.windows(2).filter_map(|pair| {

@@ -4,6 +4,12 @@ use formats::interval::{Z, wilson};
 use serde::Serialize;
 
 use super::directions::Direction;
+use super::median::median;
+
+/// A value to five decimals: metres to a hundredth of a millimetre.
+pub fn rounded(value: f64) -> f64 {
+    (1e5 * value).round() / 1e5
+}
 
 /// A figure, its 95 % interval, and the number of values it is from.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -84,10 +90,8 @@ pub fn repeatability(directions: &[&Direction], quantum_m: f64) -> Option<Estima
     if sizes.len() < 100 {
         return None;
     }
-    let middle = sizes.len() / 2;
     // The median of a normal deviate's size is 0.6745.
-    let median = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
-    let mut sigma_m = (median / 0.6745).max(LEAST_OF_QUANTUM * quantum_m).max(1e-6);
+    let mut sigma_m = (median(&mut sizes)? / 0.6745).max(LEAST_OF_QUANTUM * quantum_m).max(1e-6);
     let mut blocks = Blocks::default();
     for _ in 0..4 {
         blocks = Blocks::default();

@@ -3,6 +3,7 @@
 use super::directions::{Direction, directions};
 use super::estimate::{Estimate, missing, repeatability};
 use super::firings::Recording;
+use super::median::median;
 use super::quantum::quantum;
 use super::turning::{Turning, turning};
 
@@ -76,11 +77,7 @@ pub fn figures(recording: &Recording) -> Result<Figures, String> {
     let spread = spread.ok_or(few)?;
     let mut drifts: Vec<f64> =
         inner.iter().map(|direction| direction.drift).filter(|drift| !drift.is_nan()).collect();
-    let middle = drifts.len() / 2;
-    let drift = match drifts.is_empty() {
-        true => 1.0,
-        false => *drifts.select_nth_unstable_by(middle, f64::total_cmp).1,
-    };
+    let drift = median(&mut drifts).unwrap_or(1.0);
     let jumps = |direction: &&Direction| {
         let limit_m = (JUMP * spread.high.max(unit_m)).max(0.1 + 0.02 * direction.range_m);
         direction.differences_m.iter().any(|difference| difference.abs() > limit_m)

@@ -7,9 +7,10 @@ use std::path::PathBuf;
 use anyhow::{Context, bail, ensure};
 use formats::turns::read_turns;
 use formats::velodyne::Model;
-use formats::{Scan, Senders, ouster, pcap};
+use formats::{Scan, Senders, ouster};
 use glam::{DMat3, DVec3};
 
+use super::median::median;
 use crate::Usage;
 use crate::points::{PointsArgs, warn_of_packets};
 
@@ -55,11 +56,8 @@ pub struct Recording {
 
 /// Reads captures, one after the other, or sweeps of one turn each.
 pub fn read(files: &[PathBuf], points: &PointsArgs) -> anyhow::Result<Recording> {
-    let is_capture = |file: &PathBuf| {
-        points.metadata.is_some() || (points.format.is_none() && pcap::is_capture(file))
-    };
-    let is_sweeps = !is_capture(&files[0]);
-    if let Some(other) = files.iter().find(|file| is_capture(file) == is_sweeps) {
+    let is_sweeps = !points.is_capture(&files[0]);
+    if let Some(other) = files.iter().find(|file| points.is_capture(file) == is_sweeps) {
         let [first, other] = [&files[0], other].map(|file| file.display());
         bail!(Usage(format!(
             "expected captures or sweeps, found one of each: {first} and {other}"
@@ -226,11 +224,8 @@ fn add_sweep(sweep: &Scan, number: u32, rings: &mut Vec<Vec<Firing>>) -> anyhow:
         elevations_deg[usize::from(ring)].push(beam.z.atan2(flat).to_degrees());
     }
     let middle = |angles: &mut Vec<f64>| {
-        if angles.len() < LEAST_RETURNS {
-            return Ok(f64::NAN);
-        }
-        let half = angles.len() / 2;
-        let middle = *angles.select_nth_unstable_by(half, f64::total_cmp).1;
+        let enough = median(angles).filter(|_| angles.len() >= LEAST_RETURNS);
+        let Some(middle) = enough else { return Ok(f64::NAN) };
         let apart = angles.iter().filter(|angle| (*angle - middle).abs() > WIDEST_RING_DEG).count();
         ensure!(2 * apart <= angles.len(), "{expected}, found rings of many elevations");
         Ok(middle)
@@ -247,11 +242,8 @@ impl Ring {
             found.windows(2).map(|pair| pair[1].turns - pair[0].turns).collect();
         // Further returns of a beam have the same angle.
         steps.retain(|&step| step > 1e-5);
-        if steps.len() < LEAST_RETURNS {
-            return Ok(None);
-        }
-        let middle = steps.len() / 2;
-        let step = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let enough = median(&mut steps).filter(|_| steps.len() >= LEAST_RETURNS);
+        let Some(step) = enough else { return Ok(None) };
         let (n_found, mut n_again) = (found.len(), 0);
         let mut firings: Vec<Firing> = Vec::with_capacity(n_found);
         for firing in found {

@@ -4,6 +4,7 @@ mod directions;
 mod estimate;
 mod figures;
 mod firings;
+mod median;
 mod quantum;
 mod report;
 mod turning;
@@ -18,8 +19,10 @@ use sim_gpu::internals::sensor::{Layout, Rotating, SensorProfile, TypicalNoise};
 
 use crate::points::PointsArgs;
 use crate::{Outcome, Usage};
+use estimate::rounded;
 use figures::{Figures, STEADY, STILL, figures};
 use firings::Recording;
+use median::median;
 
 /// The fewest turns: fewer do not tell noise from change.
 const LEAST_TURNS: usize = 5;
@@ -156,15 +159,10 @@ fn turn(head: &mut Rotating, rpm: f64, recording: &Recording) {
     let firings = 60e6 / head.rpm / head.sequence_us;
     if (firings - firings.round()).abs() < 1e-6 {
         let mut counts: Vec<f64> = recording.rings.iter().map(|ring| ring.step.recip()).collect();
-        counts.sort_by(f64::total_cmp);
-        let scale = 60e6 / rpm / counts[counts.len() / 2].round() / head.sequence_us;
+        let count = median(&mut counts).expect("invariant: what has figures has rings");
+        let scale = 60e6 / rpm / count.round() / head.sequence_us;
         head.sequence_us *= scale;
         head.beam.iter_mut().for_each(|beam| beam.firing_us *= scale.min(1.0));
     }
     head.rpm = rpm;
-}
-
-/// Metres to a hundredth of a millimetre.
-fn rounded(metres: f64) -> f64 {
-    (1e5 * metres).round() / 1e5
 }

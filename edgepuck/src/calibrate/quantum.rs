@@ -9,8 +9,8 @@ const LEAST_M: f64 = 1e-4;
 /// have 0.29.
 const MOST_OFF: f64 = 0.1;
 
-/// The greatest unit of which all `ranges_m` are multiples, or `None` if there is none that singles
-/// can tell.
+/// The greatest unit of which nearly all `ranges_m` are multiples; `None` if there is none, or one too
+/// fine for numbers of single precision.
 pub fn quantum(mut ranges_m: Vec<f64>) -> Option<Estimate> {
     ranges_m.sort_by(f64::total_cmp);
     // The rounding of singles, on both sides.

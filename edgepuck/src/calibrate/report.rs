@@ -6,7 +6,7 @@ use std::path::Path;
 use serde_json::{Value, json};
 use sim_gpu::internals::sensor::SensorProfile;
 
-use super::estimate::Estimate;
+use super::estimate::{Estimate, rounded};
 use super::figures::{Figures, Part, SHARES};
 use super::firings::Recording;
 use crate::significant_digits::digits;
@@ -75,7 +75,6 @@ fn shown(found: &Estimate, scale: f64) -> String {
 
 /// How commands are asked for the figures.
 fn asked(found: &Figures, out: &Path) -> String {
-    let rounded = |value: f64| (1e5 * value).round() / 1e5;
     let noise_m = rounded(found.repeatability_m.value);
     let dropout = rounded(found.missing.value);
     let [flag, line, table] = match found.quantum_m {

@@ -65,7 +65,8 @@ pub struct Cloud {
     /// below 256, and reflectivities of whole numbers up to 255, of which 100 is 1.
     pub intensities: Option<Vec<f32>>,
     /// The ring of each point, if the file has them: the column `ring` or
-    /// `scalar_ring`, or nuScenes' fifth. A column that holds anything else is none of rings.
+    /// `scalar_ring`, or nuScenes' fifth. A column with other values than
+    /// whole numbers from 0 to 65535 is ignored.
     pub rings: Option<Vec<u16>>,
     /// The pose of the sensor, a matrix of 4 by 4 row by row: `pose` of an NPZ or PLY file, or the
     /// VIEWPOINT of a PCD file, unless it is the identity.

@@ -9,6 +9,7 @@ use super::{Decoder, Header, Model, PacketError};
 use crate::capture::{Points, Senders, each_packet};
 use crate::error::FormatError;
 use crate::pcap::Counts;
+use crate::periodic::shorter_way;
 use crate::returns::Kind;
 use crate::scan::Scan;
 use crate::vlp32c::packet::PAYLOAD_SIZE;
@@ -145,8 +146,7 @@ impl Turn {
 
 /// Microseconds from one packet to another, by the shorter way around the hour.
 fn step_us(from: &Header, to: &Header) -> f64 {
-    let (step_us, hour_us) = (f64::from(to.time_us) - f64::from(from.time_us), HOUR_US as f64);
-    (step_us + hour_us / 2.0).rem_euclid(hour_us) - hour_us / 2.0
+    shorter_way(f64::from(to.time_us) - f64::from(from.time_us), HOUR_US as f64)
 }
 
 /// Whether azimuths no longer tell how far the head turned in a step after `last`.

@@ -92,7 +92,7 @@ fn columns_of_rings_are_known_by_their_names() {
     }
 }
 
-/// LAS 1.4 R15, 2.6.2: the largest intensity is 65535, and 0 says that there is none.
+/// The largest intensity of LAS is 65535, and 0 stands for none (LAS 1.4 R15, 2.6.2).
 #[test]
 fn what_is_written_is_read() {
     let folder = tempfile::tempdir().unwrap();

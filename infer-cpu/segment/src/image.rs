@@ -88,7 +88,7 @@ impl RangeImage {
     fn place(&mut self, sweep: &Sweep<'_>, settings: &Settings, labels: &mut [Label]) {
         let per_row = 1.0 / settings.row_height_deg.to_radians();
         let squares = settings.min_range_m.powi(2)..=settings.max_range_m.powi(2);
-        let rings = sweep.told_rings();
+        let rings = sweep.distinct_rings();
         self.spots.clear();
         self.rows.clear();
         for (point, &[x, y, z]) in sweep.points.iter().enumerate() {

@@ -29,6 +29,7 @@ mod hierarchy;
 mod image;
 mod label;
 mod link;
+mod look;
 mod open_sets;
 mod oriented_box;
 mod plane;

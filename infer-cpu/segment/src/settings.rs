@@ -31,7 +31,8 @@ pub struct Settings {
     pub min_points: usize,
     /// The most points of a cluster.
     pub max_points: usize,
-    /// The largest horizontal diagonal of a cluster's bounding box in metres.
+    /// The largest horizontal diagonal of a cluster's bounding box in metres; 20 by default, since an
+    /// articulated bus is 18 m long and 2.55 m wide.
     pub max_size_m: f32,
     /// With a radius in metres, clusters are the connected components of points within it, for
     /// clouds without the structure of a scan: there is no range image and no ground, and any range

@@ -5,10 +5,11 @@ use std::ops::Range;
 
 use crate::ground::{GroundFinder, sector};
 use crate::height_grid::HeightGrid;
-use crate::hierarchy::{Steps, Tree, find_steps, most_columns};
+use crate::hierarchy::{find_steps, most_columns};
 use crate::image::{self, Cells, Columns, Return};
 use crate::link::{MOST_COLUMNS, MOST_IN_CELL};
-use crate::open_sets::{NONE, OpenSets, STEPS_PER_POINT};
+use crate::look::{Handed, Look};
+use crate::open_sets::{NONE, OpenSets};
 use crate::settings::{Settings, SettingsError};
 
 /// Columns that are kept for steps: those within reach of a return, on both sides.
@@ -110,40 +111,6 @@ pub struct StreamNode {
     /// Height of the ground under the middle of the points' bounding box, in metres in the sensor's
     /// frame; `None` where it is unknown.
     pub ground_z_m: Option<f32>,
-}
-
-/// The tree of a set. Its memory is reused.
-struct Look {
-    /// The points of the set in the order in which they came.
-    members: Vec<(u64, u32)>,
-    /// The number of each point among them.
-    numbers: Vec<u32>,
-    positions: Vec<[f32; 3]>,
-    steps: Steps,
-    tree: Tree,
-    nodes: Vec<Looked>,
-    /// For each point, whether it is still needed, and from which level on its set is too wide.
-    fates: Vec<(bool, u8)>,
-}
-
-/// What is known of a node.
-#[derive(Clone, Copy)]
-struct Looked {
-    /// It is too wide for an object, or extends all around the sensor.
-    is_wide: bool,
-    /// No later return can be linked to it.
-    is_passed: bool,
-    /// `None` if it is not handed out.
-    handed: Option<Handed>,
-}
-
-/// A node that is handed out.
-#[derive(Clone, Copy)]
-struct Handed {
-    /// The place of its first point.
-    start: usize,
-    number: usize,
-    is_part: bool,
 }
 
 struct Complete<T> {
@@ -496,98 +463,6 @@ impl<T: Copy + Default> Stream<T> {
         }
         self.turn_start = self.front.unwrap_or(0);
         self.turn.clear();
-    }
-}
-
-impl Look {
-    fn new(capacity: u32) -> Self {
-        let n = capacity as usize;
-        let mut steps = Steps::default();
-        const { assert!(STEPS_PER_POINT == 3, "the room of `Steps`") };
-        steps.reset(n);
-        let mut tree = Tree::default();
-        tree.reserve(n);
-        Self {
-            members: Vec::with_capacity(n),
-            numbers: vec![0; n],
-            positions: Vec::with_capacity(n),
-            steps,
-            tree,
-            nodes: Vec::with_capacity(n),
-            fates: Vec::with_capacity(n),
-        }
-    }
-
-    /// Finds the nodes of the set of `root`, and what is needed of it after the column `place`.
-    fn at<T: Copy + Default>(
-        &mut self,
-        points: &OpenSets<T>,
-        root: u32,
-        place: u64,
-        n_columns: u64,
-        settings: &Settings,
-    ) {
-        let Self { members, numbers, positions, steps, tree, nodes, fates } = self;
-        members.clear();
-        members.extend(points.members(root).map(|point| (points.slot(point).order, point)));
-        members.sort_unstable();
-        positions.clear();
-        positions.extend(members.iter().map(|&(_, point)| points.slot(point).position));
-        for (&(_, point), number) in members.iter().zip(0..) {
-            numbers[point as usize] = number;
-        }
-        steps.reset(members.len());
-        for (&(_, point), number) in members.iter().zip(0..) {
-            for (level, other) in points.steps(point) {
-                steps.add(level, [number, numbers[other as usize]]);
-            }
-        }
-        tree.reset(positions);
-        // Small sets may still grow to nodes.
-        steps.levels().for_each(|pairs| tree.join_level(pairs, 2));
-        tree.finish();
-        nodes.clear();
-        for node in 0..tree.len() {
-            let slots =
-                tree.points(node).iter().map(|&point| points.slot(members[point as usize].1));
-            let (mut last, mut first, mut least) = (0, u64::MAX, u8::MAX);
-            for slot in slots {
-                last = last.max(slot.last_place);
-                first = first.min(slot.place);
-                least = least.min(slot.wide_from);
-            }
-            let is_wide = tree.extent(node).diagonal_m() > settings.max_size_m
-                || place >= first.saturating_add(n_columns)
-                || tree.level(node) >= least;
-            nodes.push(Looked { is_wide, is_passed: last <= place, handed: None });
-        }
-        fates.clear();
-        fates.extend(members.iter().map(|&(_, point)| {
-            let slot = points.slot(point);
-            (slot.last_place > place, slot.wide_from)
-        }));
-        // From the wholes to the parts.
-        for (node, known) in nodes.iter().enumerate().rev() {
-            let is_top = tree.parent(node).is_none_or(|above| nodes[above].is_wide);
-            for &point in tree.points(node) {
-                let (is_needed, wide_from) = &mut fates[point as usize];
-                if known.is_wide {
-                    *wide_from = tree.level(node).min(*wide_from);
-                } else if is_top {
-                    *is_needed = !known.is_passed;
-                }
-            }
-        }
-    }
-
-    /// Removes what is not needed any more of the set that was looked at.
-    fn thin<T: Copy + Default>(&self, points: &mut OpenSets<T>, place: u64) {
-        let members = self.members.iter().map(|&(_, point)| point);
-        let wide_from = |point: u32| {
-            let (is_needed, wide_from) = self.fates[self.numbers[point as usize] as usize];
-            is_needed.then_some(wide_from)
-        };
-        points.thin(members, wide_from, place);
     }
 }
 

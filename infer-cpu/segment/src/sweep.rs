@@ -12,7 +12,7 @@ pub struct Sweep<'a> {
 
 impl<'a> Sweep<'a> {
     /// The rings; `None` if all points have the same one, as in a column that nobody filled.
-    pub(crate) fn told_rings(&self) -> Option<&'a [u16]> {
+    pub(crate) fn distinct_rings(&self) -> Option<&'a [u16]> {
         self.rings.filter(|rings| rings.iter().any(|ring| *ring != rings[0]))
     }
 }

@@ -27,6 +27,7 @@ mod counts;
 mod ego_motion;
 mod kalman;
 mod object;
+mod object_classifier;
 mod packet_clock;
 mod pipeline;
 #[cfg(feature = "mcap")]
@@ -35,6 +36,7 @@ mod sensor;
 mod stats;
 mod timeline;
 mod tracker;
+mod waiting;
 
 pub use counts::Counts;
 pub use ego_motion::{EgoMotion, Pose};

@@ -1,5 +1,7 @@
 //! The times of packets: their order, losses, and Unix times.
 
+use formats::periodic::shorter_way;
+
 /// A gap of this length, or a step back by it, counts as a restart of the sensor.
 const RESTART_S: f64 = 1.0;
 /// The share of the difference between the clocks of host and sensor by which each packet corrects
@@ -75,11 +77,8 @@ impl PacketClock {
             return (Succession::First, arrival_s);
         };
         let arrived_s = arrival_s - self.start_s;
-        let mut step_us = stamp_us - last.stamp_us;
-        if let Some(wraps_us) = self.wraps_us {
-            // The step is the shorter way around.
-            step_us = (step_us + wraps_us / 2.0).rem_euclid(wraps_us) - wraps_us / 2.0;
-        }
+        let step_us = stamp_us - last.stamp_us;
+        let step_us = self.wraps_us.map_or(step_us, |wraps_us| shorter_way(step_us, wraps_us));
         let by_stamp_s = last.after_s + step_us * 1e-6;
         let off_s = arrived_s - by_stamp_s;
         let is_jump =

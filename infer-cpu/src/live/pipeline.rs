@@ -1,25 +1,24 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
-use std::ops::{Range, RangeInclusive};
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 use std::time::{Instant, SystemTime};
 
-use edgepuck_segment::{BestCut, OrientedBox, Settings, SettingsError, Stream, StreamCluster};
+use edgepuck_segment::{OrientedBox, Settings, SettingsError, Stream};
 use formats::ouster::Metadata;
 use formats::returns::Return;
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 
 use super::counts::Counts;
 use super::ego_motion::{EgoMotion, Pose};
 use super::object::{Object, SCHEMA_VERSION};
+use super::object_classifier::{Chosen, ObjectClassifier};
 use super::packet_clock::{PacketClock, Succession};
 use super::sensor::{Decoder, Facts, Flaw};
 use super::stats::{Stage, Stats};
 use super::tracker::{Observation, Tracker};
+use super::waiting::{Motion, Tag, Waiting};
 use crate::classifier::Classifier;
-use crate::classifier_team::ClassifierTeam;
 use crate::error::Error;
-use crate::prediction::{UNKNOWN, UnknownRule};
-use crate::rule::{MARGIN_OF_WHOLES, Rule};
 
 /// The capacity for returns of each ring: 1.5 times as many as a VLP-32C sends in its slowest turn
 /// with dual returns.
@@ -34,11 +33,6 @@ const MOST_FOREIGN: u32 = 300;
 
 /// The widest columns, degrees: the steps of a sensor are narrower, unless its packet is damaged.
 const WIDEST_DEG: f32 = 1.0;
-
-/// The most clusters and points that are usually complete at once: those of the first turn, whose
-/// ground is known at its end. More take more memory.
-const USUAL_NODES: usize = 4096;
-const USUAL_POINTS: usize = 1 << 17;
 
 /// The options of a pipeline.
 #[derive(Clone, Debug)]
@@ -152,50 +146,6 @@ struct Sensor {
     n_foreign: u32,
 }
 
-/// The time and the ring of a point.
-#[derive(Clone, Copy, Debug, Default)]
-struct Tag {
-    /// Unix time in seconds.
-    time_s: f64,
-    /// When its packet arrived.
-    moment: Option<Instant>,
-    ring: u16,
-}
-
-/// Trees of complete clusters that are not reported yet.
-struct Waiting {
-    points: Vec<[f32; 3]>,
-    tags: Vec<Tag>,
-    nodes: Vec<Node>,
-}
-
-struct Node {
-    points: Range<usize>,
-    parent: Option<usize>,
-    is_part: bool,
-    ground_z_m: Option<f32>,
-    /// The time of the sensor's pose in whose frame the points are.
-    pose_s: f64,
-    turn: u64,
-}
-
-struct ObjectClassifier {
-    team: ClassifierTeam,
-    classes: Vec<Arc<str>>,
-    unknown: UnknownRule,
-    unknown_name: Arc<str>,
-    rule: Rule,
-    best: BestCut,
-    /// The log-probabilities of all classes for each classified node.
-    log_probabilities: Vec<f64>,
-    /// For each node, where those are, and the energy.
-    views: Vec<Option<(Range<usize>, f64)>>,
-    worths: Vec<f64>,
-    is_known: Vec<bool>,
-    /// The nodes of the best cut, in the order in which the beams passed them.
-    chosen: Vec<usize>,
-}
-
 impl Pipeline {
     /// A pipeline that classifies clusters with as many threads as `classifier` has.
     ///
@@ -203,31 +153,14 @@ impl Pipeline {
     /// Invalid settings; threads that cannot be started.
     pub fn new(classifier: Classifier, options: &LiveOptions) -> Result<Self, LiveError> {
         options.segmentation.check()?;
-        let n_classes = classifier.classes().len();
-        let classifiers = ObjectClassifier {
-            classes: classifier.classes().to_vec(),
-            unknown: UnknownRule::new(classifier.card(), classifier.classes()),
-            unknown_name: UNKNOWN.into(),
-            rule: Rule::new(&classifier),
-            team: ClassifierTeam::new(classifier)?,
-            best: BestCut::with_capacity(USUAL_NODES),
-            log_probabilities: Vec::with_capacity(USUAL_NODES * n_classes),
-            views: Vec::with_capacity(USUAL_NODES),
-            worths: Vec::with_capacity(USUAL_NODES),
-            is_known: Vec::with_capacity(USUAL_NODES),
-            chosen: Vec::with_capacity(USUAL_NODES),
-        };
+        let classifiers = ObjectClassifier::new(classifier)?;
         Ok(Self {
             options: options.clone(),
             sensor: None,
             returns: Vec::new(),
             taken_s: None,
-            waiting: Waiting {
-                points: Vec::with_capacity(USUAL_POINTS),
-                tags: Vec::with_capacity(USUAL_POINTS),
-                nodes: Vec::with_capacity(USUAL_NODES),
-            },
-            tracker: Tracker::new(n_classes),
+            waiting: Waiting::new(),
+            tracker: Tracker::new(classifiers.classes.len()),
             classifiers,
             counts: Counts::default(),
             stats: Stats::new(),
@@ -347,13 +280,10 @@ impl Pipeline {
         self.classifiers.classify(&self.waiting, self.options.min_points);
         let classified = Instant::now();
         self.stats.spend(Stage::Classify, classified - start);
-        for &node in &self.classifiers.chosen {
-            let view = self.classifiers.views[node].as_ref().map(|(range, energy)| {
-                (&self.classifiers.log_probabilities[range.clone()], *energy)
-            });
+        for &Chosen { node, span: [first, last] } in &self.classifiers.chosen {
+            let view = self.classifiers.view(node);
             let cluster = &self.waiting.nodes[node];
             let points = &self.waiting.points[cluster.points.clone()];
-            let [first, last] = self.waiting.span(node);
             let pose = motion.map(|motion| motion.pose(cluster.pose_s));
             let sensor_m = pose.map_or([0.0; 2], |pose| pose.position_m.truncate().to_array());
             let place = Place::locate(points, pose);
@@ -482,136 +412,6 @@ impl Sensor {
     fn end(&mut self, waiting: &mut Waiting, motion: Option<Motion<'_>>) {
         let turn = self.stream.n_turns();
         self.stream.end(|cluster| waiting.push(&cluster, turn, motion));
-    }
-}
-
-/// The motion of the sensor since its first packet.
-#[derive(Clone, Copy)]
-struct Motion<'a> {
-    motion: &'a EgoMotion,
-    start_s: f64,
-}
-
-impl Motion<'_> {
-    fn pose(&self, time_s: f64) -> Pose {
-        self.motion.pose(time_s, self.start_s)
-    }
-}
-
-impl Waiting {
-    fn clear(&mut self) {
-        self.points.clear();
-        self.tags.clear();
-        self.nodes.clear();
-    }
-
-    /// Whether a node has points of several rings.
-    fn has_rings(&self, node: usize) -> bool {
-        let tags = &self.tags[self.nodes[node].points.clone()];
-        tags.iter().any(|tag| tag.ring != tags[0].ring)
-    }
-
-    /// The first and the last point of a node.
-    fn span(&self, node: usize) -> [Tag; 2] {
-        let tags = &self.tags[self.nodes[node].points.clone()];
-        let by_time = |a: &&Tag, b: &&Tag| a.time_s.total_cmp(&b.time_s);
-        [tags.iter().min_by(by_time), tags.iter().max_by(by_time)]
-            .map(|tag| tag.copied().unwrap_or_default())
-    }
-
-    /// Adds clusters of a turn. If the sensor moves, the points are transformed into its frame at
-    /// the time of the last point.
-    fn push(&mut self, cluster: &StreamCluster<'_, Tag>, turn: u64, motion: Option<Motion<'_>>) {
-        let (start, n_nodes) = (self.points.len(), self.nodes.len());
-        self.points.extend_from_slice(cluster.points);
-        self.tags.extend_from_slice(cluster.tags);
-        let pose_s = cluster.tags.iter().fold(f64::NEG_INFINITY, |last, tag| last.max(tag.time_s));
-        if let Some(motion) = motion {
-            let pose = motion.pose(pose_s);
-            for (point, tag) in self.points[start..].iter_mut().zip(cluster.tags) {
-                let in_world = motion.pose(tag.time_s).to_world(Vec3::from(*point).as_dvec3());
-                *point = pose.from_world(in_world).as_vec3().to_array();
-            }
-        }
-        self.nodes.extend(cluster.nodes.iter().map(|node| Node {
-            points: start + node.points.start..start + node.points.end,
-            parent: node.parent.map(|parent| n_nodes + parent),
-            is_part: node.is_part,
-            ground_z_m: node.ground_z_m,
-            pose_s,
-            turn,
-        }));
-    }
-}
-
-/// The class and probability of a track.
-struct Fused {
-    class: usize,
-    answer: Arc<str>,
-    probability: f64,
-}
-
-impl ObjectClassifier {
-    /// Classifies the nodes that have enough points, and chooses the best cut.
-    fn classify(&mut self, waiting: &Waiting, min_points: usize) {
-        let Self { team, rule, best, log_probabilities, views, worths, is_known, chosen, .. } =
-            self;
-        let nodes = &waiting.nodes;
-        log_probabilities.clear();
-        views.clear();
-        views.resize(nodes.len(), None);
-        worths.clear();
-        worths.resize(nodes.len(), 0.0);
-        is_known.clear();
-        is_known.resize(nodes.len(), false);
-        // A single ring shows no shape: it belongs to what is next to it.
-        let is_asked = |&node: &usize| {
-            nodes[node].points.len() >= min_points
-                && (nodes[node].parent.is_none() || waiting.has_rings(node))
-        };
-        let mut asked = (0..nodes.len()).filter(is_asked);
-        let clouds = asked.clone().map(|node| {
-            let Node { points, ground_z_m, .. } = &nodes[node];
-            (&waiting.points[points.clone()], *ground_z_m)
-        });
-        team.classify_many(clouds, |answer| {
-            let Some(node) = asked.next() else { return };
-            // A cluster has no view if the network overflows on it.
-            let answer = answer.ok();
-            worths[node] = rule.worth(nodes[node].points.len(), answer);
-            is_known[node] = answer.is_some_and(|answer| !answer.is_unknown);
-            views[node] = answer.map(|answer| {
-                let start = log_probabilities.len();
-                let n_classes = answer.logits.len();
-                let all = (0..n_classes).map(|class| answer.log_probability(class));
-                log_probabilities.extend(all);
-                (start..start + n_classes, answer.energy)
-            });
-        });
-        chosen.clear();
-        // Neither an unknown piece of a wall or a hedge is an object, nor one that shows no shape.
-        let is_object = |&&node: &&usize| {
-            let Node { is_part, parent, .. } = &nodes[node];
-            is_known[node] || !*is_part && (parent.is_none() || views[node].is_some())
-        };
-        let cut = best.find(worths, |node| nodes[node].parent, MARGIN_OF_WHOLES);
-        chosen.extend(cut.iter().filter(is_object));
-        chosen.sort_unstable_by(|&a, &b| {
-            let last_s = |node| waiting.span(node)[1].time_s;
-            last_s(a).total_cmp(&last_s(b)).then(a.cmp(&b))
-        });
-    }
-
-    /// The class of a track with these mean log-probabilities and this mean energy; `None` without
-    /// a view.
-    fn fused(&self, means: &[f64], energy: f64) -> Option<Fused> {
-        let (class, largest) = means.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
-        let sum: f64 = means.iter().map(|mean| (mean - largest).exp()).sum();
-        let answer = match self.unknown.holds(class, energy) {
-            true => Arc::clone(&self.unknown_name),
-            false => Arc::clone(&self.classes[class]),
-        };
-        Some(Fused { class, answer, probability: 1.0 / sum })
     }
 }
 

@@ -215,7 +215,7 @@ impl Clouds {
                 break;
             }
             let indices: Vec<usize> = sparse.iter().map(|&i| indices[i]).collect();
-            let other_seed = other_seed(seed, Stream::AnotherView { attempt });
+            let other_seed = Stream::AnotherView { attempt }.key(seed).seed();
             let others = self.cast(caster, other_seed, &indices, &make)?;
             for (i, mut other) in sparse.into_iter().zip(others) {
                 use DatasetError::Sparse;
@@ -313,12 +313,7 @@ impl Clouds {
 /// The seed of epoch `epoch` of a training that has `seed`, which is the seed of epoch 0.
 #[must_use]
 pub fn seed_of_epoch(seed: u64, epoch: u32) -> u64 {
-    if epoch == 0 { seed } else { other_seed(seed, Stream::Epoch { epoch }) }
-}
-
-fn other_seed(seed: u64, stream: Stream) -> u64 {
-    let [low, high, ..] = stream.key(seed).words([0; 4]);
-    u64::from(high) << 32 | u64::from(low)
+    if epoch == 0 { seed } else { Stream::Epoch { epoch }.key(seed).seed() }
 }
 
 /// One view of one mesh, before its rays are cast.

@@ -49,20 +49,21 @@ impl Scene {
         let mut batch = Batch {
             range_m: filled(poses.len(), n_beams, f32::INFINITY)?,
             object: filled(poses.len(), n_beams, NO_OBJECT)?,
-            seeds: rows.map(|row| row_seed(self.seed, row)).collect(),
+            seeds: rows.map(|row| Stream::BatchRow { row }.key(self.seed).seed()).collect(),
         };
         if n_beams == 0 {
             return Ok(batch);
         }
         let rows = batch.range_m.par_chunks_mut(n_beams).zip(batch.object.par_chunks_mut(n_beams));
-        rows.zip(poses).enumerate().try_for_each_init(
+        let rows = rows.zip(poses.par_iter().zip(&batch.seeds));
+        rows.enumerate().try_for_each_init(
             || self.clone(),
-            |world, (i, ((ranges_m, objects), &pose))| {
+            |world, (i, ((ranges_m, objects), (&pose, &seed)))| {
                 let of_this = &moves.poses[i * n_moved..(i + 1) * n_moved];
                 for (&instance, &pose) in moves.instances.iter().zip(of_this) {
                     world[instance].pose = pose;
                 }
-                let scan = world.scan(sensor, pose).seed(row_seed(self.seed, i as u32));
+                let scan = world.scan(sensor, pose).seed(seed);
                 let scan = scan.attributes([Attribute::Range, Attribute::Beam, Attribute::Object]);
                 let found = scan.run()?.points;
                 let column = "invariant: the scan was asked for it";
@@ -94,11 +95,6 @@ impl Scene {
         }
         Ok(())
     }
-}
-
-fn row_seed(seed: u64, row: u32) -> u64 {
-    let [low, high, ..] = Stream::BatchRow { row }.key(seed).words([0; 4]);
-    u64::from(low) | u64::from(high) << 32
 }
 
 /// A number for each beam of each pose, if the memory holds them.
