@@ -224,8 +224,8 @@ fn pose_of(rows: &[f64; 16]) -> PyResult<Pose> {
 fn posed([x, y, z, qw, qx, qy, qz]: [f64; 7]) -> Result<Pose, String> {
     let position_m = position(x, y, z)?;
     let rotation = DQuat::from_xyzw(qx, qy, qz, qw);
-    // What is not a number is not within either.
-    if !((rotation.length_squared() - 1.0).abs() < 1e-3) {
+    let off = (rotation.length_squared() - 1.0).abs();
+    if off.is_nan() || off >= 1e-3 {
         let found = [qw, qx, qy, qz];
         return Err(format!("expected a quaternion of length 1, found {found:?}"));
     }

@@ -24,6 +24,7 @@ const COMPRESSIONS: [&str; 3] =
 /// The mesh of a file, whose buffers in other files are in `folder`.
 pub(super) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Parsed, ParseError> {
     let wrong = |cause: String| ParseError::from(Malformed::Syntax(cause));
+    check_length(bytes).map_err(wrong)?;
     let Gltf { document, blob } = Gltf::from_slice_without_validation(bytes)
         .map_err(|error| wrong(format!("expected glTF 2.0: {error}")))?;
     let mut json = document.into_json();
@@ -58,6 +59,18 @@ pub(super) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Parsed, Parse
         reader.add(&node, DMat4::IDENTITY).map_err(wrong)?;
     }
     Ok(reader.parsed)
+}
+
+/// The crate subtracts the header from the length that the header of a binary file tells.
+fn check_length(bytes: &[u8]) -> Result<(), String> {
+    const HEADER: u32 = 12;
+    let [b'g', b'l', b'T', b'F', _, _, _, _, length @ ..] = bytes else { return Ok(()) };
+    match length.first_chunk().map(|length| u32::from_le_bytes(*length)) {
+        Some(length) if length < HEADER => {
+            Err(format!("expected a length of {HEADER} or more in the header, found {length}"))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// The bytes of a buffer: of the file itself, in base64, or of another file.
@@ -389,6 +402,7 @@ mod tests {
         };
         for (bytes, expected) in [
             (b"{}".to_vec(), "expected glTF 2.0: "),
+            (b"glTF\x02\0\0\0\x0b\0\0\0".to_vec(), "expected a length of 12 or more in the header"),
             (swap(r#""scenes": [{"nodes": [0]}]"#, r#""scenes": []"#), "scene"),
             (swap(r#""mesh": 0"#, r#""mesh": 7"#), "nodes[0].mesh"),
             (
