@@ -45,7 +45,8 @@ fn rounded(soup: &[[DVec3; 3]]) -> Vec<Corners> {
 }
 
 fn contents(bvh: &Bvh) -> Vec<(u32, [u32; 9])> {
-    let mut all: Vec<_> = bvh.triangles.iter().map(|t| (t.index, bits([t.a, t.b, t.c]))).collect();
+    let mut all: Vec<_> =
+        bvh.two_wide().triangles.iter().map(|t| (t.index, bits([t.a, t.b, t.c]))).collect();
     all.sort_unstable();
     all
 }
@@ -77,7 +78,7 @@ proptest! {
             .collect();
         expected.sort_unstable();
         for builder in BUILDERS {
-            let bvh = Bvh::build(builder, &corners, &indices);
+            let bvh = Bvh::build(builder, &indices, |nth| corners[nth]);
             assert_well_formed(&bvh);
             prop_assert_eq!(&contents(&bvh), &expected);
         }
@@ -94,7 +95,7 @@ proptest! {
             let target = target_by(builder, &mesh);
             let job = job(&target, &at(sensor), &pattern);
             // One triangle is a tree of its own: no box of others can hide it.
-            let alone: Vec<_> = target.bvh.triangles.iter().map(|t| one_of(&target, t)).collect();
+            let alone: Vec<_> = target.bvh.two_wide().triangles.iter().map(|t| one_of(&target, t)).collect();
             for &direction in &pattern.directions {
                 let ray = job.frame.ray(direction);
                 let nearest = alone
@@ -112,7 +113,7 @@ proptest! {
 /// The same surface under a tree that knows one triangle only.
 fn one_of(target: &Target, triangle: &LeafTriangle) -> Target {
     let corners = [triangle.a, triangle.b, triangle.c];
-    let bvh = Bvh::build(Builder::Sah, &[corners], &[triangle.index]);
+    let bvh = Bvh::build(Builder::Sah, &[triangle.index], |_| corners);
     Target { surface: target.surface.clone(), bvh: bvh.into() }
 }
 
@@ -124,9 +125,9 @@ fn every_small_number_of_triangles_makes_a_tree() {
             (0..n).map(|_| [(); 3].map(|()| random.in_cube().as_vec3().to_array())).collect();
         let indices: Vec<u32> = (0..n).collect();
         for builder in BUILDERS {
-            let bvh = Bvh::build(builder, &corners, &indices);
+            let bvh = Bvh::build(builder, &indices, |nth| corners[nth]);
             assert_well_formed(&bvh);
-            assert_eq!(bvh.triangles.len(), n as usize);
+            assert_eq!(bvh.two_wide().triangles.len(), n as usize);
         }
     }
 }
@@ -143,7 +144,7 @@ fn shrinking_triangles_make_no_deep_tree() {
         .collect();
     let indices: Vec<u32> = (0..3000).collect();
     for builder in BUILDERS {
-        assert_well_formed(&Bvh::build(builder, &corners, &indices));
+        assert_well_formed(&Bvh::build(builder, &indices, |nth| corners[nth]));
     }
 }
 

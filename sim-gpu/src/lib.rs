@@ -53,8 +53,8 @@ mod target;
 mod weather;
 
 pub use api::{
-    Batch, Caster, Error, Instance, InstanceId, Mesh, MountedSensor, Moves, NO_OBJECT, Scan,
-    ScanBuilder, Scene, Sensor,
+    Batch, BatchBuilder, Caster, Error, Instance, InstanceId, Mesh, MountedSensor, Moves,
+    NO_OBJECT, Scan, ScanBuilder, Scene, Sensor,
 };
 pub use effects::Effects;
 pub use formats;

@@ -121,14 +121,9 @@ impl Target {
     /// Builds the hierarchy over `surface`.
     #[must_use]
     pub fn new(surface: Surface, builder: Builder) -> Self {
-        let rounded: Vec<[f32; 3]> =
-            surface.vertices.iter().map(|v| v.as_vec3().to_array()).collect();
-        let corners: Vec<[[f32; 3]; 3]> = surface
-            .kept
-            .iter()
-            .map(|&t| surface.triangles[t as usize].map(|v| rounded[v as usize]))
-            .collect();
-        let bvh = Bvh::build(builder, &corners, &surface.kept);
+        let bvh = Bvh::build(builder, &surface.kept, |nth| {
+            surface.corners(surface.kept[nth]).map(|v| v.as_vec3().to_array())
+        });
         Self { surface: Arc::new(surface), bvh: Arc::new(bvh) }
     }
 

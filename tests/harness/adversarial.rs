@@ -33,7 +33,7 @@ pub fn corners_and_midpoints(target: &Target) -> Vec<DVec3> {
     let bits = |v: [f32; 3]| v.map(f32::to_bits);
     let mut corners = BTreeSet::new();
     let mut edges = BTreeSet::new();
-    for t in &target.bvh.triangles {
+    for t in &target.bvh.two_wide().triangles {
         // Corners are in canonical order, so an edge is the same pair in both
         // triangles.
         let [a, b, c] = [t.a, t.b, t.c].map(bits);

@@ -2,7 +2,7 @@
 
 use formats::rng::StreamKey;
 use glam::{DAffine3, DQuat, DVec3};
-use sim_gpu::internals::bvh::{Builder, Bvh};
+use sim_gpu::internals::bvh::{Builder, Bvh, TwoWide};
 use sim_gpu::internals::caster::OpenCaster;
 use sim_gpu::internals::job::{Cast, CastJob, Culling};
 use sim_gpu::internals::mesh::TriangleMesh;
@@ -26,7 +26,7 @@ pub fn target_by(builder: Builder, mesh: &TriangleMesh) -> Target {
 
 /// A tree as it is uploaded: its nodes, then its triangles.
 pub fn tree_bytes(bvh: &Bvh) -> Vec<u8> {
-    let Bvh { nodes, triangles, .. } = bvh;
+    let TwoWide { nodes, triangles } = bvh.two_wide();
     [bytemuck::cast_slice::<_, u8>(nodes), bytemuck::cast_slice(triangles)].concat()
 }
 

@@ -1,8 +1,13 @@
 //! Casts of a scene from many poses at once.
 
-use super::{Error, InstanceId, Scene, Sensor};
+use super::scan_builder::{Prepared, check_pose};
+use super::{Caster, Error, InstanceId, ScanBuilder, Scene, Sensor};
+use crate::caster::{Casting, OpenCaster};
 use crate::config::InvalidValue;
+use crate::effects::{Effects, ReturnMode};
+use crate::job::CastJob;
 use crate::pose::Pose;
+use crate::scan::{BeamReturn, PlacedTarget, aim_all, cast_returns, resolve_returns};
 use formats::scan::Attribute;
 use formats::streams::Stream;
 use rayon::prelude::*;
@@ -10,7 +15,11 @@ use rayon::prelude::*;
 /// The object of a beam that returns nothing.
 pub const NO_OBJECT: u32 = u32::MAX;
 
-/// What moves from pose to pose in a [batch](Scene::cast).
+/// The rays of the rows that an adapter casts together: it has the next of them while their ranges are
+/// computed.
+const RAYS_AT_ONCE: usize = 1 << 22;
+
+/// What moves from pose to pose in a [batch](Scene::batch).
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Moves<'a> {
     /// The instances that move.
@@ -24,76 +33,237 @@ pub struct Moves<'a> {
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Batch {
-    /// Metres; infinite where no return comes back.
+    /// Metres; infinite where no return comes back. Of several returns, that with the number 1.
     pub range_m: Vec<f32>,
     /// The number of the instance; [`NO_OBJECT`] where no return comes back, or one from the air.
     pub object: Vec<u32>,
+    /// The range of the second return, metres, if the effects ask for dual returns; else empty.
+    pub second_range_m: Vec<f32>,
+    /// The intensity of the first return, 0 without one, if it was asked for; else empty.
+    pub intensity: Vec<f32>,
+    /// The received power of the first return, 0 without one, if it was asked for; else empty.
+    pub power: Vec<f32>,
     /// The seed of each row.
     pub seeds: Vec<u64>,
 }
 
+/// A batch that [`BatchBuilder::run`] makes. Settings that are not given come from the [`Scene`].
+#[derive(Clone, Debug)]
+#[must_use = "`run` makes the batch"]
+pub struct BatchBuilder<'a> {
+    scan: ScanBuilder<'a>,
+    poses: &'a [Pose],
+    moves: Moves<'a>,
+    seed: u64,
+}
+
 impl Scene {
-    /// The ranges that `sensor` measures at each of `poses`, on all threads of the CPU. Each pose sees a
-    /// world of its own, in which the instances of `moves` stand elsewhere: nothing is rebuilt.
-    ///
-    /// A row has the ranges of [`Scene::scan`] at its pose and with its seed, to the bit. Of several
-    /// returns of a beam it has the first. Rows, and batches of other seeds, have other noise.
+    /// The ranges that `sensor` measures at each of `poses`, on all threads of the CPU: a
+    /// [batch](Scene::batch) in which the instances of `moves` stand elsewhere.
     ///
     /// # Errors
-    /// As [`ScanBuilder::run`](super::ScanBuilder::run); another number of poses in `moves` than poses
-    /// times instances; an instance of another scene; more ranges than the memory holds.
+    /// As [`BatchBuilder::run`].
     pub fn cast(&self, sensor: &Sensor, poses: &[Pose], moves: Moves<'_>) -> Result<Batch, Error> {
-        self.check_moves(poses.len(), moves)?;
-        let (n_beams, n_moved) = (sensor.directions().len(), moves.instances.len());
-        let rows = 0..poses.len() as u32;
-        let mut batch = Batch {
-            range_m: filled(poses.len(), n_beams, f32::INFINITY)?,
-            object: filled(poses.len(), n_beams, NO_OBJECT)?,
-            seeds: rows.map(|row| Stream::BatchRow { row }.key(self.seed).seed()).collect(),
-        };
-        if n_beams == 0 {
-            return Ok(batch);
-        }
-        let rows = batch.range_m.par_chunks_mut(n_beams).zip(batch.object.par_chunks_mut(n_beams));
-        let rows = rows.zip(poses.par_iter().zip(&batch.seeds));
-        rows.enumerate().try_for_each_init(
-            || self.clone(),
-            |world, (i, ((ranges_m, objects), (&pose, &seed)))| {
-                let of_this = &moves.poses[i * n_moved..(i + 1) * n_moved];
-                for (&instance, &pose) in moves.instances.iter().zip(of_this) {
-                    world[instance].pose = pose;
-                }
-                let scan = world.scan(sensor, pose).seed(seed);
-                let scan = scan.attributes([Attribute::Range, Attribute::Beam, Attribute::Object]);
-                let found = scan.run()?.points;
-                let column = "invariant: the scan was asked for it";
-                let range_m = found.range_m.expect(column);
-                let (beam, object) = (found.beam.expect(column), found.object.expect(column));
-                for ((range_m, beam), object) in range_m.into_iter().zip(beam).zip(object) {
-                    let beam = beam as usize;
-                    if objects[beam] == NO_OBJECT && ranges_m[beam] == f32::INFINITY {
-                        (ranges_m[beam], objects[beam]) = (range_m, object);
-                    }
-                }
-                Ok::<(), Error>(())
-            },
-        )?;
+        self.batch(sensor, poses).moving(moves).run()
+    }
+
+    /// The ranges that `sensor` measures at each of `poses`, which [`BatchBuilder::run`] casts.
+    ///
+    /// A row has the ranges of [`Scene::scan`] at its pose and with its seed, to the bit, whatever casts
+    /// it. Rows, and batches of other seeds, have other noise.
+    pub fn batch<'a>(&'a self, sensor: &'a Sensor, poses: &'a [Pose]) -> BatchBuilder<'a> {
+        let scan = self.scan(sensor, Pose::IDENTITY).attributes([]);
+        BatchBuilder { scan, poses, moves: Moves::default(), seed: self.seed }
+    }
+}
+
+impl<'a> BatchBuilder<'a> {
+    /// Each pose sees a world of its own, in which these instances stand elsewhere: nothing is rebuilt,
+    /// and the scene does not change.
+    pub fn moving(self, moves: Moves<'a>) -> Self {
+        Self { moves, ..self }
+    }
+
+    /// Casts on `caster`; by default the CPU casts.
+    pub fn with(self, caster: &'a Caster) -> Self {
+        Self { scan: self.scan.with(caster), ..self }
+    }
+
+    /// Applies these effects in place of the scene's.
+    pub fn effects(self, effects: Effects) -> Self {
+        Self { scan: self.scan.effects(effects), ..self }
+    }
+
+    /// Gives the batch [`Attribute::Intensity`] or [`Attribute::Power`], besides ranges and objects.
+    pub fn attributes(self, attributes: impl IntoIterator<Item = Attribute>) -> Self {
+        Self { scan: self.scan.attributes(attributes), ..self }
+    }
+
+    /// Draws the seeds of its rows from this seed: give each step of a loop its own.
+    pub fn seed(self, seed: u64) -> Self {
+        Self { seed, ..self }
+    }
+
+    /// Begins the scan of each row at this time of all trajectories, seconds; 0 by default.
+    pub fn start_s(self, start_s: f64) -> Self {
+        Self { scan: self.scan.start_s(start_s), ..self }
+    }
+
+    /// Casts the batch.
+    ///
+    /// # Errors
+    /// As [`ScanBuilder::run`]; a pose in `moves` that is none; another number of poses in `moves` than
+    /// poses times instances; an instance of another scene; another attribute than intensity and power;
+    /// more ranges than the memory holds.
+    pub fn run(self) -> Result<Batch, Error> {
+        self.check()?;
+        let prepared = self.scan.prepare()?;
+        let mut batch = self.empty()?;
+        let Batch { range_m, object, second_range_m, intensity, power, seeds } = &mut batch;
+        let n_beams = self.scan.sensor.directions().len().max(1);
+        let mut columns = [second_range_m, intensity, power].map(|all| all.chunks_mut(n_beams));
+        let rows = range_m.chunks_mut(n_beams).zip(object.chunks_mut(n_beams));
+        let rows = rows.zip(seeds.iter().zip(self.poses)).enumerate();
+        let rows = rows.map(|(number, ((range_m, object), (&seed, &pose)))| {
+            let scan = self.scan.clone().at(pose).seed(seed);
+            let of_row = columns.each_mut().map(|column| column.next().unwrap_or_default());
+            let [second_range_m, intensity, power] = of_row;
+            Row { number, scan, range_m, object, second_range_m, intensity, power }
+        });
+        self.cast(rows.collect(), &prepared)?;
         Ok(batch)
     }
 
-    fn check_moves(&self, n_poses: usize, moves: Moves<'_>) -> Result<(), InvalidValue> {
-        let n_instances = self.instances().len();
-        if let Some(other) = moves.instances.iter().find(|id| id.number() as usize >= n_instances) {
+    fn cast(&self, mut rows: Vec<Row<'_, 'a>>, prepared: &Prepared) -> Result<(), Error> {
+        let Prepared { caster, rays, .. } = prepared;
+        let fits = self.scan.scene.instances().iter().all(|i| caster.fits(i.mesh.target()));
+        if matches!(**caster, OpenCaster::Cpu(_)) || !fits {
+            return rows.par_iter_mut().try_for_each(|row| {
+                let (scan, placed) = (row.scan.clone(), self.placed(row));
+                let request = scan.request(rays);
+                Ok(cast_returns(caster.effects(), &placed, &request, |found| row.add(&found))?)
+            });
+        }
+        let n_rows = (RAYS_AT_ONCE / rays.len().max(1)).max(1);
+        let mut before: Option<(&mut [Row<'_, 'a>], Vec<CastJob>, Casting)> = None;
+        for rows in rows.chunks_mut(n_rows) {
+            let aimed = rows
+                .par_iter()
+                .map(|row| aim_all(&self.placed(row), &row.scan.request(rays), caster.effects()));
+            let jobs: Vec<CastJob> = aimed.collect::<Vec<_>>().into_iter().flatten().collect();
+            let casting = caster.submit(&jobs)?;
+            if let Some(before) = before.replace((rows, jobs, casting)) {
+                self.finish(before, prepared)?;
+            }
+        }
+        before.map_or(Ok(()), |last| self.finish(last, prepared))
+    }
+
+    /// Fills the rows that an adapter has cast.
+    fn finish(
+        &self,
+        (rows, jobs, casting): (&mut [Row<'_, 'a>], Vec<CastJob>, Casting),
+        Prepared { caster, rays, .. }: &Prepared,
+    ) -> Result<(), Error> {
+        let casts = casting.wait()?;
+        let n = self.scan.scene.instances().len();
+        if n == 0 {
+            return Ok(());
+        }
+        let cast = jobs.par_chunks(n).zip(casts.par_chunks(n));
+        rows.par_iter_mut().zip(cast).try_for_each(|(row, cast)| {
+            let (scan, placed) = (row.scan.clone(), self.placed(row));
+            let request = scan.request(rays);
+            let add = |found: BeamReturn| row.add(&found);
+            Ok(resolve_returns(caster.effects(), &placed, &request, cast, add)?)
+        })
+    }
+
+    /// The instances in the world of `row`.
+    fn placed(&self, row: &Row<'_, 'a>) -> Vec<PlacedTarget<'a>> {
+        let Moves { instances, poses } = self.moves;
+        let of_row = &poses[row.number * instances.len()..][..instances.len()];
+        // The last of an instance that is named twice.
+        let moved = |number| instances.iter().rposition(|id| id.number() == number);
+        row.scan.placed(|number| moved(number).map(|at| of_row[at]))
+    }
+
+    fn check(&self) -> Result<(), InvalidValue> {
+        let Moves { instances, poses } = self.moves;
+        let n_instances = self.scan.scene.instances().len();
+        if let Some(other) = instances.iter().find(|id| id.number() as usize >= n_instances) {
             let cause = format!("expected one of {n_instances}, found {}", other.number());
             return Err(InvalidValue::new("moves.instances", cause));
         }
-        let (expected, found) = (n_poses * moves.instances.len(), moves.poses.len());
-        if expected != found {
-            let n = moves.instances.len();
+        let (n_poses, n) = (self.poses.len(), instances.len());
+        if n_poses * n != poses.len() {
+            let (expected, found) = (n_poses * n, poses.len());
             let cause = format!("expected {n_poses} times {n} poses, {expected}, found {found}");
             return Err(InvalidValue::new("moves.poses", cause));
         }
-        Ok(())
+        for (name, poses) in [("poses", self.poses), ("moves.poses", poses)] {
+            let mut numbered = poses.iter().enumerate();
+            numbered.try_for_each(|(i, &pose)| check_pose(|| format!("{name}[{i}]"), pose))?;
+        }
+        let is_known =
+            |wanted: &&Attribute| matches!(wanted, Attribute::Intensity | Attribute::Power);
+        match self.scan.attributes.iter().find(|wanted| !is_known(wanted)) {
+            Some(other) => {
+                let cause = format!("expected intensity or power, found {other}");
+                Err(InvalidValue::new("attributes", cause))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// The batch without any return.
+    fn empty(&self) -> Result<Batch, InvalidValue> {
+        let (n_poses, n_beams) = (self.poses.len(), self.scan.sensor.directions().len());
+        let column = |is_wanted: bool, nothing: f32| {
+            filled(if is_wanted { n_poses } else { 0 }, n_beams, nothing)
+        };
+        let asks_for = |wanted| self.scan.attributes.contains(&wanted);
+        let is_dual = self.scan.effects.returns == Some(ReturnMode::Dual);
+        let seed = |row| Stream::BatchRow { row }.key(self.seed).seed();
+        Ok(Batch {
+            range_m: column(true, f32::INFINITY)?,
+            object: filled(n_poses, n_beams, NO_OBJECT)?,
+            second_range_m: column(is_dual, f32::INFINITY)?,
+            intensity: column(asks_for(Attribute::Intensity), 0.0)?,
+            power: column(asks_for(Attribute::Power), 0.0)?,
+            seeds: (0..n_poses as u32).map(seed).collect(),
+        })
+    }
+}
+
+/// A row on its way into a [`Batch`]. Columns that were not asked for are empty.
+struct Row<'r, 'a> {
+    number: usize,
+    scan: ScanBuilder<'a>,
+    range_m: &'r mut [f32],
+    object: &'r mut [u32],
+    second_range_m: &'r mut [f32],
+    intensity: &'r mut [f32],
+    power: &'r mut [f32],
+}
+
+impl Row<'_, '_> {
+    fn add(&mut self, found: &BeamReturn) {
+        let beam = found.beam as usize;
+        if self.range_m[beam] < f32::INFINITY {
+            if let Some(second_range_m) = self.second_range_m.get_mut(beam) {
+                *second_range_m = found.range_m;
+            }
+            return;
+        }
+        (self.range_m[beam], self.object[beam]) = (found.range_m, found.object);
+        for (column, value) in
+            [(&mut *self.intensity, found.intensity), (&mut *self.power, found.power)]
+        {
+            if let Some(here) = column.get_mut(beam) {
+                *here = value;
+            }
+        }
     }
 }
 
@@ -113,8 +283,8 @@ fn filled<T: Copy>(n_poses: usize, n_beams: usize, value: T) -> Result<Vec<T>, I
 mod tests {
     use super::*;
     use crate::Mesh;
-    use crate::effects::{Effects, Noise};
-    use glam::DVec3;
+    use crate::effects::{EvenMotion, Footprint, Noise};
+    use glam::{DQuat, DVec3};
 
     /// A wall 10 m ahead and a plate before it.
     fn world() -> (Scene, InstanceId) {
@@ -198,6 +368,76 @@ mod tests {
         assert_eq!(seeds.len(), 9 * poses.len());
     }
 
+    /// Whatever a scan models, a batch models it to the bit: each row beside the scan at its pose.
+    #[test]
+    fn a_row_has_the_returns_intensities_and_powers_of_its_scan() {
+        let (scene, moving) = world();
+        let sensor = Sensor::named("vlp16").unwrap();
+        let n = sensor.directions().len();
+        let poses: Vec<Pose> = (0..3).map(|i| Pose::at([0.3 * f64::from(i), 0.2, 0.1])).collect();
+        let of_each: Vec<Pose> = (0..3).map(|i| Pose::at([6.0, 0.1 * f64::from(i), 0.0])).collect();
+        let moves = Moves { instances: &[moving], poses: &of_each };
+        let wide =
+            Footprint { samples: 7, divergence_deg: Some([1.0; 2]), separation_m: Some(0.5) };
+        let motion = EvenMotion { velocity_m_s: [20.0, 0.0, 0.0], yaw_rate_deg_s: 90.0 };
+        let effects = Effects {
+            noise: Some(Noise::along_range(0.02)),
+            footprint: Some(wide),
+            returns: Some(ReturnMode::Dual),
+            motion: Some(Box::new(motion)),
+            ..Effects::default()
+        };
+        let attributes = [Attribute::Intensity, Attribute::Power];
+        let batch = scene.batch(&sensor, &poses).moving(moves).effects(effects.clone());
+        let batch = batch.attributes(attributes).seed(3).run().unwrap();
+        let (mut n_seconds, mut world) = (0, scene.clone());
+        for (row, (&pose, &of_row)) in poses.iter().zip(&of_each).enumerate() {
+            world[moving].pose = of_row;
+            let wanted = attributes.into_iter().chain([Attribute::Range, Attribute::Beam]);
+            let scan = world.scan(&sensor, pose).effects(effects.clone()).attributes(wanted);
+            let points = scan.seed(batch.seeds[row]).run().unwrap().points;
+            let [range_m, intensity, power] =
+                [&points.range_m, &points.intensity, &points.power].map(|column| column.as_ref());
+            let mut expected = vec![(f32::INFINITY, f32::INFINITY, 0.0, 0.0); n];
+            for (i, &beam) in points.beam.as_ref().unwrap().iter().enumerate() {
+                let (range_m, here) = (range_m.unwrap()[i], &mut expected[beam as usize]);
+                if here.0 == f32::INFINITY {
+                    *here = (range_m, here.1, intensity.unwrap()[i], power.unwrap()[i]);
+                } else {
+                    (here.1, n_seconds) = (range_m, n_seconds + 1);
+                }
+            }
+            for (beam, expected) in (row * n..).zip(expected) {
+                let first = (batch.range_m[beam], batch.second_range_m[beam]);
+                assert_eq!((first.0, first.1, batch.intensity[beam], batch.power[beam]), expected);
+            }
+        }
+        assert!(n_seconds > 10, "{n_seconds}");
+    }
+
+    /// Ranges are computed in f64 whatever finds the triangles.
+    #[cfg(feature = "gpu")]
+    #[test]
+    fn an_adapter_casts_the_same_batch_and_keeps_its_trees() {
+        let adapters = crate::gpu::list_adapters().into_iter().next();
+        let adapter = test_support::need!(test_support::adapter(adapters));
+        let caster = Caster::named(&adapter.name).unwrap();
+        let (scene, moving) = world();
+        let sensor = Sensor::named("vlp16").unwrap();
+        // More rays than are cast at once.
+        let n_poses = RAYS_AT_ONCE as u32 / sensor.directions().len() as u32 + 3;
+        let place = |i: u32| Pose::at([0.01 * f64::from(i % 90), 0.0, 0.0]);
+        let poses: Vec<Pose> = (0..n_poses).map(place).collect();
+        for x in [3.0, 4.0] {
+            let of_each: Vec<Pose> = poses.iter().map(|_| Pose::at([x, 0.3, 0.0])).collect();
+            let moves = Moves { instances: &[moving], poses: &of_each };
+            let batch = scene.batch(&sensor, &poses).moving(moves);
+            let by_adapter = batch.clone().with(&caster).run().unwrap();
+            assert!(by_adapter == batch.run().unwrap());
+            assert!(by_adapter.object.contains(&moving.number()));
+        }
+    }
+
     #[test]
     fn moves_that_do_not_fit_are_refused() {
         let (scene, moving) = world();
@@ -213,5 +453,13 @@ mod tests {
             let error = scene.cast(&sensor, &[Pose::IDENTITY; 2], moves).unwrap_err().to_string();
             assert_eq!(error, expected);
         }
+        let askew = Pose { rotation: DQuat::from_xyzw(0.0, 0.0, 0.0, 2.0), ..Pose::IDENTITY };
+        let poses = [Pose::IDENTITY, askew];
+        let batch = scene.batch(&sensor, &poses);
+        let expected = "poses[1]: expected a rotation of length 1, found length 2";
+        assert_eq!(batch.run().unwrap_err().to_string(), expected);
+        let expected = "attributes: expected intensity or power, found ring";
+        let batch = scene.batch(&sensor, &poses[..1]).attributes([Attribute::Ring]);
+        assert_eq!(batch.run().unwrap_err().to_string(), expected);
     }
 }

@@ -11,7 +11,7 @@ mod scene;
 mod scene_file;
 mod sensor;
 
-pub use batch::{Batch, Moves, NO_OBJECT};
+pub use batch::{Batch, BatchBuilder, Moves, NO_OBJECT};
 pub use caster::Caster;
 pub use error::Error;
 pub use mesh::Mesh;

@@ -1,12 +1,14 @@
 //! What is wanted of a scan.
 
 use super::{Caster, Error, Instance, Scan, Scene, Sensor};
+use crate::caster::OpenCaster;
 use crate::config::{InvalidValue, within};
 use crate::effects::{Effects, Intensity};
 use crate::job::Culling;
 use crate::pose::{Pose, Trajectory};
-use crate::scan::{ScanRequest, Scanned, scan_objects};
+use crate::scan::{PlacedTarget, ScanRequest, Scanned, scan_objects};
 use crate::scene::{check_motion, check_object, check_start};
+use crate::sensor::BeamPattern;
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, AttributeSet};
 use formats::streams::{StartTime, Stream};
@@ -16,18 +18,25 @@ use std::sync::Arc;
 #[derive(Clone, Debug)]
 #[must_use = "`run` makes the scan"]
 pub struct ScanBuilder<'a> {
-    scene: &'a Scene,
-    sensor: &'a Sensor,
+    pub(super) scene: &'a Scene,
+    pub(super) sensor: &'a Sensor,
     pose: Pose,
     key: Key<'a>,
     caster: Option<&'a Caster>,
     motion: Option<Arc<Trajectory>>,
     start_s: f64,
     deskew: bool,
-    effects: Effects,
-    attributes: AttributeSet,
+    pub(super) effects: Effects,
+    pub(super) attributes: AttributeSet,
     seed: u64,
     culling: Culling,
+}
+
+/// What a scan needs of its sensor and effects.
+pub(super) struct Prepared {
+    pub effects: Effects,
+    pub caster: Arc<OpenCaster>,
+    pub rays: Arc<BeamPattern>,
 }
 
 /// What the random numbers of a scan belong to, besides its seed.
@@ -123,6 +132,10 @@ impl<'a> ScanBuilder<'a> {
         Self { deskew, ..self }
     }
 
+    pub(super) fn at(self, pose: Pose) -> Self {
+        Self { pose, ..self }
+    }
+
     /// Whether beams that cannot hit are cast; the scan is the same.
     #[doc(hidden)]
     pub fn culling(self, culling: Culling) -> Self {
@@ -135,13 +148,24 @@ impl<'a> ScanBuilder<'a> {
     /// An effect, an instance, a pose or a time is out of its bounds; the sensor's profile lacks a value
     /// that an effect needs; a trajectory does not cover the scan; the adapter failed.
     pub fn run(self) -> Result<Scan, Error> {
+        check_pose(|| "pose".to_owned(), self.pose)?;
+        let Prepared { effects, caster, rays } = self.prepare()?;
+        let (request, placed) = (self.request(&rays), self.placed(|_| None));
+        let Scanned { mut scan, tally, cast_on_cpu, .. } =
+            scan_objects(&caster, &placed, &request)?;
+        let pose = self.motion.as_ref().map_or(self.pose, |motion| motion.at(self.start_s));
+        scan.pose = (pose != Pose::IDENTITY).then(|| pose.matrix());
+        Ok(Scan::new(scan, tally, cast_on_cpu, self.sensor.clone(), effects))
+    }
+
+    /// Checks everything but the pose of the sensor.
+    pub(super) fn prepare(&self) -> Result<Prepared, Error> {
         let mut effects = self.effects.clone();
         if self.attributes.contains(&Attribute::Intensity) {
             effects.intensity.get_or_insert(Intensity);
         }
         effects.validate()?;
         effects.for_sensor(self.sensor.profile())?;
-        check_pose("pose", self.pose)?;
         self.check_instances()?;
         let cpu = Caster::cpu();
         let caster = self.caster.unwrap_or(&cpu).for_effects(&effects)?;
@@ -151,24 +175,28 @@ impl<'a> ScanBuilder<'a> {
             let times_s = [self.start_s, self.start_s + rays.last_s()];
             check_motion("trajectory", self.sensor.profile(), motion, times_s)?;
         }
-        let mut request = ScanRequest::new(self.sensor.profile(), &rays, self.pose);
+        Ok(Prepared { effects, caster, rays })
+    }
+
+    pub(super) fn request<'r>(&'r self, rays: &'r BeamPattern) -> ScanRequest<'r> {
+        let mut request = ScanRequest::new(self.sensor.profile(), rays, self.pose);
         (request.motion, request.start_s) = (self.motion.clone(), self.start_s);
         request.deskew = self.deskew;
         request.attributes.clone_from(&self.attributes);
         request.stream = self.stream(self.key.name);
         request.culling = self.culling;
+        request
+    }
+
+    /// The instances, those that `pose` names by their numbers elsewhere than in the scene.
+    pub(super) fn placed(&self, pose: impl Fn(u32) -> Option<Pose>) -> Vec<PlacedTarget<'a>> {
         let (at, sensor) = (StartTime(self.start_s), self.key.number);
-        let placed = self.scene.placed(|name, number| match (name, number) {
+        self.scene.placed_at(pose, |name, number| match (name, number) {
             (Some(name), _) => Some(self.stream(name)),
             // A scene of one mesh has the random numbers of the scan.
             (None, 0) => None,
             (None, _) => Some(Stream::Instance { number, at, sensor }.key(self.seed)),
-        });
-        let Scanned { mut scan, tally, cast_on_cpu, .. } =
-            scan_objects(&caster, &placed, &request)?;
-        let pose = self.motion.as_ref().map_or(self.pose, |motion| motion.at(self.start_s));
-        scan.pose = (pose != Pose::IDENTITY).then(|| pose.matrix());
-        Ok(Scan::new(scan, tally, cast_on_cpu, self.sensor.clone(), effects))
+        })
     }
 
     /// The key of a name's random numbers. Scans of other times have other noise, other drops and
@@ -181,7 +209,7 @@ impl<'a> ScanBuilder<'a> {
     fn check_instances(&self) -> Result<(), Error> {
         for (i, instance) in self.scene.instances().iter().enumerate() {
             let key = |field: &str| format!("instance[{i}].{field}");
-            check_pose(&key("pose"), instance.pose)?;
+            check_pose(|| key("pose"), instance.pose)?;
             let Instance { scale, reflectivity, retroreflection, .. } = *instance;
             check_object(key, scale.to_array(), reflectivity, retroreflection)?;
             within(&key("glass.returned"), instance.glass.as_ref().map(|g| g.returned), 0.0..=1.0)?;
@@ -198,17 +226,17 @@ impl<'a> ScanBuilder<'a> {
 }
 
 /// That `pose`, which stands at `key`, is a place and a rotation.
-fn check_pose(key: &str, pose: Pose) -> Result<(), InvalidValue> {
+pub(super) fn check_pose(key: impl Fn() -> String, pose: Pose) -> Result<(), InvalidValue> {
     let numbers = pose.position_m.to_array().into_iter().chain(pose.rotation.to_array());
     if let Some(number) = numbers.into_iter().find(|number| !number.is_finite()) {
         let cause = format!("expected finite numbers, found {number}");
-        return Err(InvalidValue::new(key, cause));
+        return Err(InvalidValue::new(key(), cause));
     }
     // Rounding moves the length of a product of rotations by a few ulps.
     if !pose.rotation.is_normalized() {
         let length = pose.rotation.length();
         let cause = format!("expected a rotation of length 1, found length {length}");
-        return Err(InvalidValue::new(key, cause));
+        return Err(InvalidValue::new(key(), cause));
     }
     Ok(())
 }

@@ -179,10 +179,19 @@ impl Scene {
         &self,
         stream: impl Fn(Option<&str>, u32) -> Option<StreamKey>,
     ) -> Vec<PlacedTarget<'_>> {
+        self.placed_at(|_| None, stream)
+    }
+
+    /// As [`placed`](Self::placed), with those instances that `pose` names by their numbers elsewhere.
+    pub(super) fn placed_at(
+        &self,
+        pose: impl Fn(u32) -> Option<Pose>,
+        stream: impl Fn(Option<&str>, u32) -> Option<StreamKey>,
+    ) -> Vec<PlacedTarget<'_>> {
         let numbered = self.instances.iter().zip(0..);
         numbered
             .map(|(instance, number)| {
-                let mut placed = instance.placed();
+                let mut placed = instance.placed_at(pose(number).unwrap_or(instance.pose));
                 placed.stream = stream(instance.name.as_deref(), number);
                 placed
             })
@@ -235,9 +244,9 @@ impl Instance {
         }
     }
 
-    /// As a caster takes it.
-    fn placed(&self) -> PlacedTarget<'_> {
-        let Pose { position_m, rotation } = self.pose;
+    /// As a caster takes it, at `pose`.
+    fn placed_at(&self, pose: Pose) -> PlacedTarget<'_> {
+        let Pose { position_m, rotation } = pose;
         let world_from_mesh =
             DAffine3::from_scale_rotation_translation(self.scale, rotation, position_m);
         let mut placed = PlacedTarget::new(self.mesh.target());

@@ -13,6 +13,9 @@ mod traverse;
 mod validate;
 mod wide;
 
+use glam::Vec3A;
+use std::sync::OnceLock;
+
 pub use bounds::Bounds;
 pub use node::{LeafTriangle, Node, canonical_corners};
 pub(crate) use traverse::step;
@@ -48,47 +51,110 @@ pub enum Builder {
 /// A hierarchy over the triangles of one mesh.
 #[derive(Clone, Debug)]
 pub struct Bvh {
+    /// The tree that the CPU searches.
+    pub wide: WideBvh,
+    builder: Builder,
+    two_wide: OnceLock<TwoWide>,
+}
+
+/// The tree that shaders search.
+#[derive(Clone, Debug)]
+pub struct TwoWide {
     /// Nodes; the root is number 0. Never empty.
     pub nodes: Vec<Node>,
     /// Triangles in leaf order.
     pub triangles: Vec<LeafTriangle>,
-    /// The same tree as the CPU searches it.
-    pub wide: WideBvh,
 }
 
+/// The tree of shaders over more triangles than this is dropped once the CPU's is made of it, and
+/// built again if a GPU casts: it takes some 90 bytes a triangle.
+const KEPT_UP_TO: usize = 1 << 20;
+
+/// As small as its numbers: to sort many of them takes most of the time of a build.
 #[derive(Clone, Copy)]
 struct Primitive {
-    bounds: Bounds,
+    min: [f32; 3],
     triangle: u32,
+    max: [f32; 3],
+    _padding: u32,
+}
+
+impl Primitive {
+    fn new(corners: &[[f32; 3]; 3], triangle: u32) -> Self {
+        let Bounds { min, max } = Bounds::around(corners);
+        Self { min: min.to_array(), triangle, max: max.to_array(), _padding: 0 }
+    }
+
+    #[inline]
+    fn bounds(&self) -> Bounds {
+        Bounds { min: Vec3A::from_array(self.min), max: Vec3A::from_array(self.max) }
+    }
 }
 
 impl Bvh {
-    /// Builds a hierarchy over triangles with these `corners`, in the unit frame, and these
-    /// `indices`, which casters answer with. Both `[n_triangles]`.
+    /// Builds a hierarchy over triangles with these `indices`, which casters answer with. `corners`
+    /// gives those of the nth, in the unit frame.
     #[must_use]
-    pub fn build(builder: Builder, corners: &[[[f32; 3]; 3]], indices: &[u32]) -> Self {
-        debug_assert_eq!(corners.len(), indices.len());
-        let mut primitives: Vec<Primitive> = corners
-            .iter()
-            .zip(0..)
-            .map(|(corners, triangle)| Primitive { bounds: Bounds::around(corners), triangle })
-            .collect();
-        // Builders also sort the primitives into leaf order.
-        let nodes = match builder {
-            Builder::Sah => sah::build(&mut primitives),
-            Builder::Morton => morton::build(&mut primitives),
+    pub fn build(
+        builder: Builder,
+        indices: &[u32],
+        corners: impl Fn(usize) -> [[f32; 3]; 3],
+    ) -> Self {
+        let (nodes, order) = build_nodes(builder, indices.len(), &corners);
+        let triangle = |at: usize| {
+            let nth = order[at] as usize;
+            LeafTriangle::new(corners(nth), indices[nth])
         };
-        let triangles: Vec<LeafTriangle> = primitives
-            .iter()
-            .map(|p| LeafTriangle::new(corners[p.triangle as usize], indices[p.triangle as usize]))
-            .collect();
-        let wide = WideBvh::collapsed(&nodes, &triangles);
-        Self { nodes, triangles, wide }
+        let wide = WideBvh::collapsed(&nodes, &triangle);
+        let two_wide = OnceLock::new();
+        if indices.len() <= KEPT_UP_TO {
+            let triangles = (0..indices.len()).map(triangle).collect();
+            two_wide.get_or_init(|| TwoWide { nodes, triangles });
+        }
+        Self { wide, builder, two_wide }
     }
 
-    /// Bytes of both trees.
+    /// The tree that shaders search.
+    #[must_use]
+    pub fn two_wide(&self) -> &TwoWide {
+        // Outside of `get_or_init`: the pool that builds may run a task that wants the same tree.
+        self.two_wide.get().unwrap_or_else(|| {
+            let mut all: Vec<(u32, [[f32; 3]; 3])> = self.wide.triangles().collect();
+            // In the order of the first build, which gives the same tree.
+            all.sort_unstable_by_key(|(index, _)| *index);
+            let (nodes, order) = build_nodes(self.builder, all.len(), &|nth| all[nth].1);
+            let triangle = |&nth: &u32| {
+                let (index, corners) = all[nth as usize];
+                LeafTriangle::new(corners, index)
+            };
+            let triangles = order.iter().map(triangle).collect();
+            self.two_wide.get_or_init(|| TwoWide { nodes, triangles })
+        })
+    }
+
+    /// Bytes of the trees that there are.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.nodes[..]) + size_of_val(&self.triangles[..]) + self.wide.bytes()
+        let of_shaders = self
+            .two_wide
+            .get()
+            .map_or(0, |tree| size_of_val(&tree.nodes[..]) + size_of_val(&tree.triangles[..]));
+        of_shaders + self.wide.bytes()
     }
+}
+
+/// The two-wide nodes over `n` triangles, and the number of the triangle at each place of the leaves.
+fn build_nodes(
+    builder: Builder,
+    n: usize,
+    corners: &impl Fn(usize) -> [[f32; 3]; 3],
+) -> (Vec<Node>, Vec<u32>) {
+    let primitive = |nth: usize| Primitive::new(&corners(nth), nth as u32);
+    let mut primitives: Vec<Primitive> = (0..n).map(primitive).collect();
+    // Builders also sort the primitives into leaf order.
+    let nodes = match builder {
+        Builder::Sah => sah::build(&mut primitives),
+        Builder::Morton => morton::build(&mut primitives),
+    };
+    (nodes, primitives.iter().map(|p| p.triangle).collect())
 }

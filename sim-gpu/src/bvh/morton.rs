@@ -14,7 +14,7 @@ pub(super) fn build(primitives: &mut [Primitive]) -> Vec<Node> {
     let mut keys: Vec<(u32, u32)> = primitives
         .iter()
         .zip(0..)
-        .map(|(p, i)| (code(p.bounds.doubled_centre(), centres), i))
+        .map(|(p, i)| (code(p.bounds().doubled_centre(), centres), i))
         .collect();
     // The index breaks ties, so that the tree is the same on every run.
     keys.sort_unstable();
@@ -37,7 +37,7 @@ fn subtree(
     nodes: &mut Vec<Node>,
 ) -> Child {
     if primitives.len() <= MAX_LEAF {
-        let bounds = primitives.iter().fold(Bounds::EMPTY, |b, p| b.union(p.bounds));
+        let bounds = primitives.iter().fold(Bounds::EMPTY, |b, p| b.union(p.bounds()));
         return Child { bounds, first, count: primitives.len() as u32 };
     }
     let middle = split(codes, depth);

@@ -95,7 +95,7 @@ fn in_parallel(
 /// The bounds of the primitives, and of their doubled centres.
 pub(super) fn extent(primitives: &[Primitive]) -> (Bounds, Bounds) {
     primitives.iter().fold((Bounds::EMPTY, Bounds::EMPTY), |(bounds, centres), p| {
-        (bounds.union(p.bounds), centres.with(p.bounds.doubled_centre()))
+        (bounds.union(p.bounds()), centres.with(p.bounds().doubled_centre()))
     })
 }
 
@@ -112,7 +112,7 @@ struct Split {
 impl Split {
     /// Repeats the arithmetic of [`best_split`], so that no primitive falls into another bin.
     fn is_left(&self, primitive: &Primitive) -> bool {
-        let centre = primitive.bounds.doubled_centre()[self.axis];
+        let centre = primitive.bounds().doubled_centre()[self.axis];
         let bin = ((centre - self.origin) * self.bins_per_unit) as usize;
         bin.min(self.last_bin) <= self.last_left_bin
     }
@@ -135,7 +135,7 @@ fn split_between_bins(primitives: &mut [Primitive], centres: Bounds) -> usize {
 fn split_exactly(primitives: &mut [Primitive]) -> (usize, f32) {
     let sort = |primitives: &mut [Primitive], axis: usize| {
         primitives.sort_unstable_by(|p, q| {
-            let centre = |p: &Primitive| p.bounds.doubled_centre()[axis];
+            let centre = |p: &Primitive| p.bounds().doubled_centre()[axis];
             centre(p).total_cmp(&centre(q)).then(p.triangle.cmp(&q.triangle))
         });
     };
@@ -144,7 +144,7 @@ fn split_exactly(primitives: &mut [Primitive]) -> (usize, f32) {
         sort(primitives, axis);
         // A bin for each primitive: every boundary between two of them is a split.
         let mut bins = [(Bounds::EMPTY, 1); EXACT];
-        bins.iter_mut().zip(&*primitives).for_each(|(bin, p)| bin.0 = p.bounds);
+        bins.iter_mut().zip(&*primitives).for_each(|(bin, p)| bin.0 = p.bounds());
         let (last_left, cost) = cheapest_boundary(&bins[..primitives.len()]);
         if cost < best.1 {
             (best_axis, best) = (axis, (last_left + 1, cost));
@@ -167,11 +167,11 @@ fn best_split<const BINS: usize>(primitives: &[Primitive], centres: Bounds) -> O
     }));
     let mut bins = [[(Bounds::EMPTY, 0u32); BINS]; 3];
     for p in primitives {
-        let at = (p.bounds.doubled_centre() - centres.min) * bins_per_unit;
+        let at = (p.bounds().doubled_centre() - centres.min) * bins_per_unit;
         for (axis, bins) in bins.iter_mut().enumerate() {
             // The highest centre lies at the end of the last bin.
             let (bounds, count) = &mut bins[(at[axis] as usize).min(BINS - 1)];
-            *bounds = bounds.union(p.bounds);
+            *bounds = bounds.union(p.bounds());
             *count += 1;
         }
     }
@@ -231,7 +231,7 @@ fn halve(primitives: &mut [Primitive], centres: Bounds) -> usize {
     let axis = (0..3).max_by(|&i, &j| size[i].total_cmp(&size[j])).unwrap_or(0);
     let middle = primitives.len() / 2;
     primitives.select_nth_unstable_by(middle, |p, q| {
-        let centre = |p: &Primitive| p.bounds.doubled_centre()[axis];
+        let centre = |p: &Primitive| p.bounds().doubled_centre()[axis];
         centre(p).total_cmp(&centre(q)).then(p.triangle.cmp(&q.triangle))
     });
     middle
@@ -256,7 +256,7 @@ mod tests {
             let corners = soup(n);
             let indices: Vec<u32> = (0..n as u32).collect();
             for builder in [Builder::Sah, Builder::Morton] {
-                assert_well_formed(&Bvh::build(builder, &corners, &indices));
+                assert_well_formed(&Bvh::build(builder, &indices, |nth| corners[nth]));
             }
         }
     }
@@ -265,6 +265,6 @@ mod tests {
     fn triangles_at_one_place_are_halved() {
         let corners = vec![[[0.0; 3], [0.5, 0.0, 0.0], [0.0, 0.5, 0.0]]; 1000];
         let indices: Vec<u32> = (0..1000).collect();
-        assert_well_formed(&Bvh::build(Builder::Sah, &corners, &indices));
+        assert_well_formed(&Bvh::build(Builder::Sah, &indices, |nth| corners[nth]));
     }
 }

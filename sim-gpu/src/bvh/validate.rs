@@ -1,16 +1,16 @@
 //! Checks of the invariants of trees.
 
-use super::{Bounds, Bvh, LEAF, MAX_DEPTH, MAX_LEAF, Node, WIDTH, WideChild};
+use super::{Bounds, Bvh, LEAF, MAX_DEPTH, MAX_LEAF, Node, TwoWide, WIDTH, WideChild};
 use glam::Vec3A;
 
 /// Panics unless in both trees every triangle is reached exactly once, every box contains its
 /// children, and leaves and paths are within the limits. For tests.
 pub fn assert_well_formed(bvh: &Bvh) {
-    assert_narrow_well_formed(bvh);
+    assert_narrow_well_formed(bvh.two_wide());
     assert_wide_well_formed(bvh);
 }
 
-fn assert_narrow_well_formed(bvh: &Bvh) {
+fn assert_narrow_well_formed(bvh: &TwoWide) {
     assert!(!bvh.nodes.is_empty(), "a tree has a root, even over nothing");
     let mut seen = vec![0u32; bvh.triangles.len()];
     let mut visited = vec![false; bvh.nodes.len()];
@@ -50,7 +50,8 @@ fn children(node: &Node) -> [(Bounds, usize, usize); 2] {
     ]
 }
 
-fn assert_wide_well_formed(Bvh { wide, triangles, .. }: &Bvh) {
+fn assert_wide_well_formed(bvh: &Bvh) {
+    let (wide, triangles) = (&bvh.wide, &bvh.two_wide().triangles);
     assert!(!wide.nodes.is_empty(), "a tree has a root, even over nothing");
     let mut found: Vec<(u32, [[f32; 3]; 3])> = Vec::new();
     let (mut nodes_seen, mut leaves_seen) = (vec![0; wide.nodes.len()], vec![0; wide.leaves.len()]);

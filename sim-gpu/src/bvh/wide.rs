@@ -7,6 +7,7 @@
 
 use super::{Bounds, LeafTriangle, MAX_LEAF, Node};
 use glam::Vec3A;
+use std::iter::repeat;
 
 /// How many children a node has.
 pub const WIDTH: usize = 8;
@@ -95,13 +96,14 @@ impl Leaf4 {
         Self { corners: [[[0.0; LEAF]; 3]; 3], indices: [u32::MAX; LEAF], len: 0 };
 
     /// A leaf of one to four `triangles`.
-    fn new(triangles: &[LeafTriangle]) -> Self {
-        let first = &triangles[0];
+    fn new(mut triangles: impl ExactSizeIterator<Item = LeafTriangle>) -> Self {
+        let len = triangles.len() as u32;
+        let first = triangles.next().expect("invariant: a leaf has a triangle");
         // A point of the first triangle stays inside the box of the leaf.
-        let without_area = LeafTriangle { b: first.a, c: first.a, ..*first };
-        let mut leaf = Self { len: triangles.len() as u32, ..Self::NOTHING };
-        for i in 0..LEAF {
-            let triangle = triangles.get(i).unwrap_or(&without_area);
+        let without_area = LeafTriangle { b: first.a, c: first.a, ..first };
+        let mut leaf = Self { len, ..Self::NOTHING };
+        let places = std::iter::once(first).chain(triangles).chain(repeat(without_area));
+        for (i, triangle) in places.take(LEAF).enumerate() {
             leaf.indices[i] = triangle.index;
             for (corner, from) in leaf.corners.iter_mut().zip([triangle.a, triangle.b, triangle.c])
             {
@@ -121,14 +123,23 @@ impl Leaf4 {
 }
 
 impl WideBvh {
-    /// Collapses the two-wide tree of `nodes`: the wide tree has some of its boxes.
+    /// Collapses the two-wide tree of `nodes`, whose leaves have these `triangles`: the wide tree has
+    /// some of its boxes.
     #[must_use]
-    pub(super) fn collapsed(nodes: &[Node], triangles: &[LeafTriangle]) -> Self {
+    pub(super) fn collapsed(nodes: &[Node], triangles: &impl Fn(usize) -> LeafTriangle) -> Self {
         let to = Self { nodes: vec![WideNode::EMPTY], leaves: vec![Leaf4::NOTHING] };
         let mut collapse = Collapse { nodes, triangles, costs: Vec::new(), to };
         collapse.count_costs();
         collapse.fill(0, 0);
         collapse.to
+    }
+
+    /// The index and the corners, in canonical order, of each triangle.
+    pub fn triangles(&self) -> impl Iterator<Item = (u32, [[f32; 3]; 3])> + '_ {
+        self.leaves.iter().flat_map(|leaf| {
+            let corners = |i: usize| leaf.corners.map(|corner| corner.map(|axis| axis[i]));
+            leaf.indices().iter().enumerate().map(move |(i, &index)| (index, corners(i)))
+        })
     }
 
     /// Bytes of nodes and leaves together.
@@ -141,9 +152,9 @@ impl WideBvh {
 /// Collapses a tree of two-wide nodes so that its search costs least by the surface area
 /// heuristic: Ylitie, Karras, Laine, "Efficient incoherent ray traversal on GPUs through
 /// compressed wide BVHs", HPG 2017, section 3.1.
-struct Collapse<'a> {
+struct Collapse<'a, Triangles> {
     nodes: &'a [Node],
-    triangles: &'a [LeafTriangle],
+    triangles: &'a Triangles,
     /// By two-wide node.
     costs: Vec<Cost>,
     to: WideBvh,
@@ -168,7 +179,7 @@ struct Subtree {
     count: u32,
 }
 
-impl Collapse<'_> {
+impl<Triangles: Fn(usize) -> LeafTriangle> Collapse<'_, Triangles> {
     fn children(&self, at: usize) -> [Subtree; 2] {
         let node = &self.nodes[at];
         let child = |min, max, child: u32, count| {
@@ -246,7 +257,7 @@ impl Collapse<'_> {
                 }
                 None => {
                     let range = subtree.first as usize..(subtree.first + subtree.count) as usize;
-                    self.to.leaves.push(Leaf4::new(&self.triangles[range]));
+                    self.to.leaves.push(Leaf4::new(range.map(self.triangles)));
                     WideChild((self.to.leaves.len() - 1) as u32 | WideChild::IS_LEAF)
                 }
             };

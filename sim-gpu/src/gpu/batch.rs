@@ -2,7 +2,7 @@
 
 use super::compose::reads_random_bits;
 use crate::aim::{Aim, MOST_DIRECTIONS};
-use crate::bvh::{Bvh, LeafTriangle, Node};
+use crate::bvh::{Bvh, LeafTriangle, Node, TwoWide};
 use crate::effects::Effects;
 use crate::fixed_frame::FixedFrame;
 use crate::job::CastJob;
@@ -77,18 +77,19 @@ impl BatchLimits {
     /// Whether `target` alone fits.
     #[must_use]
     pub fn holds(&self, target: &Target) -> bool {
-        size_of_val(&target.bvh.nodes[..]) <= self.binding_bytes
-            && size_of_val(&target.bvh.triangles[..]) <= self.binding_bytes
+        let TwoWide { nodes, triangles } = target.bvh.two_wide();
+        size_of_val(&nodes[..]) <= self.binding_bytes
+            && size_of_val(&triangles[..]) <= self.binding_bytes
     }
 }
 
 /// The buffers of one dispatch, on their way to the adapter.
 #[derive(Default)]
 pub struct Batch {
-    /// The trees of all targets, one after another.
-    pub nodes: Vec<Node>,
-    /// Their triangles.
-    pub triangles: Vec<LeafTriangle>,
+    /// The trees of all targets, which follow each other in the buffers.
+    pub trees: Vec<Arc<Bvh>>,
+    n_nodes: usize,
+    n_triangles: usize,
     /// The rays of all jobs, one job after another: eight words for each ray that is sent, and the
     /// beam of each ray that the shader makes.
     pub rays: Vec<u32>,
@@ -116,8 +117,8 @@ impl Batch {
         }
         let target = &job.target;
         self.bases.contains_key(&Arc::as_ptr(&target.bvh)) || {
-            let nodes = self.nodes.len() + target.bvh.nodes.len();
-            let triangles = self.triangles.len() + target.bvh.triangles.len();
+            let nodes = self.n_nodes + target.bvh.two_wide().nodes.len();
+            let triangles = self.n_triangles + target.bvh.two_wide().triangles.len();
             nodes * size_of::<Node>() <= limits.binding_bytes
                 && triangles * size_of::<LeafTriangle>() <= limits.binding_bytes
         }
@@ -167,14 +168,28 @@ impl Batch {
         first
     }
 
-    /// The root of the tree of `target`, which is copied only once.
+    /// The root of the tree of `target`, which is there only once.
     fn root_of(&mut self, target: &Target) -> u32 {
-        let (nodes, triangles) = (&mut self.nodes, &mut self.triangles);
         *self.bases.entry(Arc::as_ptr(&target.bvh)).or_insert_with(|| {
-            let (node_base, triangle_base) = (nodes.len() as u32, triangles.len() as u32);
-            nodes.extend(target.bvh.nodes.iter().map(|n| n.moved(node_base, triangle_base)));
-            triangles.extend_from_slice(&target.bvh.triangles);
-            node_base
+            let root = self.n_nodes as u32;
+            let TwoWide { nodes, triangles } = target.bvh.two_wide();
+            self.n_nodes += nodes.len();
+            self.n_triangles += triangles.len();
+            self.trees.push(Arc::clone(&target.bvh));
+            root
         })
+    }
+
+    /// The nodes and the triangles of all trees, one after another.
+    #[must_use]
+    pub fn joined_trees(&self) -> (Vec<Node>, Vec<LeafTriangle>) {
+        let mut nodes = Vec::with_capacity(self.n_nodes);
+        let mut triangles: Vec<LeafTriangle> = Vec::with_capacity(self.n_triangles);
+        for tree in self.trees.iter().map(|tree| tree.two_wide()) {
+            let (node_base, triangle_base) = (nodes.len() as u32, triangles.len() as u32);
+            nodes.extend(tree.nodes.iter().map(|n| n.moved(node_base, triangle_base)));
+            triangles.extend_from_slice(&tree.triangles);
+        }
+        (nodes, triangles)
     }
 }

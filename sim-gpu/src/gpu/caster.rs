@@ -137,7 +137,7 @@ impl GpuCaster {
     fn too_large(&self, job: &CastJob) -> CastError {
         CastError::TooLarge {
             name: self.core.summary.name.clone(),
-            nodes: job.target.bvh.nodes.len(),
+            nodes: job.target.bvh.two_wide().nodes.len(),
             binding_bytes: self.core.limits.binding_bytes,
         }
     }

@@ -5,9 +5,11 @@ use super::batch::Batch;
 use super::clock::Clock;
 use super::compose::{WORKGROUP_SIZE, reads_random_bits};
 use super::pipeline::Pipeline;
+use crate::bvh::Bvh;
 use crate::fixed_frame::fixed_direction;
 use crate::sensor::Directions;
 use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Weak};
 
 const INPUT: wgpu::BufferUsages = wgpu::BufferUsages::STORAGE.union(wgpu::BufferUsages::COPY_DST);
 const OUTPUT: wgpu::BufferUsages = wgpu::BufferUsages::STORAGE.union(wgpu::BufferUsages::COPY_SRC);
@@ -72,6 +74,8 @@ pub(super) struct Slot {
     streams: Growing,
     codes_readback: Growing,
     outputs_readback: Growing,
+    /// The content of the buffers of nodes and triangles, so that trees that are cast again stay.
+    trees: Vec<Weak<Bvh>>,
     /// The content of the buffer of directions.
     patterns: Vec<Directions>,
     bind_groups: Option<BindGroups>,
@@ -110,6 +114,7 @@ impl Slot {
             streams: Growing::new("streams", INPUT),
             codes_readback: Growing::new("codes, read back", READBACK),
             outputs_readback: Growing::new("effect outputs, read back", READBACK),
+            trees: Vec::new(),
             patterns: Vec::new(),
             bind_groups: None,
             clock: if timed { Clock::new(pipeline) } else { None },
@@ -153,8 +158,7 @@ impl Slot {
         let n_rays = batch.n_rays;
         self.answer.codes = (n_rays * size_of::<u32>()) as u64;
         self.answer.outputs = (n_rays * effects.outputs_per_ray() * size_of::<f32>()) as u64;
-        let mut grown = self.nodes.upload(pipeline, bytemuck::cast_slice(&batch.nodes));
-        grown |= self.triangles.upload(pipeline, bytemuck::cast_slice(&batch.triangles));
+        let mut grown = self.upload_trees(pipeline, batch);
         grown |= self.rays.upload(pipeline, bytemuck::cast_slice(&batch.rays));
         grown |= self.views.upload(pipeline, bytemuck::cast_slice(&batch.views));
         grown |= self.upload_directions(pipeline, &batch.directions);
@@ -166,6 +170,20 @@ impl Slot {
             grown |= self.streams.upload(pipeline, bytemuck::cast_slice(&batch.streams));
         }
         grown
+    }
+
+    /// Uploads the trees of `batch`, unless an earlier batch did.
+    fn upload_trees(&mut self, pipeline: &Pipeline, batch: &Batch) -> bool {
+        // The memory of a tree is not used again while a slot has a weak reference to it.
+        let is_here = |(here, tree): (&Weak<Bvh>, _)| here.as_ptr() == Arc::as_ptr(tree);
+        if self.trees.len() == batch.trees.len() && self.trees.iter().zip(&batch.trees).all(is_here)
+        {
+            return false;
+        }
+        self.trees = batch.trees.iter().map(Arc::downgrade).collect();
+        let (nodes, triangles) = batch.joined_trees();
+        let grown = self.nodes.upload(pipeline, bytemuck::cast_slice(&nodes));
+        self.triangles.upload(pipeline, bytemuck::cast_slice(&triangles)) | grown
     }
 
     /// Uploads the directions of `patterns`, unless an earlier batch did.

@@ -29,22 +29,39 @@ pub fn assemble(
 ) -> Result<(Scan, Tally), InvalidValue> {
     let receiver = Receiver::new(request, cast_effects, objects)?;
     let nearest = nearest_per_ray(objects, request.pattern.len());
-    let (mut returns, mut tally) = measure(&receiver, &nearest);
-    post_process(request, &mut returns);
-    tally.points = returns.len() as u64;
+    let mut points = Vec::with_capacity(nearest.len());
+    let mut tally = measure(&receiver, &nearest, |r| points.push(Point::of(&receiver, r)));
+    post_process(request, &mut points);
+    tally.points = points.len() as u64;
     if receiver.air.is_some() {
-        let is_of_air = |r: &&Return| matches!(r.source, Source::Air { .. });
-        tally.scattered = returns.iter().filter(is_of_air).count() as u64;
+        let is_of_air = |p: &&Point| matches!(p.r.source, Source::Air { .. });
+        tally.scattered = points.iter().filter(is_of_air).count() as u64;
     }
     let start = request.pose_at_start();
     let origin = origin_for(start.position_m);
-    let position = |r: &Return| f32x3(position(&receiver, &start, r, origin));
+    let position = |p: &Point| f32x3(position(&receiver, &start, p, origin));
     let scan = Scan {
         origin: origin.to_array(),
-        positions: returns.iter().map(position).collect(),
+        positions: points.iter().map(position).collect(),
         ..Scan::default()
     };
-    Ok((with_attributes(scan, &receiver, &returns), tally))
+    Ok((with_attributes(scan, &receiver, &points), tally))
+}
+
+/// A return on its way into a scan.
+#[derive(Clone, Copy)]
+pub(super) struct Point {
+    pub r: Return,
+    /// The measured point relative to the sensor, in world axes.
+    from_sensor: DVec3,
+}
+
+impl Point {
+    pub fn of(receiver: &Receiver, r: Return) -> Self {
+        let from_start = from_start(receiver, &r);
+        let start = receiver.start(receiver.ray_of(r.source));
+        Self { r, from_sensor: start.map_or(from_start, |start| from_start + start) }
+    }
 }
 
 /// The origin of positions: zero near the world's, else whole metres near the sensor.
@@ -54,16 +71,16 @@ fn origin_for(position_m: DVec3) -> DVec3 {
 
 /// Where a point is stored, relative to `origin`, metres. The sensor was at `start` when the scan
 /// began.
-fn position(receiver: &Receiver, start: &Pose, r: &Return, origin: DVec3) -> DVec3 {
+fn position(receiver: &Receiver, start: &Pose, point: &Point, origin: DVec3) -> DVec3 {
     let request = receiver.request;
     if request.motion.is_none() {
-        return r.from_sensor + (start.position_m - origin);
+        return point.from_sensor + (start.position_m - origin);
     }
-    let pose = request.pose_at(receiver.ray_of(r.source));
+    let pose = request.pose_at(receiver.ray_of(point.r.source));
     if request.deskew {
-        return r.from_sensor + (pose.position_m - origin);
+        return point.from_sensor + (pose.position_m - origin);
     }
-    let in_sensor = pose.rotation.inverse() * r.from_sensor;
+    let in_sensor = pose.rotation.inverse() * point.from_sensor;
     start.rotation * in_sensor + (start.position_m - origin)
 }
 
@@ -73,7 +90,7 @@ fn f32x3(v: DVec3) -> [f32; 3] {
 
 /// The nearest hit of each of the `n_rays` rays that hit anything, by ray. The first of several
 /// objects at the same range wins.
-fn nearest_per_ray(objects: &[ObjectHits], n_rays: usize) -> Vec<HitId> {
+pub(super) fn nearest_per_ray(objects: &[ObjectHits], n_rays: usize) -> Vec<HitId> {
     if let [alone] = objects {
         return (0..alone.hits.hits.len() as u32).map(|hit| HitId { object: 0, hit }).collect();
     }
@@ -91,88 +108,76 @@ fn nearest_per_ray(objects: &[ObjectHits], n_rays: usize) -> Vec<HitId> {
 }
 
 /// Applies the rings and the sampling of points that a sensor's profile may ask for.
-fn post_process(request: &ScanRequest, returns: &mut Vec<Return>) {
+pub(super) fn post_process(request: &ScanRequest, points: &mut Vec<Point>) {
     let SensorProfile { rings, sample, .. } = request.sensor;
     if let (Some(sample), Some(_)) = (sample, rings) {
-        let drawn = sample.draw_before_rings(returns.len() as u32, request.stream);
-        *returns = drawn.iter().map(|&i| returns[i as usize]).collect();
+        let drawn = sample.draw_before_rings(points.len() as u32, request.stream);
+        *points = drawn.iter().map(|&i| points[i as usize]).collect();
     }
     if let Some(rings) = rings {
-        let polar = |r: &Return| polar_angle_rad(r.from_sensor);
-        let first_rad = returns.iter().map(polar).fold(f64::INFINITY, f64::min);
-        returns.retain_mut(|r| {
-            let range_m = r.from_sensor.length();
-            let snapped = rings.snap_to_ring(r.from_sensor / range_m, first_rad);
-            r.from_sensor = snapped.unwrap_or_default() * range_m;
+        let polar = |p: &Point| polar_angle_rad(p.from_sensor);
+        let first_rad = points.iter().map(polar).fold(f64::INFINITY, f64::min);
+        points.retain_mut(|p| {
+            let range_m = p.from_sensor.length();
+            let snapped = rings.snap_to_ring(p.from_sensor / range_m, first_rad);
+            p.from_sensor = snapped.unwrap_or_default() * range_m;
             snapped.is_some()
         });
     }
     if let Some(sample) = sample {
         let [low, high] = request.stream.0;
-        let drawn = sample.draw(returns.len() as u32, StreamKey([!low, high]));
-        *returns = drawn.iter().map(|&i| returns[i as usize]).collect();
+        let drawn = sample.draw(points.len() as u32, StreamKey([!low, high]));
+        *points = drawn.iter().map(|&i| points[i as usize]).collect();
     }
 }
 
-fn with_attributes(mut scan: Scan, receiver: &Receiver, returns: &[Return]) -> Scan {
-    let surface = |r: &Return| match r.source {
-        Source::Surface(id) => Some(id),
-        Source::Air { .. } => None,
-    };
+fn with_attributes(mut scan: Scan, receiver: &Receiver, points: &[Point]) -> Scan {
     let (request, pattern) = (receiver.request, receiver.pattern());
-    let ray = |r: &Return| receiver.ray_of(r.source);
-    let from_start =
-        |r: &Return| receiver.start(ray(r)).map_or(r.from_sensor, |start| r.from_sensor - start);
+    let ray = |p: &Point| receiver.ray_of(p.r.source);
     for attribute in &request.attributes {
         match attribute {
             Attribute::Range => {
-                scan.range_m = column(returns, |r| from_start(r).length() as f32);
+                scan.range_m = column(points, |p| range_m(receiver, &p.r));
             }
-            Attribute::Beam => scan.beam = column(returns, |r| pattern.beam_of(ray(r))),
-            Attribute::Ring => scan.ring = column(returns, |r| pattern.ring[ray(r) as usize]),
+            Attribute::Beam => scan.beam = column(points, |p| pattern.beam_of(ray(p))),
+            Attribute::Ring => scan.ring = column(points, |p| pattern.ring[ray(p) as usize]),
             Attribute::Time => {
-                scan.time_s = column(returns, |r| pattern.time_s[ray(r) as usize] as f32);
+                scan.time_s = column(points, |p| pattern.time_s[ray(p) as usize] as f32);
             }
             Attribute::Triangle => {
                 let triangle = |id| receiver.hit(id).triangle;
-                scan.triangle = column(returns, |r| surface(r).map_or(NONE, triangle));
+                scan.triangle = column(points, |p| surface(&p.r).map_or(NONE, triangle));
             }
             Attribute::Object => {
-                let object = |id| receiver.object(id).object;
-                scan.object = column(returns, |r| surface(r).map_or(NONE, object));
-            }
-            // In clear air the intensity is that of the effect, which casters compute.
-            Attribute::Intensity if receiver.air.is_some() => {
-                scan.intensity = column(returns, |r| r.brightness);
+                scan.object = column(points, |p| object(receiver, &p.r));
             }
             Attribute::Intensity => {
-                let intensity = |id| intensity(receiver, id);
-                scan.intensity = column(returns, |r| surface(r).map_or(0.0, intensity));
+                scan.intensity = column(points, |p| intensity(receiver, &p.r));
             }
-            Attribute::Power => scan.power = column(returns, |r| r.power),
-            Attribute::Reflectivity => scan.reflectivity = column(returns, |r| r.reflectivity),
-            Attribute::Return => scan.return_number = column(returns, |r| r.number),
+            Attribute::Power => scan.power = column(points, |p| p.r.power),
+            Attribute::Reflectivity => scan.reflectivity = column(points, |p| p.r.reflectivity),
+            Attribute::Return => scan.return_number = column(points, |p| p.r.number),
             Attribute::Sensor => {
-                let at = |r: &Return| request.pose_at(ray(r)).position_m;
+                let at = |p: &Point| request.pose_at(ray(p)).position_m;
                 let origin = DVec3::from_array(scan.origin);
-                scan.sensor_m = column(returns, |r| f32x3(at(r) - origin));
+                scan.sensor_m = column(points, |p| f32x3(at(p) - origin));
             }
             Attribute::Attitude => {
-                let at = |r: &Return| request.pose_at(ray(r)).rotation;
+                let at = |p: &Point| request.pose_at(ray(p)).rotation;
                 // The quaternion of the two that turns by at most half a turn.
                 let shorter = |q: DQuat| if q.w < 0.0 { -q } else { q };
-                scan.attitude_rad = column(returns, |r| f32x3(shorter(at(r)).to_scaled_axis()));
+                scan.attitude_rad = column(points, |p| f32x3(shorter(at(p)).to_scaled_axis()));
             }
             Attribute::Medium => {
-                scan.medium = column(returns, |r| match r.source {
+                scan.medium = column(points, |p| match p.r.source {
                     Source::Surface { .. } => Medium::Surface as u8,
                     Source::Air { medium, .. } => medium as u8,
                 });
             }
             Attribute::Normal => {
-                scan.normal = column(returns, |r| {
-                    let normal = |id| normal(receiver, id, from_start(r));
-                    surface(r).map_or([0.0; 3], normal)
+                scan.normal = column(points, |p| {
+                    let normal = |id| normal(receiver, id, from_start(receiver, &p.r));
+                    surface(&p.r).map_or([0.0; 3], normal)
                 });
             }
         }
@@ -183,12 +188,42 @@ fn with_attributes(mut scan: Scan, receiver: &Receiver, returns: &[Return]) -> S
 /// The triangle and the object of points that are not of a surface.
 const NONE: u32 = u32::MAX;
 
-fn column<T>(returns: &[Return], value: impl Fn(&Return) -> T) -> Option<Vec<T>> {
-    Some(returns.iter().map(value).collect())
+fn surface(r: &Return) -> Option<HitId> {
+    match r.source {
+        Source::Surface(id) => Some(id),
+        Source::Air { .. } => None,
+    }
+}
+
+/// The measured point relative to the start of its beam, in world axes.
+fn from_start(receiver: &Receiver, r: &Return) -> DVec3 {
+    receiver.beam_direction(receiver.ray_of(r.source)) * r.range_m + r.aside_m
+}
+
+/// As [`Scan::range_m`].
+pub(super) fn range_m(receiver: &Receiver, r: &Return) -> f32 {
+    match r.aside_m == DVec3::ZERO {
+        true => r.range_m as f32,
+        false => from_start(receiver, r).length() as f32,
+    }
+}
+
+/// As [`Scan::object`].
+pub(super) fn object(receiver: &Receiver, r: &Return) -> u32 {
+    surface(r).map_or(NONE, |id| receiver.object(id).object)
+}
+
+fn column<T>(points: &[Point], value: impl Fn(&Point) -> T) -> Option<Vec<T>> {
+    Some(points.iter().map(value).collect())
 }
 
 /// The intensity of a hit as an effect, times the reflectivity of its material.
-fn intensity(receiver: &Receiver, id: HitId) -> f32 {
+pub(super) fn intensity(receiver: &Receiver, r: &Return) -> f32 {
+    // In clear air the intensity is that of the effect, which casters compute.
+    if receiver.air.is_some() {
+        return r.brightness;
+    }
+    let Some(id) = surface(r) else { return 0.0 };
     let (object, pattern) = (receiver.object(id), receiver.pattern());
     let HitEffects { intensity, .. } =
         HitEffects::of_hit(receiver.cast_effects, pattern, object, id);

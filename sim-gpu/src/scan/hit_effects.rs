@@ -18,6 +18,7 @@ pub(super) struct HitEffects {
 
 impl HitEffects {
     /// The outputs for a hit of `object`: as its caster computed them, or else computed here.
+    #[inline]
     pub fn of_hit(
         cast_effects: &Effects,
         pattern: &BeamPattern,
@@ -40,6 +41,7 @@ impl HitEffects {
     }
 
     /// The outputs that do not depend on the surface, for a ray.
+    #[inline]
     pub fn of_ray(cast_effects: &Effects, stream: StreamKey, ray: u32) -> Self {
         let noise = cast_effects.noise.map(|noise| match noise.model {
             NoiseModel::Range => DVec3::X * noise_range(&noise, stream, ray),

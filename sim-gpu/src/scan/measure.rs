@@ -10,12 +10,15 @@ use super::receiver::{NoEcho, Receiver};
 use crate::effects::NoiseModel;
 use glam::DVec3;
 
-/// A point on its way into a scan.
+/// What a sensor reports of an echo.
 #[derive(Clone, Copy)]
 pub(super) struct Return {
     pub source: Source,
-    /// The measured point relative to the sensor, in world axes.
-    pub from_sensor: DVec3,
+    /// The measured distance from the start of the beam, metres.
+    pub range_m: f64,
+    /// How far noise moves the point from there, metres, in world axes; 0 unless it moves points
+    /// sideways.
+    pub aside_m: DVec3,
     /// As [`Signal::brightness`](super::echo::Signal::brightness); 0 unless something needs it.
     pub brightness: f32,
     /// As [`Scan::power`](formats::Scan::power), likewise.
@@ -27,11 +30,11 @@ pub(super) struct Return {
 }
 
 /// Measures the returns of a scan from `nearest`, the nearest hit of each ray that hit anything,
-/// by ray; and counts the returns that are lost.
-pub(super) fn measure(receiver: &Receiver, nearest: &[HitId]) -> (Vec<Return>, Tally) {
+/// by ray: gives `each` of them, and counts those that are lost.
+pub(super) fn measure(receiver: &Receiver, nearest: &[HitId], each: impl FnMut(Return)) -> Tally {
     let mut measurer = Measurer {
         receiver,
-        returns: Vec::with_capacity(nearest.len()),
+        each,
         tally: Tally::default(),
         echoes: Vec::new(),
         normals: Normals::new(receiver.objects),
@@ -41,19 +44,20 @@ pub(super) fn measure(receiver: &Receiver, nearest: &[HitId]) -> (Vec<Return>, T
     } else {
         measurer.measure_beams(nearest);
     }
-    (measurer.returns, measurer.tally)
+    measurer.tally
 }
 
-struct Measurer<'a> {
+struct Measurer<'a, Each> {
     receiver: &'a Receiver<'a>,
-    returns: Vec<Return>,
+    each: Each,
     tally: Tally,
     echoes: Vec<Echo>,
     normals: Normals,
 }
 
-impl Measurer<'_> {
+impl<Each: FnMut(Return)> Measurer<'_, Each> {
     /// Measures a hit that is the only echo of its beam.
+    #[inline]
     fn measure_hit(&mut self, id: HitId) {
         match self.receiver.echo_of_hit(id, &mut self.normals) {
             Ok(echo) => self.measure_echo(&echo, 0),
@@ -131,6 +135,7 @@ impl Measurer<'_> {
     }
 
     /// Measures a detected echo, number `place` of its beam, with the errors of the sensor.
+    #[inline]
     fn measure_echo(&mut self, echo: &Echo, place: usize) {
         let Echo { signal, source, .. } = *echo;
         let receiver = self.receiver;
@@ -147,7 +152,7 @@ impl Measurer<'_> {
             self.tally.dropped += 1;
             return;
         }
-        let (along_m, sideways_m) = match effects.noise.map(|noise| noise.model) {
+        let (along_m, aside_m) = match effects.noise.map(|noise| noise.model) {
             Some(NoiseModel::Range) => (outputs.noise.x, DVec3::ZERO),
             Some(NoiseModel::Xyz) => (0.0, outputs.noise),
             None => (0.0, DVec3::ZERO),
@@ -164,10 +169,10 @@ impl Measurer<'_> {
             self.tally.negative += 1;
             return;
         }
-        let from_start = receiver.beam_direction(ray) * range_m + sideways_m;
-        self.returns.push(Return {
+        (self.each)(Return {
             source,
-            from_sensor: receiver.start(ray).map_or(from_start, |start| from_start + start),
+            range_m,
+            aside_m,
             brightness: signal.brightness as f32,
             power: signal.power.min(f64::from(f32::MAX)) as f32,
             reflectivity: power::calibrated(signal.brightness, signal.retroreflection),

@@ -5,6 +5,7 @@
 //! and make points of them ([`assemble`]).
 
 mod assemble;
+mod beam_returns;
 mod echo;
 mod hit_effects;
 mod measure;
@@ -15,6 +16,7 @@ mod receiver;
 mod request;
 
 pub use assemble::assemble;
+pub use beam_returns::{BeamReturn, each_return};
 pub use object_hits::{ObjectHits, Tally};
 pub use request::{Glass, PlacedTarget, ScanRequest};
 
@@ -85,6 +87,40 @@ pub fn scan_objects(
     finish(caster, objects, request, &jobs, hits.collect(), false)
 }
 
+/// Gives `each` return of the scan that `request` asks for, as [`each_return`]. The CPU casts.
+pub fn cast_returns(
+    effects: &Effects,
+    objects: &[PlacedTarget],
+    request: &ScanRequest,
+    each: impl FnMut(BeamReturn),
+) -> Result<(), ScanError> {
+    let request = &request.in_motion(effects);
+    let (jobs, hits) = cast_nearest_first(objects, request);
+    Ok(each_return(request, effects, &hits_of(objects, &jobs, &hits), each)?)
+}
+
+/// The rays of the scan that `request` asks for, for an adapter with these effects.
+#[must_use]
+pub fn aim_all(objects: &[PlacedTarget], request: &ScanRequest, effects: &Effects) -> Vec<CastJob> {
+    let request = &request.in_motion(effects);
+    objects.iter().map(|object| request.aim(object)).collect()
+}
+
+/// As [`cast_returns`], from the answers of an adapter to the jobs of [`aim_all`].
+pub fn resolve_returns(
+    effects: &Effects,
+    objects: &[PlacedTarget],
+    request: &ScanRequest,
+    (jobs, casts): (&[CastJob], &[Cast]),
+    each: impl FnMut(BeamReturn),
+) -> Result<(), ScanError> {
+    let request = &request.in_motion(effects);
+    let answered = jobs.iter().zip(casts);
+    let hits = answered.map(|(job, cast)| resolve(job, cast, request.pattern, effects));
+    let hits: Vec<Hits> = hits.collect();
+    Ok(each_return(request, effects, &hits_of(objects, jobs, &hits), each)?)
+}
+
 /// Casts on the CPU at the nearest object first, so that a beam that ends there is not cast at
 /// objects behind.
 fn cast_nearest_first(
@@ -121,11 +157,18 @@ fn finish(
     hits: Vec<Hits>,
     cast_on_cpu: bool,
 ) -> Result<Scanned, ScanError> {
-    let found: Vec<ObjectHits> = (0..)
-        .zip(objects)
-        .zip(jobs.iter().zip(&hits))
-        .map(|((object, placed), (job, hits))| ObjectHits::new(object, placed, job, hits))
-        .collect();
+    let found = hits_of(objects, jobs, &hits);
     let (scan, tally) = assemble(request, caster.effects(), &found)?;
     Ok(Scanned { scan, tally, hits, cast_on_cpu })
+}
+
+fn hits_of<'a>(
+    objects: &'a [PlacedTarget<'a>],
+    jobs: &'a [CastJob],
+    hits: &'a [Hits],
+) -> Vec<ObjectHits<'a>> {
+    let numbered = (0..).zip(objects).zip(jobs.iter().zip(hits));
+    numbered
+        .map(|((object, placed), (job, hits))| ObjectHits::new(object, placed, job, hits))
+        .collect()
 }

@@ -106,11 +106,13 @@ impl<'a> Receiver<'a> {
 
     /// Whether a ray carries light in this scan. Off a beam's axis it does only if this scan's
     /// beams have a width: other rays were cast for other scans.
+    #[inline]
     pub fn is_lit(&self, ray: u32) -> bool {
         self.ray_share.is_some() || ray == self.axis_of(ray)
     }
 
     /// The start of a ray relative to the sensor, in world axes; `None` if it is the sensor.
+    #[inline]
     pub fn start(&self, ray: u32) -> Option<DVec3> {
         let start = self.pattern().start(ray)?;
         Some(self.request.pose_at(ray).rotation * start)
@@ -121,6 +123,7 @@ impl<'a> Receiver<'a> {
     }
 
     /// The ray along which most of an echo came back.
+    #[inline]
     pub fn ray_of(&self, source: Source) -> u32 {
         match source {
             Source::Surface(id) => self.hit(id).beam,
@@ -128,6 +131,7 @@ impl<'a> Receiver<'a> {
         }
     }
 
+    #[inline]
     pub fn echo_of_hit(&self, id: HitId, normals: &mut Normals) -> Result<Echo, NoEcho> {
         let hit = self.hit(id);
         let limits = &self.request.sensor.range;
@@ -145,6 +149,7 @@ impl<'a> Receiver<'a> {
     }
 
     /// Whether a hit is on glass, and its beam one of those that glass does not return.
+    #[inline]
     fn is_lost_in_glass(&self, object: &ObjectHits, hit: &Hit) -> bool {
         let Some(glass) = object.glass.filter(|glass| glass.triangles.contains(&hit.triangle))
         else {
@@ -204,6 +209,7 @@ impl<'a> Receiver<'a> {
     }
 
     /// The stream and the ray of an echo's random numbers: those of the ray that returned most.
+    #[inline]
     pub fn random_key(&self, source: Source) -> (StreamKey, u32) {
         match source {
             Source::Surface(id) => (self.object(id).job.stream, self.hit(id).beam),

@@ -93,7 +93,7 @@ fn each_lane_does_what_one_triangle_does() {
             .collect();
         let origin = point(17 * i + 13) * 2.0;
         let Some(direction) = (point(17 * i + 14) - origin).try_normalize() else { continue };
-        let bvh = Bvh::build(Builder::Morton, &corners, &[0, 1, 2, 3][..n]);
+        let bvh = Bvh::build(Builder::Morton, &[0, 1, 2, 3][..n], |nth| corners[nth]);
         let leaf = &bvh.wide.leaves[1];
         let lanes = intersect4(origin, &Shear::along(direction), leaf);
         for lane in 0..4 {
