@@ -91,8 +91,10 @@ class Scene:
         poses: NDArray[np.float64],
         numbers: Sequence[int],
         moved: NDArray[np.float64],
+        effects: str | None,
+        attributes: Sequence[str],
         seed: int | None,
-    ) -> tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.uint64]]: ...
+    ) -> dict[str, Any]: ...
     def scan_all(self, adapter: str) -> list[tuple[str, dict[str, Any]]]: ...
 
 @final

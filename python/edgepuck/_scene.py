@@ -205,21 +205,29 @@ class Scene:
         poses: ArrayLike,
         *,
         move: tuple[Sequence[int], ArrayLike] | None = None,
+        noise: float = 0.0,
+        dropout: float = 0.0,
+        effects: Mapping[str, Any] | None = None,
+        attributes: Iterable[str] = (),
         seed: int | None = None,
     ) -> Batch:
         """The ranges of a sensor's beams from many poses, as learning loops want them.
 
         Each pose sees a world of its own, in which the instances of `move` stand elsewhere. Nothing is
-        rebuilt, and the scene itself does not change. A row has the ranges of `scan` at its pose and, where
-        the scene's file has random effects, with its seed of `seeds`.
+        rebuilt, and the scene itself does not change. A row has the ranges of `scan` at its pose, with the
+        same effects and its seed of `seeds`. The sensor's adapter casts.
 
         Args:
             sensor: The sensor.
             poses: The poses of the sensor, [n, 4, 4], or [n, 7]: x, y, z and a quaternion w, x, y, z.
-            seed: The seed of the batch; by default that of the scene's file, or 0. Give each step of a
-                loop its own.
             move: Numbers of k instances, and their poses for each pose of the sensor, [n, k, 4, 4] or
                 [n, k, 7].
+            noise: Standard deviation of the noise of the ranges, metres.
+            dropout: Probability that a return is missing.
+            effects: Further effects, as in `scan`.
+            attributes: What the batch has besides ranges and objects: intensity, power.
+            seed: The seed of the batch; by default that of the scene's file, or 0. Give each step of a
+                loop its own.
 
         Raises:
             Error: A pose has a wrong shape or is not a rotation; there is no such instance.
@@ -241,9 +249,13 @@ class Scene:
             numbers = [whole("move", number, 0, 2**32 - 1) for number in move[0]]
             _, moved = _rows("move", move[1], (n, len(numbers)))
         key = None if seed is None else seed_of(seed)
-        ranges, objects, seeds = self._scene.cast(sensor_of(sensor), rows, numbers, moved, key)
+        if isinstance(attributes, str):
+            raise _edgepuck.Error(f"attributes: expected a list of names, found {attributes!r}")
+        wanted = (_scanning.encoded(noise, dropout, effects), list(attributes), key)
+        columns = self._scene.cast(sensor_of(sensor), rows, numbers, moved, *wanted)
         # The largest number, of beams without a return, is -1.
-        return Batch(ranges, objects.view(np.int32), seeds, sensor)
+        columns["object"] = columns["object"].view(np.int32)
+        return Batch(**columns, sensor=sensor)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _remade, (self._file, self._added, self._poses)
@@ -264,6 +276,12 @@ class Batch:
     """The seed of each row, [n]."""
     sensor: Sensor
     """The sensor."""
+    second_ranges: NDArray[np.float32] | None = None
+    """The ranges of second returns, if the effects ask for dual returns, [n, n_beams]."""
+    intensity: NDArray[np.float32] | None = None
+    """The intensities of the returns of `ranges`, if they were asked for, [n, n_beams]."""
+    power: NDArray[np.float32] | None = None
+    """The received powers of these returns, if they were asked for, [n, n_beams]."""
 
     def range_image(self) -> NDArray[np.float32]:
         """The ranges as images, [n, rings, columns]: rings from below, columns in the order of firing.

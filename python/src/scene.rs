@@ -8,20 +8,16 @@ use crate::sensor::Sensor;
 use formats::scan::Attribute;
 use glam::{DMat3, DQuat, DVec3};
 use numpy::ndarray::{Array2, ArrayView1};
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2};
+use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use sim_gpu::internals::scene::check_object;
-use sim_gpu::{Moves, Pose};
+use sim_gpu::{Batch, Effects, Moves, Pose};
 use std::path::PathBuf;
 use std::sync::Mutex;
 
 /// A scan's columns and the name of its sensor.
 type NamedScan<'py> = (String, Bound<'py, PyDict>);
-
-/// Ranges, objects and the seeds of rows.
-type CastArrays<'py> =
-    (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<u32>>, Bound<'py, PyArray1<u64>>);
 
 /// Meshes in the world, and the sensors of a scene's file.
 #[pyclass(module = "edgepuck._edgepuck", frozen)]
@@ -103,16 +99,9 @@ impl Scene {
     ) -> PyResult<Bound<'py, PyDict>> {
         let pose = place.pose()?;
         let (caster, mut scene) = (sensor.caster.open()?, lock(&self.scene).clone());
-        if let Some(effects) = effects {
-            scene.effects = serde_json::from_str(effects).map_err(|error| {
-                // The place in the text of JSON says nothing to the user.
-                let place = format!(" at line {} column {}", error.line(), error.column());
-                raised(format!("effects: {}", error.to_string().replace(&place, "")))
-            })?;
-        }
+        read_effects(effects, &mut scene.effects)?;
         if let Some(names) = attributes {
-            let attributes = names.iter().map(|name| name.parse::<Attribute>());
-            scene.attributes = attributes.collect::<Result<_, _>>().map_err(raised)?;
+            scene.attributes = read_attributes(&names)?.into_iter().collect();
         }
         scene.seed = seed.unwrap_or(scene.seed);
         sensor.sensor.rays(&scene.effects).map_err(raised)?;
@@ -120,8 +109,9 @@ impl Scene {
         arrays::scan(py, scan.map_err(raised)?.points)
     }
 
-    /// The ranges and objects of the sensor's beams from each pose, `[n, n_beams]`; `moved` has the poses
-    /// of the instances of these `numbers` for each pose.
+    /// The columns of a batch, `[n, n_beams]`, and the seed of each row; `moved` has the poses of the
+    /// instances of these `numbers` for each pose.
+    #[expect(clippy::too_many_arguments, reason = "Python's side has names for them")]
     fn cast<'py>(
         &self,
         py: Python<'py>,
@@ -129,10 +119,13 @@ impl Scene {
         poses: PyReadonlyArray2<'py, f64>,
         numbers: Vec<usize>,
         moved: PyReadonlyArray2<'py, f64>,
+        effects: Option<&str>,
+        attributes: Vec<String>,
         seed: Option<u64>,
-    ) -> PyResult<CastArrays<'py>> {
-        let mut scene = lock(&self.scene).clone();
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let (caster, mut scene) = (sensor.caster.open()?, lock(&self.scene).clone());
         scene.seed = seed.unwrap_or(scene.seed);
+        read_effects(effects, &mut scene.effects)?;
         let ids: Vec<_> = scene.ids().collect();
         let missing = |number: &usize| {
             let n = ids.len();
@@ -143,12 +136,13 @@ impl Scene {
         let (poses, moved) = (poses_of("poses", &poses)?, poses_of("move", &moved)?);
         sensor.sensor.rays(&scene.effects).map_err(raised)?;
         let moves = Moves { instances: &instances, poses: &moved };
-        let batch = process::run(py, || scene.cast(&sensor.sensor, &poses, moves))?;
-        let (batch, shape) =
-            (batch.map_err(raised)?, (poses.len(), sensor.sensor.directions().len()));
-        let ranges = Array2::from_shape_vec(shape, batch.range_m).map_err(raised)?;
-        let objects = Array2::from_shape_vec(shape, batch.object).map_err(raised)?;
-        Ok((ranges.into_pyarray(py), objects.into_pyarray(py), batch.seeds.into_pyarray(py)))
+        let attributes = read_attributes(&attributes)?;
+        let batch = process::run(py, || {
+            let batch = scene.batch(&sensor.sensor, &poses).moving(moves).with(&caster);
+            batch.attributes(attributes).run()
+        })?;
+        let shape = (poses.len(), sensor.sensor.directions().len());
+        columns(py, shape, batch.map_err(raised)?)
     }
 
     /// Scan it by each of the sensors of its file.
@@ -161,6 +155,45 @@ impl Scene {
             .map(|(scan, mounted)| Ok((mounted.name.clone(), arrays::scan(py, scan.points)?)));
         columns.collect()
     }
+}
+
+/// Takes `effects`, in JSON, in place of a scene's.
+fn read_effects(effects: Option<&str>, to: &mut Effects) -> PyResult<()> {
+    let Some(effects) = effects else { return Ok(()) };
+    *to = serde_json::from_str(effects).map_err(|error| {
+        // The place in the text of JSON says nothing to the user.
+        let place = format!(" at line {} column {}", error.line(), error.column());
+        raised(format!("effects: {}", error.to_string().replace(&place, "")))
+    })?;
+    Ok(())
+}
+
+fn read_attributes(names: &[String]) -> PyResult<Vec<Attribute>> {
+    names.iter().map(|name| name.parse::<Attribute>()).collect::<Result<_, _>>().map_err(raised)
+}
+
+/// The columns of `batch` that there are, as arrays of this shape.
+fn columns(py: Python<'_>, shape: (usize, usize), batch: Batch) -> PyResult<Bound<'_, PyDict>> {
+    let Batch { range_m, object, second_range_m, intensity, power, seeds, .. } = batch;
+    let arrays = PyDict::new(py);
+    arrays.set_item("ranges", array(py, shape, range_m)?)?;
+    arrays.set_item("object", array(py, shape, object)?)?;
+    arrays.set_item("seeds", seeds.into_pyarray(py))?;
+    let asked = [("second_ranges", second_range_m), ("intensity", intensity), ("power", power)];
+    for (name, column) in asked {
+        if !column.is_empty() {
+            arrays.set_item(name, array(py, shape, column)?)?;
+        }
+    }
+    Ok(arrays)
+}
+
+fn array<T: numpy::Element>(
+    py: Python<'_>,
+    shape: (usize, usize),
+    numbers: Vec<T>,
+) -> PyResult<Bound<'_, PyArray2<T>>> {
+    Ok(Array2::from_shape_vec(shape, numbers).map_err(raised)?.into_pyarray(py))
 }
 
 /// Where a sensor stands.

@@ -17,7 +17,7 @@ pub const NO_OBJECT: u32 = u32::MAX;
 
 /// The rays of the rows that an adapter casts together: it has the next of them while their ranges are
 /// computed.
-const RAYS_AT_ONCE: usize = 1 << 22;
+const RAYS_AT_ONCE: usize = if cfg!(test) { 1 << 17 } else { 1 << 22 };
 
 /// What moves from pose to pose in a [batch](Scene::batch).
 #[derive(Clone, Copy, Debug, Default)]

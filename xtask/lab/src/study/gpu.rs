@@ -30,6 +30,7 @@ use sim_gpu::internals::bvh::Builder;
 use sim_gpu::internals::caster::OpenCaster;
 use sim_gpu::internals::gpu::{AdapterKind, list_adapters};
 use sim_gpu::internals::mesh::TriangleMesh;
+use sim_gpu::{Caster, Mesh, Moves, Pose, Scene, Sensor};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use xtask::workspace::root;
@@ -56,6 +57,8 @@ struct Size {
     views: u32,
     /// Level of the sphere at whose vertices and edges rays are aimed.
     sphere_level: u32,
+    /// Rows of a batch.
+    rows: u32,
     /// Sizes of the meshes at which rays are timed.
     triangles: &'static [usize],
     rounds: usize,
@@ -65,11 +68,13 @@ const FULL: Size = Size {
     meshes: 512,
     views: 4,
     sphere_level: 5,
+    rows: 256,
     triangles: &[1_000, 10_000, 100_000, 1_000_000],
     rounds: 3,
 };
 
-const QUICK: Size = Size { meshes: 2, views: 1, sphere_level: 2, triangles: &[1_000], rounds: 1 };
+const QUICK: Size =
+    Size { meshes: 2, views: 1, sphere_level: 2, rows: 4, triangles: &[1_000], rounds: 1 };
 
 #[derive(Serialize)]
 struct Report {
@@ -116,6 +121,7 @@ pub fn run(args: &GpuArgs) -> Result<Outcome> {
         let measured = speed::tracing(&bench_mesh::tori(size.triangles), &backends, size.rounds)?;
         Ok((serde_json::to_value(&measured)?, measured.tables(), vec![]))
     })?;
+    report.part("batches", &backends, || batches(&size, &backends))?;
     report.part("datasets", &backends, || datasets(args, &size, &backends))?;
     print!("{}", report.table());
     Ok(report.outcome())
@@ -233,6 +239,43 @@ fn effect_check(name: &str, backend: &Backend, verdicts: &[EffectVerdict]) -> (V
         "beyond_tolerance": broken.len(),
     });
     (figure, Check::new(&format!("effect {name}"), backend, found, passed))
+}
+
+/// A batch of a sensor among twenty tori that stand elsewhere in each row, as a learning loop casts it.
+/// Every adapter gives the CPU's ranges, to the bit.
+fn batches(size: &Size, backends: &[Backend]) -> Result<Found> {
+    let torus = Mesh::try_from(bench_mesh::torus(10_000))?;
+    let mut scene = Scene::new();
+    let tori: Vec<_> = (0..20).map(|_| scene.add(&torus, Pose::IDENTITY)).collect();
+    let sensor = Sensor::named("vlp32c")?;
+    let poses = vec![Pose::IDENTITY; size.rows as usize];
+    let place = |i: u32| {
+        let angle_rad = 0.7 * f64::from(i);
+        let range_m = 3.0 + f64::from(i % 17);
+        Pose::at([range_m * angle_rad.cos(), range_m * angle_rad.sin(), 0.0])
+    };
+    let moved: Vec<Pose> = (0..size.rows * tori.len() as u32).map(place).collect();
+    let moves = Moves { instances: &tori, poses: &moved };
+    let (mut figures, mut checks, mut of_cpu) = (Vec::new(), Vec::new(), None);
+    for backend in backends {
+        let caster = Caster::named(backend.name())?;
+        let batch = || scene.batch(&sensor, &poses).moving(moves).with(&caster).run();
+        let cast = batch()?;
+        let mut seconds = Vec::new();
+        for _ in 0..size.rounds {
+            let start = Instant::now();
+            batch()?;
+            seconds.push(start.elapsed().as_secs_f64());
+        }
+        seconds.sort_by(f64::total_cmp);
+        let rays_per_s = cast.range_m.len() as f64 / seconds[seconds.len() / 2];
+        let is_equal = of_cpu.as_ref().is_none_or(|of_cpu| *of_cpu == cast);
+        let found = format!("{} million rays a second", digits(rays_per_s / 1e6));
+        checks.push(Check::new("batches", backend, found, is_equal));
+        figures.push(json!({ "adapter": backend.name(), "rays_per_s": rays_per_s }));
+        of_cpu.get_or_insert(cast);
+    }
+    Ok((figures.into(), vec![], checks))
 }
 
 fn datasets(args: &GpuArgs, size: &Size, backends: &[Backend]) -> Result<Found> {
