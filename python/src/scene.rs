@@ -255,14 +255,7 @@ fn pose_of(rows: &[f64; 16]) -> PyResult<Pose> {
 
 /// The pose of a position and a quaternion w, x, y, z; or what it lacks.
 fn posed([x, y, z, qw, qx, qy, qz]: [f64; 7]) -> Result<Pose, String> {
-    let position_m = position(x, y, z)?;
-    let rotation = DQuat::from_xyzw(qx, qy, qz, qw);
-    let off = (rotation.length_squared() - 1.0).abs();
-    if off.is_nan() || off >= 1e-3 {
-        let found = [qw, qx, qy, qz];
-        return Err(format!("expected a quaternion of length 1, found {found:?}"));
-    }
-    Ok(Pose { position_m, rotation: rotation.normalize() })
+    Pose::rigid([x, y, z], [qx, qy, qz, qw]).map_err(|invalid| invalid.cause)
 }
 
 fn position(x: f64, y: f64, z: f64) -> Result<DVec3, String> {

@@ -44,6 +44,28 @@ impl Pose {
         Self { position_m: position_m.into(), ..Self::IDENTITY }
     }
 
+    /// At this position, metres, turned by this quaternion x, y, z, w, which becomes one of length 1.
+    ///
+    /// # Errors
+    /// A coordinate is not finite; the square of the quaternion's length is not 1 to within 0.001, as that
+    /// of rotations in f32 is.
+    pub fn rigid(position_m: [f64; 3], quaternion_xyzw: [f64; 4]) -> Result<Self, InvalidValue> {
+        if let Some(number) = position_m.into_iter().find(|number| !number.is_finite()) {
+            let cause = format!("expected a position of finite metres, found {number}");
+            return Err(InvalidValue::new("position_m", cause));
+        }
+        let rotation = DQuat::from_array(quaternion_xyzw);
+        let length = rotation.length();
+        let off = (length * length - 1.0).abs();
+        if off.is_nan() || off >= 1e-3 {
+            let cause = format!(
+                "expected a quaternion of length 1, found {quaternion_xyzw:?} (x, y, z, w) of length {length:.4}"
+            );
+            return Err(InvalidValue::new("quaternion_xyzw", cause));
+        }
+        Ok(Self { position_m: position_m.into(), rotation: rotation.normalize() })
+    }
+
     /// At the same position, turned by `yaw_deg` about z, then by `pitch_deg` about its own y axis
     /// (a positive angle looks down), then by `roll_deg` about its own x axis.
     #[must_use]

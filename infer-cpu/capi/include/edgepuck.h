@@ -14,6 +14,9 @@
  *     }
  *     edgepuck_free(classifier);
  *
+ * A pointer is null, which is an error, or points at what its type says. What was
+ * freed or closed is not used any more, nor are texts that are valid as long as it.
+ *
  * One classifier serves one thread at a time, whichever; different classifiers
  * have nothing to do with each other. No Rust panic leaves the library; where
  * memory runs out, the process ends.
@@ -305,8 +308,7 @@ const char *edgepuck_version(void);
  *
  * # Safety
  *
- * path is null or a NUL-terminated string, as is every word of options; options is null or valid;
- * out is null or may be written to.
+ * path is null or a NUL-terminated string, as is every word of options.
  */
 enum EdgepuckStatus edgepuck_load(const char *path,
                                   const struct EdgepuckOptions *options,
@@ -319,8 +321,7 @@ enum EdgepuckStatus edgepuck_load(const char *path,
  *
  * # Safety
  *
- * classifier is null or comes from edgepuck_load, is not freed, and no other thread uses it now;
- * xyz is null or 3 * n_points floats can be read there; out is null or may be written to.
+ * xyz is null or 3 * n_points floats can be read there.
  */
 enum EdgepuckStatus edgepuck_classify(struct EdgepuckClassifier *classifier,
                                       const float *xyz,
@@ -333,8 +334,7 @@ enum EdgepuckStatus edgepuck_classify(struct EdgepuckClassifier *classifier,
  *
  * # Safety
  *
- * classifier is null or comes from edgepuck_load, is not freed, and no other thread classifies
- * with it now; out is null or length floats may be written there.
+ * out is null or length floats may be written there.
  */
 enum EdgepuckStatus edgepuck_logits(const struct EdgepuckClassifier *classifier,
                                     float *out,
@@ -342,41 +342,20 @@ enum EdgepuckStatus edgepuck_logits(const struct EdgepuckClassifier *classifier,
 
 /**
  * The number of classes; 0 for a null classifier.
- *
- * # Safety
- *
- * classifier is null or comes from edgepuck_load and is not freed.
  */
 size_t edgepuck_n_classes(const struct EdgepuckClassifier *classifier);
 
 /**
  * The name of class index, UTF-8, valid as long as the classifier; null for a null classifier or a
  * class that does not exist.
- *
- * # Safety
- *
- * classifier is null or comes from edgepuck_load and is not freed.
  */
 const char *edgepuck_class_name(const struct EdgepuckClassifier *classifier,
                                 size_t index);
 
 /**
  * Frees a classifier; null has no effect.
- *
- * # Safety
- *
- * classifier is null or comes from edgepuck_load; no thread uses it or its class names now or
- * later.
  */
 void edgepuck_free(struct EdgepuckClassifier *classifier);
-
-/**
- * The error message of the last failed call of this thread; empty if no call has failed. A
- * successful call does not change it.
- *
- * The text is UTF-8, and valid until another call of this thread fails.
- */
-const char *edgepuck_last_error(void);
 
 /**
  * Opens a pipeline that classifies clusters with the model file at path and with options (null
@@ -388,8 +367,7 @@ const char *edgepuck_last_error(void);
  *
  * # Safety
  *
- * path is null or a NUL-terminated string, as are metadata and every word of options; options is
- * null or valid; out is null or may be written to.
+ * path is null or a NUL-terminated string, as are metadata and every word of options.
  */
 enum EdgepuckStatus edgepuck_live_open(const char *path,
                                        const struct EdgepuckOptions *options,
@@ -404,7 +382,6 @@ enum EdgepuckStatus edgepuck_live_open(const char *path,
  *
  * # Safety
  *
- * live is null or comes from edgepuck_live_open, is not closed, and no other thread uses it now;
  * packet is null or n_bytes bytes can be read there.
  */
 enum EdgepuckStatus edgepuck_live_take(struct EdgepuckLive *live,
@@ -414,43 +391,24 @@ enum EdgepuckStatus edgepuck_live_take(struct EdgepuckLive *live,
 
 /**
  * Completes all clusters, for example at the end of a recording. Then call edgepuck_live_next.
- *
- * # Safety
- *
- * live is null or comes from edgepuck_live_open, is not closed, and no other thread uses it now.
  */
 enum EdgepuckStatus edgepuck_live_end(struct EdgepuckLive *live);
 
 /**
  * Writes the next object to out and returns true. Returns false if there is no object until the
  * next packet, or if a pointer is null.
- *
- * # Safety
- *
- * live is null or comes from edgepuck_live_open, is not closed, and no other thread uses it now;
- * out is null or may be written to.
  */
 bool edgepuck_live_next(struct EdgepuckLive *live,
                         struct EdgepuckObject *out);
 
 /**
  * Writes the numbers of packets to out.
- *
- * # Safety
- *
- * live is null or comes from edgepuck_live_open, is not closed, and no other thread takes packets
- * with it now; out is null or may be written to.
  */
 enum EdgepuckStatus edgepuck_live_counts(const struct EdgepuckLive *live,
                                          struct EdgepuckLiveCounts *out);
 
 /**
  * Closes a pipeline; null has no effect.
- *
- * # Safety
- *
- * live is null or comes from edgepuck_live_open; no thread uses it or its class names now or
- * later.
  */
 void edgepuck_live_close(struct EdgepuckLive *live);
 
@@ -458,6 +416,14 @@ void edgepuck_live_close(struct EdgepuckLive *live);
  * The default options.
  */
 struct EdgepuckOptions edgepuck_options_default(void);
+
+/**
+ * The error message of the last failed call of this thread; empty if no call has failed. A
+ * successful call does not change it.
+ *
+ * The text is UTF-8, and valid until another call of this thread fails.
+ */
+const char *edgepuck_last_error(void);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -1,14 +1,14 @@
 use std::ffi::{CString, c_char};
+use std::mem::MaybeUninit;
 use std::path::Path;
 use std::ptr::null;
 
+use edgepuck_ffi::{self as ffi, guard, guard_status};
 use infer_cpu::{Classifier, Options, Precision};
 
-use crate::failure::{Failure, guard, guard_status};
 use crate::options::EdgepuckOptions;
-use crate::pointers;
 use crate::prediction::EdgepuckPrediction;
-use crate::status::EdgepuckStatus;
+use crate::status::{EdgepuckStatus, Failure};
 
 /// A loaded network that classifies clouds. edgepuck_load creates it, and edgepuck_free frees it.
 pub struct EdgepuckClassifier {
@@ -57,20 +57,19 @@ pub extern "C" fn edgepuck_version() -> *const c_char {
 ///
 /// # Safety
 ///
-/// path is null or a NUL-terminated string, as is every word of options; options is null or valid;
-/// out is null or may be written to.
+/// path is null or a NUL-terminated string, as is every word of options.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn edgepuck_load(
     path: *const c_char,
-    options: *const EdgepuckOptions,
-    out: *mut *mut EdgepuckClassifier,
+    options: Option<&EdgepuckOptions>,
+    out: Option<&mut MaybeUninit<Option<Box<EdgepuckClassifier>>>>,
 ) -> EdgepuckStatus {
-    // SAFETY: the pointers are as the `# Safety` section above requires.
-    unsafe {
-        pointers::make(out, || {
-            EdgepuckClassifier::load(&pointers::path(path)?, &pointers::options(options)?)
-        })
-    }
+    ffi::make(out, || {
+        // SAFETY: the strings are as the `# Safety` section above requires.
+        let (path, options) =
+            unsafe { (ffi::path(path, "path")?, EdgepuckOptions::or_default(options)?) };
+        EdgepuckClassifier::load(&path, &options)
+    })
 }
 
 /// Classifies a cloud of n_points points, x y z after x y z, in metres; any unit will do for a
@@ -79,21 +78,18 @@ pub unsafe extern "C" fn edgepuck_load(
 ///
 /// # Safety
 ///
-/// classifier is null or comes from edgepuck_load, is not freed, and no other thread uses it now;
-/// xyz is null or 3 * n_points floats can be read there; out is null or may be written to.
+/// xyz is null or 3 * n_points floats can be read there.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn edgepuck_classify(
-    classifier: *mut EdgepuckClassifier,
+    classifier: Option<&mut EdgepuckClassifier>,
     xyz: *const f32,
     n_points: usize,
-    out: *mut EdgepuckPrediction,
+    out: Option<&mut MaybeUninit<EdgepuckPrediction>>,
 ) -> EdgepuckStatus {
     guard_status(|| {
-        // SAFETY: the pointers are as the `# Safety` section above requires.
-        let (out, classifier, cloud) = unsafe {
-            let out = pointers::out(out)?;
-            (out, pointers::exclusive(classifier, "classifier")?, pointers::cloud(xyz, n_points)?)
-        };
+        let (out, classifier) = (ffi::need(out, "out")?, ffi::need(classifier, "classifier")?);
+        // SAFETY: null or long enough, as required above.
+        let cloud = unsafe { ffi::slice(xyz.cast(), n_points, "xyz") }?;
         out.write(classifier.classify(cloud)?);
         Ok(())
     })
@@ -104,18 +100,16 @@ pub unsafe extern "C" fn edgepuck_classify(
 ///
 /// # Safety
 ///
-/// classifier is null or comes from edgepuck_load, is not freed, and no other thread classifies
-/// with it now; out is null or length floats may be written there.
+/// out is null or length floats may be written there.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn edgepuck_logits(
-    classifier: *const EdgepuckClassifier,
+    classifier: Option<&EdgepuckClassifier>,
     out: *mut f32,
     length: usize,
 ) -> EdgepuckStatus {
     guard_status(|| {
-        pointers::check(out, "out")?;
-        // SAFETY: null or from edgepuck_load, and not freed, as required above.
-        let classifier = unsafe { pointers::shared(classifier, "classifier") }?;
+        ffi::check(out, "out")?;
+        let classifier = ffi::need(classifier, "classifier")?;
         let (logits, n_classes) = (&classifier.logits, classifier.class_names.len());
         if logits.is_empty() {
             let message = "expected a classified cloud, but the last call classified none";
@@ -126,42 +120,26 @@ pub unsafe extern "C" fn edgepuck_logits(
                 format!("expected a buffer for {n_classes} logits, found one of {length}");
             return Err(Failure::new(EdgepuckStatus::BufferTooSmall, message));
         }
-        // SAFETY: not null, aligned, and long enough, as checked above; the buffer of C does not
-        // overlap with the `Vec` of logits.
-        unsafe { out.copy_from_nonoverlapping(logits.as_ptr(), logits.len()) };
-        Ok(())
+        // SAFETY: long enough, as checked above.
+        Ok(unsafe { ffi::write(logits, out, "out") }?)
     })
 }
 
 /// The number of classes; 0 for a null classifier.
-///
-/// # Safety
-///
-/// classifier is null or comes from edgepuck_load and is not freed.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn edgepuck_n_classes(classifier: *const EdgepuckClassifier) -> usize {
-    let n_classes = guard(|| {
-        // SAFETY: null or from edgepuck_load, and not freed, as required above.
-        let classifier = unsafe { pointers::shared(classifier, "classifier") }?;
-        Ok(classifier.class_names.len())
-    });
-    n_classes.unwrap_or(0)
+pub extern "C" fn edgepuck_n_classes(classifier: Option<&EdgepuckClassifier>) -> usize {
+    classifier.map_or(0, |classifier| classifier.class_names.len())
 }
 
 /// The name of class index, UTF-8, valid as long as the classifier; null for a null classifier or a
 /// class that does not exist.
-///
-/// # Safety
-///
-/// classifier is null or comes from edgepuck_load and is not freed.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn edgepuck_class_name(
-    classifier: *const EdgepuckClassifier,
+pub extern "C" fn edgepuck_class_name(
+    classifier: Option<&EdgepuckClassifier>,
     index: usize,
 ) -> *const c_char {
-    let name = guard(|| {
-        // SAFETY: null or from edgepuck_load, and not freed, as required above.
-        let names = unsafe { &pointers::shared(classifier, "classifier")?.class_names };
+    let name = guard::<_, EdgepuckStatus>(|| {
+        let names = &ffi::need(classifier, "classifier")?.class_names;
         names.get(index).map(|name| name.as_ptr()).ok_or_else(|| {
             let message = format!("expected a class below {}, found {index}", names.len());
             Failure::new(EdgepuckStatus::BadOption, message)
@@ -171,14 +149,7 @@ pub unsafe extern "C" fn edgepuck_class_name(
 }
 
 /// Frees a classifier; null has no effect.
-///
-/// # Safety
-///
-/// classifier is null or comes from edgepuck_load; no thread uses it or its class names now or
-/// later.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn edgepuck_free(classifier: *mut EdgepuckClassifier) {
-    // SAFETY: null or from edgepuck_load, which calls `make`, and not used later, as required
-    // above.
-    unsafe { pointers::free(classifier) }
+pub extern "C" fn edgepuck_free(classifier: Option<Box<EdgepuckClassifier>>) {
+    ffi::free(classifier);
 }

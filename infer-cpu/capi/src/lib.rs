@@ -4,10 +4,8 @@
 //! Doc comments here are for readers of that header, which is generated from them.
 
 mod classifier;
-mod failure;
 mod live;
 mod options;
-mod pointers;
 mod prediction;
 mod status;
 
@@ -15,11 +13,10 @@ pub use classifier::{
     EdgepuckClassifier, edgepuck_class_name, edgepuck_classify, edgepuck_free, edgepuck_load,
     edgepuck_logits, edgepuck_n_classes, edgepuck_version,
 };
-pub use failure::edgepuck_last_error;
 pub use live::{
     EdgepuckLive, EdgepuckLiveCounts, EdgepuckObject, edgepuck_live_close, edgepuck_live_counts,
     edgepuck_live_end, edgepuck_live_next, edgepuck_live_open, edgepuck_live_take,
 };
 pub use options::{EdgepuckOptions, edgepuck_options_default};
 pub use prediction::EdgepuckPrediction;
-pub use status::EdgepuckStatus;
+pub use status::{EdgepuckStatus, edgepuck_last_error};

@@ -1,15 +1,15 @@
 use std::collections::VecDeque;
 use std::ffi::{CString, c_char};
+use std::mem::MaybeUninit;
 use std::ptr::null;
 
+use edgepuck_ffi::{self as ffi, guard, guard_status};
 use formats::ouster::Metadata;
-use infer_cpu::live::{Arrival, LiveError, LiveOptions, Object, Pipeline};
+use infer_cpu::live::{Arrival, LiveOptions, Object, Pipeline};
 use infer_cpu::{Classifier, UNKNOWN};
 
-use crate::failure::{Failure, guard_status};
 use crate::options::EdgepuckOptions;
-use crate::pointers;
-use crate::status::EdgepuckStatus;
+use crate::status::{EdgepuckStatus, Failure};
 
 /// A pipeline from the packets of a LiDAR to classified, tracked objects. edgepuck_live_open
 /// creates it, and edgepuck_live_close frees it.
@@ -103,15 +103,6 @@ impl EdgepuckObject {
     }
 }
 
-impl From<LiveError> for Failure {
-    fn from(error: LiveError) -> Self {
-        match error {
-            LiveError::Classifier(error) => error.into(),
-            other => Self::new(EdgepuckStatus::BadOption, other.to_string()),
-        }
-    }
-}
-
 /// Opens a pipeline that classifies clusters with the model file at path and with options (null
 /// stands for the defaults), one cluster per thread; clusters of fewer than min_points points are
 /// not classified. The sensor is a Velodyne VLP-16 or VLP-32C, or an Ouster if metadata is the path
@@ -121,31 +112,28 @@ impl From<LiveError> for Failure {
 ///
 /// # Safety
 ///
-/// path is null or a NUL-terminated string, as are metadata and every word of options; options is
-/// null or valid; out is null or may be written to.
+/// path is null or a NUL-terminated string, as are metadata and every word of options.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn edgepuck_live_open(
     path: *const c_char,
-    options: *const EdgepuckOptions,
+    options: Option<&EdgepuckOptions>,
     metadata: *const c_char,
     min_points: usize,
-    out: *mut *mut EdgepuckLive,
+    out: Option<&mut MaybeUninit<Option<Box<EdgepuckLive>>>>,
 ) -> EdgepuckStatus {
-    let open = || {
-        // SAFETY: the pointers are as the `# Safety` section above requires.
-        let (path, options) = unsafe { (pointers::path(path)?, pointers::options(options)?) };
+    ffi::make(out, || {
+        // SAFETY: the strings are as the `# Safety` section above requires.
+        let (path, options) =
+            unsafe { (ffi::path(path, "path")?, EdgepuckOptions::or_default(options)?) };
         let mut live = LiveOptions::default();
         live.min_points = min_points;
         if !metadata.is_null() {
             // SAFETY: null or NUL-terminated, as required above.
-            let read = Metadata::read(&unsafe { pointers::path(metadata) }?);
-            let read = read.map_err(|e| Failure::new(EdgepuckStatus::BadOption, e.to_string()))?;
-            live.ouster = Some(read);
+            let read = Metadata::read(&unsafe { ffi::path(metadata, "metadata") }?);
+            live.ouster = Some(read.map_err(Failure::of(EdgepuckStatus::BadOption))?);
         }
         EdgepuckLive::new(Classifier::load(&path, &options)?, &live)
-    };
-    // SAFETY: null or writable, as required above.
-    unsafe { pointers::make(out, open) }
+    })
 }
 
 /// Processes the payload of one UDP packet of the sensor, n_bytes at packet, which arrived at the
@@ -154,19 +142,18 @@ pub unsafe extern "C" fn edgepuck_live_open(
 ///
 /// # Safety
 ///
-/// live is null or comes from edgepuck_live_open, is not closed, and no other thread uses it now;
 /// packet is null or n_bytes bytes can be read there.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn edgepuck_live_take(
-    live: *mut EdgepuckLive,
+    live: Option<&mut EdgepuckLive>,
     packet: *const u8,
     n_bytes: usize,
     time_s: f64,
 ) -> EdgepuckStatus {
     guard_status(|| {
-        // SAFETY: the pointers are as the `# Safety` section above requires.
-        let (live, packet) =
-            unsafe { (pointers::exclusive(live, "live")?, pointers::bytes(packet, n_bytes)?) };
+        let live = ffi::need(live, "live")?;
+        // SAFETY: null or long enough, as required above.
+        let packet = unsafe { ffi::slice(packet, n_bytes, "packet") }?;
         live.pipeline.take(packet, Arrival { time_s, moment: None });
         live.answer();
         Ok(())
@@ -174,15 +161,10 @@ pub unsafe extern "C" fn edgepuck_live_take(
 }
 
 /// Completes all clusters, for example at the end of a recording. Then call edgepuck_live_next.
-///
-/// # Safety
-///
-/// live is null or comes from edgepuck_live_open, is not closed, and no other thread uses it now.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn edgepuck_live_end(live: *mut EdgepuckLive) -> EdgepuckStatus {
+pub extern "C" fn edgepuck_live_end(live: Option<&mut EdgepuckLive>) -> EdgepuckStatus {
     guard_status(|| {
-        // SAFETY: null or from edgepuck_live_open, and not closed, as required above.
-        let live = unsafe { pointers::exclusive(live, "live") }?;
+        let live = ffi::need(live, "live")?;
         live.pipeline.end();
         live.answer();
         Ok(())
@@ -191,43 +173,26 @@ pub unsafe extern "C" fn edgepuck_live_end(live: *mut EdgepuckLive) -> EdgepuckS
 
 /// Writes the next object to out and returns true. Returns false if there is no object until the
 /// next packet, or if a pointer is null.
-///
-/// # Safety
-///
-/// live is null or comes from edgepuck_live_open, is not closed, and no other thread uses it now;
-/// out is null or may be written to.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn edgepuck_live_next(
-    live: *mut EdgepuckLive,
-    out: *mut EdgepuckObject,
+pub extern "C" fn edgepuck_live_next(
+    live: Option<&mut EdgepuckLive>,
+    out: Option<&mut MaybeUninit<EdgepuckObject>>,
 ) -> bool {
-    let mut is_there = false;
-    guard_status(|| {
-        // SAFETY: the pointers are as the `# Safety` section above requires.
-        let (out, live) = unsafe { (pointers::out(out)?, pointers::exclusive(live, "live")?) };
-        if let Some(object) = live.answered.pop_front() {
-            out.write(object);
-            is_there = true;
-        }
-        Ok(())
+    let is_there = guard::<_, EdgepuckStatus>(|| {
+        let (out, live) = (ffi::need(out, "out")?, ffi::need(live, "live")?);
+        Ok(live.answered.pop_front().map(|object| out.write(object)).is_some())
     });
-    is_there
+    is_there.unwrap_or(false)
 }
 
 /// Writes the numbers of packets to out.
-///
-/// # Safety
-///
-/// live is null or comes from edgepuck_live_open, is not closed, and no other thread takes packets
-/// with it now; out is null or may be written to.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn edgepuck_live_counts(
-    live: *const EdgepuckLive,
-    out: *mut EdgepuckLiveCounts,
+pub extern "C" fn edgepuck_live_counts(
+    live: Option<&EdgepuckLive>,
+    out: Option<&mut MaybeUninit<EdgepuckLiveCounts>>,
 ) -> EdgepuckStatus {
     guard_status(|| {
-        // SAFETY: the pointers are as the `# Safety` section above requires.
-        let (out, live) = unsafe { (pointers::out(out)?, pointers::shared(live, "live")?) };
+        let (out, live) = (ffi::need(out, "out")?, ffi::need(live, "live")?);
         let counts = live.pipeline.counts();
         out.write(EdgepuckLiveCounts {
             packets: counts.packets,
@@ -241,14 +206,7 @@ pub unsafe extern "C" fn edgepuck_live_counts(
 }
 
 /// Closes a pipeline; null has no effect.
-///
-/// # Safety
-///
-/// live is null or comes from edgepuck_live_open; no thread uses it or its class names now or
-/// later.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn edgepuck_live_close(live: *mut EdgepuckLive) {
-    // SAFETY: null or from edgepuck_live_open, which calls `make`, and not used later, as required
-    // above.
-    unsafe { pointers::free(live) }
+pub extern "C" fn edgepuck_live_close(live: Option<Box<EdgepuckLive>>) {
+    ffi::free(live);
 }

@@ -1,13 +1,13 @@
-use std::ffi::{CStr, c_char};
+use std::ffi::c_char;
 use std::fmt::Display;
 use std::ptr::null;
 use std::str::FromStr;
 
+use edgepuck_ffi as ffi;
 use infer_cpu::sampler::SamplerSpec;
 use infer_cpu::{Options, UpAxis};
 
-use crate::failure::Failure;
-use crate::status::EdgepuckStatus;
+use crate::status::{EdgepuckStatus, Failure};
 
 /// The options of a classifier. Begin with edgepuck_options_default, then change fields. Choices
 /// are words, as on infer-cpu's command line; an unknown word gives an error that lists the valid
@@ -87,11 +87,18 @@ pub extern "C" fn edgepuck_options_default() -> EdgepuckOptions {
 }
 
 impl EdgepuckOptions {
-    /// The options for the Rust library.
+    /// The options for the Rust library; the defaults if there are none.
     ///
     /// # Safety
     /// Every word is null or a NUL-terminated string.
-    pub(crate) unsafe fn read(&self) -> Result<Options, Failure> {
+    pub(crate) unsafe fn or_default(options: Option<&Self>) -> Result<Options, Failure> {
+        // SAFETY: every word is null or NUL-terminated, as required above.
+        options.map_or_else(|| Ok(Options::default()), |options| unsafe { options.read() })
+    }
+
+    /// # Safety
+    /// As [`Self::or_default`].
+    unsafe fn read(&self) -> Result<Options, Failure> {
         let up = UpAxis::ALL.get(self.up).copied();
         let up = up.ok_or_else(|| bad("up", format!("expected 0, 1 or 2, found {}", self.up)))?;
         // SAFETY: every word is null or NUL-terminated, as required above.
@@ -115,7 +122,7 @@ impl EdgepuckOptions {
     }
 
     /// # Safety
-    /// As [`Self::read`].
+    /// As [`Self::or_default`].
     unsafe fn sampler(&self) -> Result<Option<SamplerSpec>, Failure> {
         let default = SamplerSpec::default();
         // SAFETY: every word is null or NUL-terminated, as required above.
@@ -155,7 +162,7 @@ unsafe fn word<T: FromStr<Err: Display>>(
         return Ok(None);
     }
     // SAFETY: not null, and NUL-terminated, as required above.
-    let word = unsafe { CStr::from_ptr(pointer) }.to_string_lossy();
+    let word = unsafe { ffi::text(pointer, option) }?;
     word.parse().map(Some).map_err(|cause: T::Err| bad(option, cause.to_string()))
 }
 

@@ -1,6 +1,6 @@
 //! Tests the library from C: the examples print the results of the Rust library, and
 //! `tests/c/contract.c` checks the statements of the header. Skipped with a message if there is no
-//! C compiler.
+//! C compiler. The header itself is what cbindgen makes of the sources.
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
@@ -14,7 +14,7 @@ use std::process::{Command, Output};
 
 use infer_cpu::live::{Arrival, LiveOptions, Object, Pipeline};
 use infer_cpu::{Classifier, Options};
-use support::Compiler;
+use support::EDGEPUCK;
 use test_support::need;
 
 /// A cloud whose longest axis is y; the last line has the largest x.
@@ -30,8 +30,8 @@ fn text(bytes: &[u8]) -> &str {
 
 #[test]
 fn the_example_gives_what_the_rust_library_gives() {
-    let compiler = need!(Compiler::c());
-    let example = compiler.compile("examples/classify.c", &support::static_link());
+    let compiler = need!(EDGEPUCK.c());
+    let example = compiler.compile("examples/classify.c", &EDGEPUCK.static_link());
     let model = compiler.folder().join("model.safetensors");
     support::write_longest_axis_model(&model);
 
@@ -59,8 +59,8 @@ fn the_example_gives_what_the_rust_library_gives() {
 /// A second of a VLP-16 in a street, as a capture and as the Rust library answers it.
 #[test]
 fn the_example_of_packets_gives_what_the_rust_library_gives() {
-    let compiler = need!(Compiler::c());
-    let example = compiler.compile("examples/live.c", &support::static_link());
+    let compiler = need!(EDGEPUCK.c());
+    let example = compiler.compile("examples/live.c", &EDGEPUCK.static_link());
     let model = compiler.folder().join("model.safetensors");
     support::write_longest_axis_model(&model);
     let sent = street::packets(&street::street(), 7, street::PACKETS_PER_S);
@@ -99,8 +99,8 @@ fn the_example_of_packets_gives_what_the_rust_library_gives() {
 
 #[test]
 fn the_example_says_what_is_wrong() {
-    let compiler = need!(Compiler::c());
-    let example = compiler.compile("examples/classify.c", &support::static_link());
+    let compiler = need!(EDGEPUCK.c());
+    let example = compiler.compile("examples/classify.c", &EDGEPUCK.static_link());
     let model = compiler.folder().join("model.safetensors");
     support::write_longest_axis_model(&model);
     let cloud = compiler.folder().join("cloud.xyz");
@@ -122,10 +122,10 @@ fn the_example_says_what_is_wrong() {
 
 #[test]
 fn the_header_s_promises_hold_in_c() {
-    let compiler = need!(Compiler::c());
+    let compiler = need!(EDGEPUCK.c());
     let model = compiler.folder().join("model.safetensors");
     support::write_longest_axis_model(&model);
-    for link in [support::static_link(), support::dynamic_link()] {
+    for link in [EDGEPUCK.static_link(), EDGEPUCK.dynamic_link()] {
         let contract = compiler.compile("tests/c/contract.c", &link);
         let output = run(&contract, &[&model]);
         assert!(output.status.success(), "{link:?}\n{}", text(&output.stderr));
@@ -135,7 +135,12 @@ fn the_header_s_promises_hold_in_c() {
 
 #[test]
 fn the_header_is_c_plus_plus_too() {
-    let compiler = need!(Compiler::c_plus_plus());
-    let program = compiler.compile("tests/c/version.cpp", &support::static_link());
+    let compiler = need!(EDGEPUCK.c_plus_plus());
+    let program = compiler.compile("tests/c/version.cpp", &EDGEPUCK.static_link());
     assert!(run(&program, &[]).status.success());
+}
+
+#[test]
+fn the_header_is_that_of_the_sources() {
+    EDGEPUCK.check_header();
 }

@@ -8,6 +8,8 @@
 //! there from the passed to the skipped.
 
 pub mod allocations;
+#[cfg(feature = "c")]
+pub mod c;
 
 use std::env;
 use std::fs::OpenOptions;

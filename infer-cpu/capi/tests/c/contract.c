@@ -92,7 +92,7 @@ static void bad_clouds_are_refused(EdgepuckClassifier *classifier)
     EXPECT_ERROR(edgepuck_classify(classifier, (const float *)((const char *)broken + 1), 1, &found),
                  EDGEPUCK_STATUS_BAD_POINTER, "`xyz`");
     EXPECT_ERROR(edgepuck_classify(classifier, broken, SIZE_MAX / 2, &found),
-                 EDGEPUCK_STATUS_BAD_CLOUD, "memory");
+                 EDGEPUCK_STATUS_BAD_POINTER, "memory");
     EXPECT_ERROR(edgepuck_classify(classifier, broken, 4, NULL),
                  EDGEPUCK_STATUS_BAD_POINTER, "`out`");
     EXPECT(memcmp(&found, &untouched, sizeof found) == 0);
