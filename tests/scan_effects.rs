@@ -5,9 +5,10 @@
 
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, Scan};
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel};
 use sim_gpu::internals::caster::OpenCaster;
+use sim_gpu::internals::mesh::TriangleMesh;
 use sim_gpu::internals::pose::Pose;
 use sim_gpu::internals::scan::{PlacedTarget, ScanRequest, Tally, scan_objects};
 use sim_gpu::internals::sensor::SensorProfile;
@@ -30,6 +31,33 @@ fn scan(caster: &OpenCaster, sensor: &SensorProfile) -> (Scan, Tally) {
     request.stream = STREAM;
     let scanned = scan_objects(caster, &[placed], &request).unwrap();
     (scanned.scan, scanned.tally)
+}
+
+/// A square that is four times as wide and high as its mesh faces the sensor: the cosine of the incidence
+/// is that of the beam and the x axis.
+#[test]
+fn an_uneven_scale_changes_no_angle() {
+    let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+    let vertices = corners.map(|[y, z]| DVec3::new(0.0, y, z)).to_vec();
+    let mesh = TriangleMesh { vertices, triangles: vec![[0, 1, 2], [0, 2, 3]] };
+    let (target, sensor) = (casting::target(&mesh), vlp32c());
+    let pattern = sensor.pattern();
+    let mut placed = PlacedTarget::new(&target);
+    placed.world_from_object = DAffine3::from_scale(DVec3::new(1.0, 4.0, 4.0));
+    placed.reflectivity = 0.5;
+    let pose = Pose::look_at(SENSOR, DVec3::ZERO).unwrap();
+    let mut request = ScanRequest::new(&sensor, &pattern, pose);
+    request.attributes = [Attribute::Intensity].into();
+    let effects = Effects { intensity: Some(Intensity), ..Effects::default() };
+    for caster in adapter::casters(&effects) {
+        let scan = scan_objects(caster, &[placed.clone()], &request).unwrap().scan;
+        assert!(scan.positions.len() > 1000);
+        for (point, intensity) in scan.positions.iter().zip(scan.intensity.unwrap()) {
+            let expected = 0.5 * from_sensor(point).normalize().x.abs();
+            // Both are rounded to f32, whose ulp is 2^-24 or less of 1.
+            assert!((f64::from(intensity) - expected).abs() < 3e-7, "{intensity} for {expected}");
+        }
+    }
 }
 
 fn vlp32c() -> SensorProfile {

@@ -148,10 +148,8 @@ pub unsafe extern "C" fn edgepuck_scene_cast(
         let instances = instances.collect::<Result<Vec<_>, _>>()?;
         let poses = EdgepuckPose::read_all(poses, "poses")?;
         let moved = EdgepuckPose::read_all(moved, "moves.poses")?;
-        let mut world = scene.scene.clone();
-        world.seed = seed;
         let moves = Moves { instances: &instances, poses: &moved };
-        let found = world.cast(sensor, &poses, moves)?;
+        let found = scene.scene.batch(sensor, &poses).moving(moves).seed(seed).run()?;
         // SAFETY: the buffers are null or have room for as many ranges as were checked.
         unsafe {
             ffi::write(&found.range_m, ranges.range_m, "range_m")?;

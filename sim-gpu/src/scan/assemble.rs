@@ -225,6 +225,13 @@ pub(super) fn intensity(receiver: &Receiver, r: &Return) -> f32 {
     }
     let Some(id) = surface(r) else { return 0.0 };
     let (object, pattern) = (receiver.object(id), receiver.pattern());
+    if object.is_uneven() {
+        // Casters see the angles in the object's frame, which differ from those in the world.
+        let hit = receiver.hit(id);
+        let normal = unit_normal(object, pattern, hit);
+        let cosine = normal.dot(receiver.direction(hit.beam)).abs().min(1.0);
+        return (cosine * object.material(pattern, hit).reflectivity) as f32;
+    }
     let HitEffects { intensity, .. } =
         HitEffects::of_hit(receiver.cast_effects, pattern, object, id);
     // Casters took the reflectivity of an object with materials for 1.

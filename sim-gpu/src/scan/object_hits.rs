@@ -56,6 +56,15 @@ impl<'a> ObjectHits<'a> {
         self.job.motion.as_ref().map_or(self.world_from_object, at)
     }
 
+    /// Whether its scale differs from axis to axis.
+    pub(super) fn is_uneven(&self) -> bool {
+        let [x, y, z] =
+            [0, 1, 2].map(|axis| self.world_from_object.matrix3.col(axis).length_squared());
+        // Rotations change lengths by a few ulps.
+        let is_as_x = |other: f64| (other - x).abs() <= 1e-12 * x;
+        !(is_as_x(y) && is_as_x(z))
+    }
+
     /// Whether its normals may change from ray to ray.
     pub(super) fn moves(&self) -> bool {
         self.job.motion.is_some()

@@ -90,7 +90,7 @@ impl<'a> Receiver<'a> {
     }
 
     /// The unit vector along a ray, in world axes.
-    fn direction(&self, ray: u32) -> DVec3 {
+    pub fn direction(&self, ray: u32) -> DVec3 {
         self.request.pose_at(ray).rotation * self.pattern().directions[ray as usize]
     }
 
