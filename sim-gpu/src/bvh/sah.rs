@@ -17,18 +17,26 @@ const EXACT: usize = 8;
 /// Cost of a triangle test in units of a node visit.
 const TRIANGLE_COST: f32 = 1.0;
 
-/// Subtrees of more triangles are built in parallel.
+/// Subtrees of more triangles than this, and of more than this part of all, are built in parallel. To
+/// join the nodes of two tasks copies them, so that a larger tree has larger tasks.
 const PARALLEL_ABOVE: usize = 8192;
+const PARALLEL_PART: usize = 256;
 
 pub(super) fn build(primitives: &mut [Primitive]) -> Vec<Node> {
     let mut nodes = Vec::with_capacity(primitives.len() / 2 + 1);
-    let root = subtree(primitives, 0, 0, &mut nodes);
+    let alone = PARALLEL_ABOVE.max(primitives.len() / PARALLEL_PART);
+    let root = subtree(primitives, 0, (0, alone), &mut nodes);
     with_root(nodes, root)
 }
 
 /// Appends the subtree over `primitives`, whose first is number `first` in leaf order, to `nodes`,
-/// and returns its entry in the parent.
-fn subtree(primitives: &mut [Primitive], first: u32, depth: usize, nodes: &mut Vec<Node>) -> Child {
+/// and returns its entry in the parent. Up to `alone` triangles are one task.
+fn subtree(
+    primitives: &mut [Primitive],
+    first: u32,
+    (depth, alone): (usize, usize),
+    nodes: &mut Vec<Node>,
+) -> Child {
     let (bounds, centres) = extent(primitives);
     let leaf = Child { bounds, first, count: primitives.len() as u32 };
     if primitives.len() <= 1 {
@@ -57,11 +65,12 @@ fn subtree(primitives: &mut [Primitive], first: u32, depth: usize, nodes: &mut V
     nodes.push(Node::new(Child::NONE, Child::NONE));
     let right_first = first + middle as u32;
     // A task must be worth its scheduling on both sides.
-    let (left, right) = if left.len().min(right.len()) > PARALLEL_ABOVE {
-        in_parallel((left, first), (right, right_first), depth + 1, nodes)
+    let below = (depth + 1, alone);
+    let (left, right) = if left.len().min(right.len()) > alone {
+        in_parallel((left, first), (right, right_first), below, nodes)
     } else {
-        let left = subtree(left, first, depth + 1, nodes);
-        (left, subtree(right, right_first, depth + 1, nodes))
+        let left = subtree(left, first, below, nodes);
+        (left, subtree(right, right_first, below, nodes))
     };
     nodes[at] = Node::new(left, right);
     Child { bounds, first: at as u32, count: 0 }
@@ -71,12 +80,12 @@ fn subtree(primitives: &mut [Primitive], first: u32, depth: usize, nodes: &mut V
 fn in_parallel(
     left: (&mut [Primitive], u32),
     right: (&mut [Primitive], u32),
-    depth: usize,
+    below: (usize, usize),
     nodes: &mut Vec<Node>,
 ) -> (Child, Child) {
     let build = |(primitives, first): (&mut [Primitive], u32)| {
         let mut nodes = Vec::with_capacity(primitives.len() / 2);
-        let child = subtree(primitives, first, depth, &mut nodes);
+        let child = subtree(primitives, first, below, &mut nodes);
         (child, nodes)
     };
     let (left, right) = rayon::join(|| build(left), || build(right));
