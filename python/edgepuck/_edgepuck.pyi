@@ -15,6 +15,7 @@ __all__ = [
     "adapters",
     "detect",
     "main",
+    "read_grey16",
     "read_points",
     "run",
     "save_scan",
@@ -77,6 +78,7 @@ class Scene:
         retroreflection: float,
     ) -> int: ...
     def move(self, number: int, pose: Sequence[float]) -> None: ...
+    def move_all(self, numbers: Sequence[int], poses: NDArray[np.float64]) -> None: ...
     def scan(
         self,
         sensor: Sensor,
@@ -91,6 +93,7 @@ class Scene:
         poses: NDArray[np.float64],
         numbers: Sequence[int],
         moved: NDArray[np.float64],
+        effects: str | None,
         seed: int | None,
     ) -> tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.uint64]]: ...
     def scan_all(self, adapter: str) -> list[tuple[str, dict[str, Any]]]: ...
@@ -145,6 +148,7 @@ def detect(
     min_points: int,
     min_confidence: float,
 ) -> list[dict[str, Any]]: ...
+def read_grey16(file: str) -> NDArray[np.uint16]: ...
 def read_points(
     path: str, format: str | None, metadata: str | None, sender: str | None
 ) -> Mapping[str, Any]: ...

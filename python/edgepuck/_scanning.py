@@ -31,6 +31,17 @@ def scan(
     """Scan `scene` by `sensor`. `Scene.scan` describes the arguments."""
     if isinstance(attributes, str):
         raise _edgepuck.Error(f"attributes: expected a list of names, found {attributes!r}")
+    encoded = encoded_effects(noise, dropout, effects)
+    at = [float(distance), float(elevation), float(azimuth)] if pose is None else matrix(pose)
+    names = None if attributes is None else list(attributes)
+    key = None if seed is None else _arguments.seed(seed)
+    return scan_of(scene.scan(sensor, at, encoded, names, key))
+
+
+def encoded_effects(
+    noise: float, dropout: float, effects: Mapping[str, Any] | None
+) -> str | None:
+    """The effects as JSON, if there are any. `Scene.scan` describes the arguments."""
     if effects is not None and not isinstance(effects, Mapping):
         raise _edgepuck.Error(f"effects: expected a dict, found {effects!r}")
     wanted: dict[str, Any] = dict(effects or {})
@@ -41,11 +52,7 @@ def scan(
         wanted["noise"] = {"sigma_m": noise, "mean_m": 0.0, "model": "range"}
     if dropout != 0:
         wanted["dropout"] = {"probability": dropout}
-    at = [float(distance), float(elevation), float(azimuth)] if pose is None else matrix(pose)
-    encoded = json.dumps(_plain(wanted, "effects")) if wanted or effects is not None else None
-    names = None if attributes is None else list(attributes)
-    key = None if seed is None else _arguments.seed(seed)
-    return scan_of(scene.scan(sensor, at, encoded, names, key))
+    return json.dumps(_plain(wanted, "effects")) if wanted or effects is not None else None
 
 
 def matrix(pose: ArrayLike) -> list[float]:

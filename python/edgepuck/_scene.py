@@ -39,7 +39,7 @@ class Scene:
         self._scene = _edgepuck.Scene()
         self._file: str | None = None
         self._added: list[tuple[Mesh, tuple[Any, ...]]] = []
-        self._poses: dict[int, list[float]] = {}
+        self._poses: dict[int, NDArray[np.float64]] = {}
 
     @classmethod
     def read(cls, file: str | os.PathLike[str]) -> Scene:
@@ -133,21 +133,39 @@ class Scene:
         settings = (factors.tolist(), name, label, float(reflectivity), float(retroreflection))
         number = self._scene.add(native(mesh), rows, *settings)
         self._added.append((mesh, settings))
-        self._poses[number] = rows
+        self._poses[number] = np.array(rows)
         return number
 
     def move(
-        self, instance: int, pose: ArrayLike | None = None, *, position: ArrayLike | None = None
+        self,
+        instance: int | Sequence[int],
+        pose: ArrayLike | None = None,
+        *,
+        position: ArrayLike | None = None,
     ) -> None:
-        """Move the instance with this number to a pose or a position, as in `add`.
+        """Move the instance with this number to a pose or a position, as in `add`, or many to their poses.
+
+        Args:
+            instance: The number of an instance, or those of k instances. All of them move, or none.
+            pose: The pose of the instance, [4, 4]; or their poses, [k, 4, 4], or [k, 7]: x, y, z and a
+                quaternion w, x, y, z.
+            position: The position of the one instance, metres, instead of `pose`.
 
         Raises:
-            Error: There is no such instance; the pose has a wrong shape or is not a rotation.
+            Error: There is no such instance; the poses have a wrong shape or are not rotations.
         """
+        if np.ndim(instance) > 0:
+            numbers = [whole("instance", number, 0, 2**32 - 1) for number in instance]  # type: ignore[union-attr]
+            if pose is None or position is not None:
+                raise _edgepuck.Error("expected the poses of all instances, and no position")
+            _, poses = _rows("pose", pose, (len(numbers),))
+            self._scene.move_all(numbers, poses)
+            self._poses.update(zip(numbers, poses.copy(), strict=True))
+            return
         rows = _pose(pose, position)
         number = whole("instance", instance, 0, 2**32 - 1)
         self._scene.move(number, rows)
-        self._poses[number] = rows
+        self._poses[number] = np.array(rows)
 
     def scan(
         self,
@@ -205,21 +223,25 @@ class Scene:
         poses: ArrayLike,
         *,
         move: tuple[Sequence[int], ArrayLike] | None = None,
+        noise: float = 0.0,
+        dropout: float = 0.0,
+        effects: Mapping[str, Any] | None = None,
         seed: int | None = None,
     ) -> Batch:
         """The ranges of a sensor's beams from many poses, as learning loops want them.
 
         Each pose sees a world of its own, in which the instances of `move` stand elsewhere. Nothing is
-        rebuilt, and the scene itself does not change. A row has the ranges of `scan` at its pose and, where
-        the scene's file has random effects, with its seed of `seeds`.
+        rebuilt, and the scene itself does not change. A row has the ranges of `scan` at its pose, with the
+        same effects and with its seed of `seeds`.
 
         Args:
             sensor: The sensor.
             poses: The poses of the sensor, [n, 4, 4], or [n, 7]: x, y, z and a quaternion w, x, y, z.
-            seed: The seed of the batch; by default that of the scene's file, or 0. Give each step of a
-                loop its own.
             move: Numbers of k instances, and their poses for each pose of the sensor, [n, k, 4, 4] or
                 [n, k, 7].
+            noise: As `dropout` and `effects`, those of `scan`.
+            seed: The seed of the batch; by default that of the scene's file, or 0. Give each step of a
+                loop its own.
 
         Raises:
             Error: A pose has a wrong shape or is not a rotation; there is no such instance.
@@ -240,8 +262,11 @@ class Scene:
         if move is not None:
             numbers = [whole("move", number, 0, 2**32 - 1) for number in move[0]]
             _, moved = _rows("move", move[1], (n, len(numbers)))
+        encoded = _scanning.encoded_effects(noise, dropout, effects)
         key = None if seed is None else seed_of(seed)
-        ranges, objects, seeds = self._scene.cast(sensor_of(sensor), rows, numbers, moved, key)
+        ranges, objects, seeds = self._scene.cast(
+            sensor_of(sensor), rows, numbers, moved, encoded, key
+        )
         # The largest number, of beams without a return, is -1.
         return Batch(ranges, objects.view(np.int32), seeds, sensor)
 
@@ -287,15 +312,17 @@ def scan_scene(file: str | os.PathLike[str], *, adapter: str = "cpu") -> dict[st
 
 
 def _remade(
-    file: str | None, added: list[tuple[Mesh, tuple[Any, ...]]], poses: dict[int, list[float]]
+    file: str | None,
+    added: list[tuple[Mesh, tuple[Any, ...]]],
+    poses: dict[int, NDArray[np.float64]],
 ) -> Scene:
     """The scene that was pickled."""
     scene = Scene() if file is None else Scene.read(file)
     scene._added, scene._poses = added, poses
     for mesh, settings in added:
         scene._scene.add(native(mesh), np.eye(4).ravel().tolist(), *settings)
-    for number, rows in poses.items():
-        scene._scene.move(number, rows)
+    for number, pose in poses.items():
+        scene._scene.move_all([number], pose[None])
     return scene
 
 

@@ -12,7 +12,7 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use sim_gpu::internals::scene::check_object;
-use sim_gpu::{Moves, Pose};
+use sim_gpu::{InstanceId, Moves, Pose};
 use std::path::PathBuf;
 use std::sync::Mutex;
 
@@ -83,11 +83,17 @@ impl Scene {
     #[pyo3(name = "move")]
     fn move_to(&self, number: usize, pose: [f64; 16]) -> PyResult<()> {
         let (pose, mut scene) = (pose_of(&pose)?, lock(&self.scene));
-        let n = scene.instances().len();
-        let missing =
-            || raised(format!("expected the number of one of {n} instances, found {number}"));
-        let id = scene.ids().nth(number).ok_or_else(missing)?;
+        let id = ids_of(&scene, &[number])?[0];
         scene[id].pose = pose;
+        Ok(())
+    }
+
+    /// Move the instances of these numbers, all or none.
+    fn move_all(&self, numbers: Vec<usize>, poses: PyReadonlyArray2<'_, f64>) -> PyResult<()> {
+        let (poses, mut scene) = (poses_of("pose", &poses)?, lock(&self.scene));
+        for (id, pose) in ids_of(&scene, &numbers)?.into_iter().zip(poses) {
+            scene[id].pose = pose;
+        }
         Ok(())
     }
 
@@ -103,13 +109,7 @@ impl Scene {
     ) -> PyResult<Bound<'py, PyDict>> {
         let pose = place.pose()?;
         let (caster, mut scene) = (sensor.caster.open()?, lock(&self.scene).clone());
-        if let Some(effects) = effects {
-            scene.effects = serde_json::from_str(effects).map_err(|error| {
-                // The place in the text of JSON says nothing to the user.
-                let place = format!(" at line {} column {}", error.line(), error.column());
-                raised(format!("effects: {}", error.to_string().replace(&place, "")))
-            })?;
-        }
+        set_effects(&mut scene, effects)?;
         if let Some(names) = attributes {
             let attributes = names.iter().map(|name| name.parse::<Attribute>());
             scene.attributes = attributes.collect::<Result<_, _>>().map_err(raised)?;
@@ -122,6 +122,7 @@ impl Scene {
 
     /// The ranges and objects of the sensor's beams from each pose, `[n, n_beams]`; `moved` has the poses
     /// of the instances of these `numbers` for each pose.
+    #[expect(clippy::too_many_arguments, reason = "Python's side has names for them")]
     fn cast<'py>(
         &self,
         py: Python<'py>,
@@ -129,17 +130,13 @@ impl Scene {
         poses: PyReadonlyArray2<'py, f64>,
         numbers: Vec<usize>,
         moved: PyReadonlyArray2<'py, f64>,
+        effects: Option<&str>,
         seed: Option<u64>,
     ) -> PyResult<CastArrays<'py>> {
         let mut scene = lock(&self.scene).clone();
+        set_effects(&mut scene, effects)?;
         scene.seed = seed.unwrap_or(scene.seed);
-        let ids: Vec<_> = scene.ids().collect();
-        let missing = |number: &usize| {
-            let n = ids.len();
-            raised(format!("expected the number of one of {n} instances, found {number}"))
-        };
-        let id = |number: &usize| ids.get(*number).copied().ok_or_else(|| missing(number));
-        let instances = numbers.iter().map(id).collect::<PyResult<Vec<_>>>()?;
+        let instances = ids_of(&scene, &numbers)?;
         let (poses, moved) = (poses_of("poses", &poses)?, poses_of("move", &moved)?);
         sensor.sensor.rays(&scene.effects).map_err(raised)?;
         let moves = Moves { instances: &instances, poses: &moved };
@@ -161,6 +158,29 @@ impl Scene {
             .map(|(scan, mounted)| Ok((mounted.name.clone(), arrays::scan(py, scan.points)?)));
         columns.collect()
     }
+}
+
+/// Gives the scene these effects, as JSON, in place of its own.
+fn set_effects(scene: &mut sim_gpu::Scene, effects: Option<&str>) -> PyResult<()> {
+    if let Some(effects) = effects {
+        scene.effects = serde_json::from_str(effects).map_err(|error| {
+            // The place in the text of JSON says nothing to the user.
+            let place = format!(" at line {} column {}", error.line(), error.column());
+            raised(format!("effects: {}", error.to_string().replace(&place, "")))
+        })?;
+    }
+    Ok(())
+}
+
+/// The handles of the instances of these numbers.
+fn ids_of(scene: &sim_gpu::Scene, numbers: &[usize]) -> PyResult<Vec<InstanceId>> {
+    let ids: Vec<_> = scene.ids().collect();
+    let id = |&number: &usize| {
+        let n = ids.len();
+        let missing = || format!("expected the number of one of {n} instances, found {number}");
+        ids.get(number).copied().ok_or_else(|| raised(missing()))
+    };
+    numbers.iter().map(id).collect()
 }
 
 /// Where a sensor stands.
