@@ -35,8 +35,8 @@ def model_of(geoms: str, shrunk: float = 0.0) -> tuple:
     model = mujoco.MjModel.from_xml_string(text)
     rows, columns = np.indices((30, 40))
     model.hfield_data[:] = (0.5 + 0.5 * np.sin(rows / 3) * np.cos(columns / 4)).ravel()
-    for geom in range(1, model.ngeom):
-        kind, size = model.geom_type[geom], model.geom_size[geom]
+    for geom in np.flatnonzero(model.geom_bodyid == 0):
+        kind, size = mujoco.mjtGeom(model.geom_type[geom]), model.geom_size[geom]
         if kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID:
             size *= 1 - shrunk / size.max()
         elif kind in (mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_CYLINDER):
@@ -59,23 +59,21 @@ def rays(model, data, sensor: ep.Sensor = SENSOR) -> tuple[np.ndarray, np.ndarra
     return np.where(geoms == no_return, np.inf, ranges), geoms
 
 
-def compare(geoms: str, exact: float | None = None) -> None:
+def compare(geoms: str, is_exact: bool = False) -> None:
     model, data = model_of(geoms)
     lidar = Lidar(model, "lidar", SENSOR, see_self=False, tolerance=TOLERANCE)
     found = lidar.cast(data)
     nearest, hit = rays(model, data)
     farthest, _ = rays(*model_of(geoms, shrunk=TOLERANCE))
-    ranges = found.ranges[0].astype(np.float64)
-    # Ours are rounded to f32, and MuJoCo's meshes have vertices in f32.
-    slack = 1e-5
-    assert np.isfinite(nearest).sum() > 200
-    # A ray through an edge may pass on either side of it.
-    at_edges = (ranges < nearest - slack) | (ranges > farthest + slack)
-    assert at_edges.sum() <= 2, (at_edges.sum(), (ranges - nearest)[at_edges])
-    both = np.isfinite(ranges) & np.isfinite(nearest) & ~at_edges
-    if exact is not None:
-        np.testing.assert_array_less(np.abs(ranges - nearest)[both], exact)
-        assert (lidar.geoms[found.object[0][both]] == hit[both]).mean() > 0.999
+    ranges, is_near = found.ranges[0].astype(np.float64), nearest < 100
+    assert is_near.sum() > 10 and not np.isfinite(ranges[np.isinf(nearest)]).any()
+    # Ours are rounded to f32, and MuJoCo's meshes and height fields are in f32. One ray may pass an edge on its other side.
+    is_off = is_near & ((ranges < nearest - 1e-5) | (ranges > farthest + 1e-5))
+    assert is_off.sum() <= 1, (ranges - nearest)[is_off]
+    if is_exact:
+        hits = is_near & ~is_off
+        np.testing.assert_allclose(ranges[hits], nearest[hits], rtol=0, atol=1e-5)
+        assert (lidar.geoms[found.object[0][hits]] == hit[hits]).all()
 
 
 @pytest.mark.parametrize(
@@ -90,7 +88,7 @@ def compare(geoms: str, exact: float | None = None) -> None:
     ],
 )
 def test_flat_faces_are_where_mujoco_has_them(geom: str) -> None:
-    compare(f"<geom {geom}/>", exact=1e-5)
+    compare(f"<geom {geom}/>", is_exact=True)
 
 
 @pytest.mark.parametrize(
@@ -145,7 +143,8 @@ def test_a_state_in_a_batch_is_the_state_alone() -> None:
     np.testing.assert_array_equal(lidar.ranges(states), batch)
     for state, ranges in zip(states, batch, strict=True):
         nearest, _ = rays(model, state)
-        assert np.nanmedian(np.abs(np.where(np.isfinite(nearest), ranges - nearest, np.nan))) < 1e-6
+        hits = np.isfinite(ranges) & np.isfinite(nearest)
+        assert np.median(np.abs(ranges[hits] - nearest[hits])) < 1e-6
         np.testing.assert_array_equal(lidar.ranges(state), ranges)
         scan = lidar.scan(state, attributes=["range", "beam", "object"])
         np.testing.assert_array_equal(ranges[scan.beam], scan.range)
@@ -153,7 +152,7 @@ def test_a_state_in_a_batch_is_the_state_alone() -> None:
     # What no joint moves can move all the same.
     states[0].mocap_pos[0] = [0, -1, 0]
     mujoco.mj_kinematics(model, states[0])
-    assert lidar.ranges(states[0]).min() < batch[0].min() - 0.3
+    assert lidar.ranges(states[0]).min() < batch[0].min() - 0.1
 
 
 def test_the_sensor_sees_what_it_is_told_to_see() -> None:
@@ -163,7 +162,8 @@ def test_the_sensor_sees_what_it_is_told_to_see() -> None:
     assert seen(see_self=False) == {"floor", "visual", "ball", "hand"}
     assert seen(groups=[2]) == {"visual"}
     scan = Lidar(model, "lidar", SENSOR).scan(data)
-    assert set(scan.range.round(4)) == {np.float32(0.05)}, "the sensor stands in the sphere of its own body"
+    # The sensor stands in the sphere of its own body.
+    assert 0.049 <= scan.range.min() and scan.range.max() <= np.float32(0.05)
 
 
 def test_each_call_has_its_own_noise_and_a_seed_repeats_it() -> None:
@@ -172,11 +172,11 @@ def test_each_call_has_its_own_noise_and_a_seed_repeats_it() -> None:
     one, two = first.ranges(data), first.ranges(data)
     assert not np.array_equal(one, two)
     np.testing.assert_array_equal(again.ranges(data), one)
-    np.testing.assert_array_equal(again.scan(data).range, first.__class__(model, "lidar", SENSOR, noise=0.01, see_self=False).scan(data, seed=ep._edgepuck.seed_of_epoch(1, 2)).range)
+    np.testing.assert_array_equal(first.scan(data, seed=9).range, other.scan(data, seed=9).range)
     assert not np.array_equal(other.ranges(data), one)
     clean = Lidar(model, "lidar", SENSOR, see_self=False).ranges(data)
     both = np.isfinite(clean) & np.isfinite(one)
-    assert 0.009 < np.std((one - clean)[both]) < 0.011
+    assert 0.009 < np.std(one[both] - clean[both]) < 0.011
 
 
 def test_what_cannot_be_seen_is_named_once() -> None:
