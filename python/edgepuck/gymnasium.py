@@ -47,6 +47,8 @@ class LidarObservation(gymnasium.ObservationWrapper[Any, Any, Any]):
             raise _edgepuck.Error(
                 f"env: expected an environment with MuJoCo's `data`, found {env.unwrapped}"
             )
+        if not isinstance(lidar, Lidar):
+            raise _edgepuck.Error(f"expected an edgepuck.mujoco.Lidar, found {type(lidar).__name__}")
         if not 0 < max_range < np.inf:
             raise _edgepuck.Error(f"max_range: expected metres above 0, found {max_range}")
         space = env.observation_space

@@ -204,6 +204,10 @@ class Lidar:
                 f"data: expected that of a model with {self._model.ngeom} geoms and "
                 f"{self._model.nsite} sites, found {len(data.geom_xpos)} and {len(data.site_xpos)}"
             )
+        if not data.site_xmat[self._site].any():
+            raise _edgepuck.Error(
+                "data: expected the poses of its geoms, found none: call `mujoco.mj_forward(model, data)` first"
+            )
         positions = np.vstack([data.site_xpos[self._site], data.geom_xpos[self.geoms]])
         return positions, np.vstack([data.site_xmat[self._site], data.geom_xmat[self.geoms]])
 
