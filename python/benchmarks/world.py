@@ -28,6 +28,8 @@ import numpy as np
 import edgepuck as ep
 
 THREADS = 2
+# The pose of a sensor, 1 m high: x, y, z and a quaternion w, x, y, z.
+AT = np.array([0.0, 0, 1, 1, 0, 0, 0])
 HAS = {name: importlib.util.find_spec(name) is not None for name in ("mujoco", "mujoco_lidar", "open3d")}
 Cast = Callable[[int], object]
 
@@ -71,30 +73,26 @@ def uniform(azimuths: int, elevations: int) -> ep.Sensor:
         return ep.Sensor(profile)
 
 
-def poses(rng: np.random.Generator, *shape: int, least: float = 2.0, most: float = 15.0) -> np.ndarray:
-    """Poses [..., 4, 4], turned at random, in a ring around the origin, 0.3 to 1.7 m high."""
+def around(rng: np.random.Generator, *shape: int, most: float = 15.0) -> np.ndarray:
+    """Poses [..., 7], turned at random, 2 m to `most` metres away from the origin and 0.3 to 1.7 m high."""
+    away, angle = rng.uniform(2, most, shape), rng.uniform(0, 2 * np.pi, shape)
+    at = np.stack([away * np.cos(angle), away * np.sin(angle), rng.uniform(0.3, 1.7, shape)], -1)
     quaternions = rng.normal(size=(*shape, 4))
-    w, x, y, z = np.moveaxis(quaternions / np.linalg.norm(quaternions, axis=-1, keepdims=True), -1, 0)
-    found = np.zeros((*shape, 4, 4))
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    found[..., :3, :3] = np.moveaxis(np.array(rows), (0, 1), (-2, -1))
-    away, angle = rng.uniform(least, most, shape), rng.uniform(0, 2 * np.pi, shape)
-    found[..., 0, 3], found[..., 1, 3] = away * np.cos(angle), away * np.sin(angle)
-    found[..., 2, 3], found[..., 3, 3] = rng.uniform(0.3, 1.7, shape), 1
+    return np.concatenate([at, quaternions / np.linalg.norm(quaternions, axis=-1, keepdims=True)], -1)
+
+
+def level(rng: np.random.Generator, n: int, most: float, height: float) -> np.ndarray:
+    """Level poses [n, 7] at this height, within a square of twice `most` metres."""
+    half, found = rng.uniform(0, np.pi, n), np.zeros((n, 7))
+    found[:, :2], found[:, 2] = rng.uniform(-most, most, (n, 2)), height
+    found[:, 3], found[:, 6] = np.cos(half), np.sin(half)
     return found
 
 
-def level(rng: np.random.Generator, n: int, most: float) -> np.ndarray:
-    """Level poses within a square of twice `most` metres, 1 m high."""
-    angle, found = rng.uniform(0, 2 * np.pi, n), np.tile(np.eye(4), (n, 1, 1))
-    found[:, 0, 0], found[:, 0, 1] = np.cos(angle), -np.sin(angle)
-    found[:, 1, 0], found[:, 1, 1] = np.sin(angle), np.cos(angle)
-    found[:, :2, 3], found[:, 2, 3] = rng.uniform(-most, most, (n, 2)), 1
-    return found
+def turned(vectors: np.ndarray, pose: np.ndarray) -> np.ndarray:
+    """Vectors [n, 3], turned by the quaternion of a pose."""
+    across = 2 * np.cross(pose[4:], vectors)
+    return vectors + pose[3] * across + np.cross(pose[4:], across)
 
 
 class Muj:
@@ -104,7 +102,12 @@ class Muj:
         import mujoco
 
         self.mujoco, spec = mujoco, mujoco.MjSpec()
-        spec.add_mesh(name="mesh", uservert=mesh[0].ravel(), userface=mesh[1].ravel(), inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL)
+        spec.add_mesh(
+            name="mesh",
+            uservert=mesh[0].ravel(),
+            userface=mesh[1].ravel(),
+            inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
+        )
         spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[100, 100, 1])
         spec.worldbody.add_site(name="lidar", pos=[0, 0, 1])
         for _ in range(n):
@@ -113,9 +116,7 @@ class Muj:
         self.data = mujoco.MjData(self.model)
 
     def move(self, poses: np.ndarray) -> None:
-        for i, pose in enumerate(poses):
-            self.data.mocap_pos[i] = pose[:3, 3]
-            self.mujoco.mju_mat2Quat(self.data.mocap_quat[i], pose[:3, :3].ravel())
+        self.data.mocap_pos[:], self.data.mocap_quat[:] = poses[:, :3], poses[:, 3:]
         self.mujoco.mj_kinematics(self.model, self.data)
 
     def cast(self, point: np.ndarray, directions: np.ndarray) -> np.ndarray:
@@ -127,7 +128,9 @@ class Muj:
 
 
 def floor() -> tuple[np.ndarray, np.ndarray]:
-    return np.array([[-100.0, -100, 0], [100, -100, 0], [100, 100, 0], [-100, 100, 0]]), np.array([[0, 1, 2], [0, 2, 3]])
+    return np.array([[-100.0, -100, 0], [100, -100, 0], [100, 100, 0], [-100, 100, 0]]), np.array(
+        [[0, 1, 2], [0, 2, 3]]
+    )
 
 
 def open3d_scene(meshes: list[tuple[np.ndarray, np.ndarray]]):
@@ -147,26 +150,24 @@ def open3d_cast(scene, rays: np.ndarray, threads: int) -> np.ndarray:
 
 def rays_from(sensors: np.ndarray, directions: np.ndarray) -> np.ndarray:
     """Rays as Open3D takes them, [n * n_beams, 6]."""
-    turned = np.einsum("nij,bj->nbi", sensors[:, :3, :3], directions)
-    origins = np.broadcast_to(sensors[:, None, :3, 3], turned.shape)
-    return np.concatenate([origins, turned], -1).astype(np.float32).reshape(-1, 6)
+    origins = np.repeat(sensors[:, :3], len(directions), axis=0)
+    return np.hstack([origins, np.vstack([turned(directions, pose) for pose in sensors])]).astype(np.float32)
 
 
 def moved(mesh: tuple[np.ndarray, np.ndarray], pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    return mesh[0] @ pose[:3, :3].T + pose[:3, 3], mesh[1]
+    return turned(mesh[0], pose) + pose[:3], mesh[1]
 
 
 def row_tori(rounds: int, share: float) -> None:
     n, sensor, mesh = 20, ep.Sensor("vlp32c"), torus(100, 50)
-    steps, at = poses(np.random.default_rng(2), rounds + 1, n), np.eye(4)
-    at[2, 3] = 1
+    steps = around(np.random.default_rng(2), rounds + 1, n)
     scene, shape = ep.Scene(), ep.Mesh(*mesh, normalize="none")
     scene.add(ep.Mesh(*floor(), normalize="none", units="m"))
     tori = [scene.add(shape) for _ in range(n)]
 
     def edgepuck(i: int) -> np.ndarray:
         scene.move(tori, steps[i])
-        return scene.cast(sensor, at[None]).ranges[0]
+        return scene.cast(sensor, AT[None]).ranges[0]
 
     casts: dict[str, Cast] = {"edgepuck": edgepuck}
     if HAS["mujoco"]:
@@ -174,7 +175,7 @@ def row_tori(rounds: int, share: float) -> None:
 
         def mujoco(i: int) -> np.ndarray:
             world.move(steps[i])
-            return world.cast(at[:3, 3], sensor.directions)
+            return world.cast(AT[:3], sensor.directions)
 
         casts["mj_multiRay"] = mujoco
     if HAS["mujoco_lidar"]:
@@ -190,7 +191,7 @@ def row_tori(rounds: int, share: float) -> None:
 
         casts["MuJoCo-LiDAR, CPU"] = mujoco_lidar
     if HAS["open3d"]:
-        rays = rays_from(at[None], sensor.directions)
+        rays = rays_from(AT[None], sensor.directions)
         build = lambda i: open3d_scene([floor(), *(moved(mesh, pose) for pose in steps[i])])  # noqa: E731
         built = build(0)
         open3d_cast(built, rays[:9], THREADS)
@@ -201,8 +202,7 @@ def row_tori(rounds: int, share: float) -> None:
 
 def row_poses(rounds: int, share: float) -> None:
     n, sensor, mesh = int(4096 * share), uniform(359, 1), room(65)
-    sensors, scene = level(np.random.default_rng(3), n, 8.0), ep.Scene()
-    sensors[:, 2, 3] = 0
+    sensors, scene = level(np.random.default_rng(3), n, 8.0, 0.0), ep.Scene()
     scene.add(ep.Mesh(*mesh, normalize="none", units="m"))
     casts: dict[str, Cast] = {"edgepuck": lambda i: scene.cast(sensor, sensors).ranges}
     if HAS["open3d"]:
@@ -216,7 +216,7 @@ def row_environments(rounds: int, share: float) -> None:
     rng, scene, shape = np.random.default_rng(4), ep.Scene(), ep.Mesh(*mesh, normalize="none")
     scene.add(ep.Mesh(*floor(), normalize="none", units="m"))
     moving = [scene.add(shape) for _ in range(n_moving)]
-    sensors, of_each = level(rng, n, 1.0), poses(rng, n, n_moving)
+    sensors, of_each = level(rng, n, 1.0, 1.0), around(rng, n, n_moving)
     n_rays = len(sensor.directions)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     batch = scene.cast(sensor, sensors, move=(moving, of_each))
@@ -230,18 +230,20 @@ def row_environments(rounds: int, share: float) -> None:
             found = np.empty((n, n_rays))
             for e in range(n):
                 world.move(of_each[e])
-                found[e] = world.cast(sensors[e, :3, 3], sensor.directions @ sensors[e, :3, :3].T)
+                found[e] = world.cast(sensors[e, :3], turned(sensor.directions, sensors[e]))
             return found
 
         casts["mj_multiRay"] = mujoco
     measure(f"environments: {n} of {n_rays} rays and {n_moving} moving objects", casts, n * n_rays, rounds)
-    print(f"  the first batch raised the peak of the memory by {grown / n:.0f} bytes an environment; {results / n:.0f} are results")
+    print(
+        f"  the first batch raised the peak of the memory by {grown / n:.0f} bytes an environment; {results / n:.0f} are results"
+    )
 
 
 def row_move(rounds: int, share: float) -> None:
     sensor, shape, n = ep.Sensor("vlp32c"), ep.Mesh(*torus(20, 10), normalize="none"), 100
-    steps, scene, at = poses(np.random.default_rng(5), rounds + 1, n, most=40.0), ep.Scene(), np.eye(4)
-    at[2, 3] = 1
+    steps, scene, at = around(np.random.default_rng(5), rounds + 1, n, most=40.0), ep.Scene(), np.eye(4)
+    at[:3, 3] = AT[:3]
     scene.add(ep.Mesh(*floor(), normalize="none", units="m"))
     objects = [scene.add(shape) for _ in range(n)]
 

@@ -13,7 +13,9 @@ from .mujoco import Lidar
 try:
     import gymnasium
 except ImportError as cause:
-    raise ImportError("edgepuck.gymnasium needs Gymnasium: pip install 'edgepuck[gymnasium]'") from cause
+    raise ImportError(
+        "edgepuck.gymnasium needs Gymnasium: pip install 'edgepuck[gymnasium]'"
+    ) from cause
 
 
 class LidarObservation(gymnasium.ObservationWrapper[Any, Any, Any]):
@@ -48,12 +50,16 @@ class LidarObservation(gymnasium.ObservationWrapper[Any, Any, Any]):
                 f"env: expected an environment with MuJoCo's `data`, found {env.unwrapped}"
             )
         if not isinstance(lidar, Lidar):
-            raise _edgepuck.Error(f"expected an edgepuck.mujoco.Lidar, found {type(lidar).__name__}")
+            raise _edgepuck.Error(
+                f"expected an edgepuck.mujoco.Lidar, found {type(lidar).__name__}"
+            )
         if not 0 < max_range < np.inf:
             raise _edgepuck.Error(f"max_range: expected metres above 0, found {max_range}")
         space = env.observation_space
         self._is_dict = isinstance(space, gymnasium.spaces.Dict)
-        spaces = dict(space.spaces) if isinstance(space, gymnasium.spaces.Dict) else {"state": space}
+        spaces = (
+            dict(space.spaces) if isinstance(space, gymnasium.spaces.Dict) else {"state": space}
+        )
         if key in spaces:
             raise _edgepuck.Error(f"key: expected one that observations lack, found {key!r}")
         n_beams = len(lidar.sensor.directions)

@@ -360,4 +360,6 @@ def _named(model: mujoco.MjModel, kind: str, number: int) -> str:
     what = f"{kind} {name!r}" if name else f"{kind} {number}"
     if kind != "geom":
         return what
-    return f"{what} ({mujoco.mjtGeom(model.geom_type[number]).name.removeprefix('mjGEOM_').lower()})"
+    return (
+        f"{what} ({mujoco.mjtGeom(model.geom_type[number]).name.removeprefix('mjGEOM_').lower()})"
+    )

@@ -116,7 +116,10 @@ def test_64_environments_share_a_lidar() -> None:
         (lambda lidar: LidarObservation(gymnasium.make("CartPole-v1"), lidar, max_range=8), "MuJoCo's `data`"),
         (lambda _: LidarObservation(Cart(), "vlp16", max_range=8), "expected an edgepuck.mujoco.Lidar, found str"),
         (lambda lidar: LidarObservation(Cart(), lidar, max_range=np.inf), "max_range: expected metres above 0"),
-        (lambda lidar: LidarObservation(Cart(), lidar, max_range=8, key="state"), "expected one that observations lack"),
+        (
+            lambda lidar: LidarObservation(Cart(), lidar, max_range=8, key="state"),
+            "expected one that observations lack",
+        ),
     ],
 )
 def test_what_does_not_fit_is_named(make, message: str) -> None:

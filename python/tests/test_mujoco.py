@@ -197,7 +197,10 @@ def test_what_cannot_be_seen_is_named_once() -> None:
         (lambda model, _: Lidar(model, groups=[5]), "expected geoms that the LiDAR can see, found none"),
         (lambda model, _: Lidar(model, tolerance=0), "tolerance: expected metres above 0, found 0"),
         (lambda model, _: Lidar(model).ranges(np.zeros(7)), "qpos: expected shape [n, 14], found [7]"),
-        (lambda model, _: Lidar(model).ranges(mujoco.MjData(model)), "found none: call `mujoco.mj_forward(model, data)`"),
+        (
+            lambda model, _: Lidar(model).ranges(mujoco.MjData(model)),
+            "found none: call `mujoco.mj_forward(model, data)`",
+        ),
         (lambda model, _: Lidar(model).scan(model_of("")[1]), "data: expected that of a model with 6 geoms"),
     ],
 )
