@@ -34,7 +34,8 @@ class Lidar:
     Each geom becomes an instance of a `Scene` when the object is made; later changes of sizes and meshes
     are not seen, those of places are. Boxes, planes, meshes and height fields are exact. Spheres,
     capsules, cylinders and ellipsoids become polyhedra inside of them. Like MuJoCo's own rays, the
-    sensor does not see geoms whose alpha is 0. Unlike them, it sees planes from below as well.
+    sensor does not see geoms whose alpha is 0. Unlike them, it sees planes from below as well. A `Lidar`
+    serves one thread at a time.
 
     Args:
         model: The model.

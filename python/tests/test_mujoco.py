@@ -6,6 +6,7 @@ MuJoCo's range is at most ours, and ours at most MuJoCo's in the model with smal
 along the beam at any incidence.
 """
 
+import pickle
 import subprocess
 import sys
 
@@ -149,6 +150,8 @@ def test_a_state_in_a_batch_is_the_state_alone() -> None:
         scan = lidar.scan(state, attributes=["range", "beam", "object"])
         np.testing.assert_array_equal(ranges[scan.beam], scan.range)
     assert len({ranges.tobytes() for ranges in batch}) == 3
+    other = Lidar(model, "lidar", "vlp16")
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(other)).ranges(qpos), other.ranges(qpos))
     # What no joint moves can move all the same.
     states[0].mocap_pos[0] = [0, -1, 0]
     mujoco.mj_kinematics(model, states[0])
