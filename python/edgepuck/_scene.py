@@ -39,7 +39,7 @@ class Scene:
         self._scene = _edgepuck.Scene()
         self._file: str | None = None
         self._added: list[tuple[Mesh, tuple[Any, ...]]] = []
-        self._poses: dict[int, NDArray[np.float64]] = {}
+        self._poses: dict[int, list[float]] = {}
 
     @classmethod
     def read(cls, file: str | os.PathLike[str]) -> Scene:
@@ -133,7 +133,7 @@ class Scene:
         settings = (factors.tolist(), name, label, float(reflectivity), float(retroreflection))
         number = self._scene.add(native(mesh), rows, *settings)
         self._added.append((mesh, settings))
-        self._poses[number] = np.array(rows)
+        self._poses[number] = rows
         return number
 
     def move(
@@ -160,12 +160,12 @@ class Scene:
                 raise _edgepuck.Error("expected the poses of all instances, and no position")
             _, poses = _rows("pose", pose, (len(numbers),))
             self._scene.move_all(numbers, poses)
-            self._poses.update(zip(numbers, poses.copy(), strict=True))
+            self._poses.update(zip(numbers, poses.tolist(), strict=True))
             return
         rows = _pose(pose, position)
         number = whole("instance", instance, 0, 2**32 - 1)
         self._scene.move(number, rows)
-        self._poses[number] = np.array(rows)
+        self._poses[number] = rows
 
     def scan(
         self,
@@ -312,17 +312,15 @@ def scan_scene(file: str | os.PathLike[str], *, adapter: str = "cpu") -> dict[st
 
 
 def _remade(
-    file: str | None,
-    added: list[tuple[Mesh, tuple[Any, ...]]],
-    poses: dict[int, NDArray[np.float64]],
+    file: str | None, added: list[tuple[Mesh, tuple[Any, ...]]], poses: dict[int, list[float]]
 ) -> Scene:
     """The scene that was pickled."""
     scene = Scene() if file is None else Scene.read(file)
     scene._added, scene._poses = added, poses
     for mesh, settings in added:
         scene._scene.add(native(mesh), np.eye(4).ravel().tolist(), *settings)
-    for number, pose in poses.items():
-        scene._scene.move_all([number], pose[None])
+    for number, rows in poses.items():
+        scene._scene.move_all([number], np.array([rows]))
     return scene
 
 

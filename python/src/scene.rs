@@ -12,7 +12,7 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use sim_gpu::internals::scene::check_object;
-use sim_gpu::{InstanceId, Moves, Pose};
+use sim_gpu::{Moves, Pose};
 use std::path::PathBuf;
 use std::sync::Mutex;
 
@@ -173,7 +173,7 @@ fn set_effects(scene: &mut sim_gpu::Scene, effects: Option<&str>) -> PyResult<()
 }
 
 /// The handles of the instances of these numbers.
-fn ids_of(scene: &sim_gpu::Scene, numbers: &[usize]) -> PyResult<Vec<InstanceId>> {
+fn ids_of(scene: &sim_gpu::Scene, numbers: &[usize]) -> PyResult<Vec<sim_gpu::InstanceId>> {
     let ids: Vec<_> = scene.ids().collect();
     let id = |&number: &usize| {
         let n = ids.len();
