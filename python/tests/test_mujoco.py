@@ -22,9 +22,7 @@ from edgepuck.mujoco import Lidar  # noqa: E402
 TOLERANCE = 1e-3
 SENSOR = all_around()
 TETRA = "0 0 0 1 0 0 0 1 0 0 0 1"
-SIZES = {
-    "box": 3, "sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3,
-}  # fmt: skip
+SIZES = {"box": 3, "sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3}
 
 
 def model_of(geoms: str, shrunk: float = 0.0) -> tuple:
@@ -47,17 +45,14 @@ def model_of(geoms: str, shrunk: float = 0.0) -> tuple:
     return model, data
 
 
-def rays(model, data, sensor: ep.Sensor = SENSOR) -> tuple[np.ndarray, np.ndarray]:
+def rays(model, data) -> tuple[np.ndarray, np.ndarray]:
     """The ranges and geoms of MuJoCo's own rays, without the body of the site."""
-    site = model.site("lidar").id
-    directions = sensor.directions @ data.site_xmat[site].reshape(3, 3).T
-    n = len(directions)
-    geoms, ranges = np.zeros(n, np.int32), np.zeros(n)
-    point, no_return = data.site_xpos[site], -1
-    mujoco.mj_multiRay(
-        model, data, point, directions.ravel(), None, 1, int(model.site_bodyid[site]), geoms, ranges, None, n, 1e9
-    )
-    return np.where(geoms == no_return, np.inf, ranges), geoms
+    site, n = model.site("lidar").id, len(SENSOR.directions)
+    directions = SENSOR.directions @ data.site_xmat[site].reshape(3, 3).T
+    geoms, ranges, body = np.zeros(n, np.int32), np.zeros(n), int(model.site_bodyid[site])
+    point, vectors = data.site_xpos[site], directions.ravel()
+    mujoco.mj_multiRay(model, data, point, vectors, None, 1, body, geoms, ranges, None, n, 1e9)
+    return np.where(geoms < 0, np.inf, ranges), geoms
 
 
 def compare(geoms: str, is_exact: bool = False) -> None:
@@ -68,7 +63,8 @@ def compare(geoms: str, is_exact: bool = False) -> None:
     farthest, _ = rays(*model_of(geoms, shrunk=TOLERANCE))
     ranges, is_near = found.ranges[0].astype(np.float64), nearest < 100
     assert is_near.sum() > 10 and not np.isfinite(ranges[np.isinf(nearest)]).any()
-    # Ours are rounded to f32, and MuJoCo's meshes and height fields are in f32. One ray may pass an edge on its other side.
+    # Ours are rounded to f32, and MuJoCo's meshes and height fields are in f32. One ray may pass an edge on
+    # its other side.
     is_off = is_near & ((ranges < nearest - 1e-5) | (ranges > farthest + 1e-5))
     assert is_off.sum() <= 1, (ranges - nearest)[is_off]
     if is_exact:
