@@ -18,6 +18,7 @@ from ._edgepuck import Error, adapters, set_num_threads
 from ._classifier import Classifier, Prediction
 from ._dataset import Dataset
 from ._detect import Detection, detect
+from ._heightfield import heightfield
 from ._mesh import Mesh, box
 from ._scan import Scan
 from ._scene import Batch, Scene, scan_scene
@@ -43,6 +44,7 @@ __all__ = [
     "adapters",
     "box",
     "detect",
+    "heightfield",
     "scan_scene",
     "segment",
     "set_num_threads",

@@ -15,6 +15,7 @@ __all__ = [
     "adapters",
     "detect",
     "main",
+    "read_grey16",
     "read_points",
     "run",
     "save_scan",
@@ -77,6 +78,7 @@ class Scene:
         retroreflection: float,
     ) -> int: ...
     def move(self, number: int, pose: Sequence[float]) -> None: ...
+    def move_all(self, numbers: Sequence[int], poses: NDArray[np.float64]) -> None: ...
     def scan(
         self,
         sensor: Sensor,
@@ -147,6 +149,7 @@ def detect(
     min_points: int,
     min_confidence: float,
 ) -> list[dict[str, Any]]: ...
+def read_grey16(file: str) -> NDArray[np.uint16]: ...
 def read_points(
     path: str, format: str | None, metadata: str | None, sender: str | None
 ) -> Mapping[str, Any]: ...

@@ -27,8 +27,8 @@ class Mesh(Remade):
         normalize: `unit-sphere` moves the mean of the vertices to the origin and scales the
             farthest of them to 1 m. `bbox` moves the middle of the bounding box there and scales its
             longest side to 2 m. `none` leaves the mesh in its place.
-        units: The unit of length of `source`: m (the default), mm, cm, in or ft. Without it, a mesh
-            that keeps its size and is larger than 100 m or smaller than 1 cm gives a warning.
+        units: The unit of length of `source`: m (the default), mm, cm, in or ft. Unless this says m,
+            a mesh that keeps its size and is larger than 100 m or smaller than 1 cm gives a warning.
         up: The upward axis of `source`: y or z. By default, y for OBJ files and z for all others.
 
     Raises:
@@ -83,7 +83,7 @@ class Mesh(Remade):
         """Warn if the unit of the source is probably another."""
         settings = self._made_of[1]
         doubt = self._mesh.doubtful_size(settings["units"] or "m")
-        if settings["normalize"] == "none" and doubt:
+        if settings["normalize"] == "none" and settings["units"] != "m" and doubt:
             warnings.warn(f"{what}: {doubt}; `units` names another unit", stacklevel=3)
 
     def __len__(self) -> int:

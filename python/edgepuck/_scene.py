@@ -137,13 +137,31 @@ class Scene:
         return number
 
     def move(
-        self, instance: int, pose: ArrayLike | None = None, *, position: ArrayLike | None = None
+        self,
+        instance: int | Sequence[int],
+        pose: ArrayLike | None = None,
+        *,
+        position: ArrayLike | None = None,
     ) -> None:
-        """Move the instance with this number to a pose or a position, as in `add`.
+        """Move the instance with this number to a pose or a position, as in `add`, or many to their poses.
+
+        Args:
+            instance: The number of an instance, or those of k instances. All of them move, or none.
+            pose: The pose of the instance, [4, 4]; or their poses, [k, 4, 4], or [k, 7]: x, y, z and a
+                quaternion w, x, y, z.
+            position: The position of the one instance, metres, instead of `pose`.
 
         Raises:
-            Error: There is no such instance; the pose has a wrong shape or is not a rotation.
+            Error: There is no such instance; the poses have a wrong shape or are not rotations.
         """
+        if np.ndim(instance) > 0:
+            numbers = [whole("instance", number, 0, 2**32 - 1) for number in instance]  # type: ignore[union-attr]
+            if pose is None or position is not None:
+                raise _edgepuck.Error("expected the poses of all instances, and no position")
+            _, poses = _rows("pose", pose, (len(numbers),))
+            self._scene.move_all(numbers, poses)
+            self._poses.update(zip(numbers, poses.tolist(), strict=True))
+            return
         rows = _pose(pose, position)
         number = whole("instance", instance, 0, 2**32 - 1)
         self._scene.move(number, rows)
@@ -313,7 +331,7 @@ def _remade(
     for mesh, settings in added:
         scene._scene.add(native(mesh), np.eye(4).ravel().tolist(), *settings)
     for number, rows in poses.items():
-        scene._scene.move(number, rows)
+        scene._scene.move_all([number], np.array([rows]))
     return scene
 
 

@@ -9,6 +9,7 @@ mod classifier;
 mod clouds;
 mod detect;
 mod error;
+mod heights;
 mod mesh;
 mod process;
 mod scene;
@@ -29,6 +30,8 @@ mod _edgepuck {
     use super::detect::detect;
     #[pymodule_export]
     use super::error::Error;
+    #[pymodule_export]
+    use super::heights::read_grey16;
     #[pymodule_export]
     use super::mesh::Mesh;
     #[pymodule_export]

@@ -79,11 +79,17 @@ impl Scene {
     #[pyo3(name = "move")]
     fn move_to(&self, number: usize, pose: [f64; 16]) -> PyResult<()> {
         let (pose, mut scene) = (pose_of(&pose)?, lock(&self.scene));
-        let n = scene.instances().len();
-        let missing =
-            || raised(format!("expected the number of one of {n} instances, found {number}"));
-        let id = scene.ids().nth(number).ok_or_else(missing)?;
+        let id = ids_of(&scene, &[number])?[0];
         scene[id].pose = pose;
+        Ok(())
+    }
+
+    /// Move the instances of these numbers, all or none.
+    fn move_all(&self, numbers: Vec<usize>, poses: PyReadonlyArray2<'_, f64>) -> PyResult<()> {
+        let (poses, mut scene) = (poses_of("pose", &poses)?, lock(&self.scene));
+        for (id, pose) in ids_of(&scene, &numbers)?.into_iter().zip(poses) {
+            scene[id].pose = pose;
+        }
         Ok(())
     }
 
@@ -126,13 +132,7 @@ impl Scene {
         let (caster, mut scene) = (sensor.caster.open()?, lock(&self.scene).clone());
         scene.seed = seed.unwrap_or(scene.seed);
         read_effects(effects, &mut scene.effects)?;
-        let ids: Vec<_> = scene.ids().collect();
-        let missing = |number: &usize| {
-            let n = ids.len();
-            raised(format!("expected the number of one of {n} instances, found {number}"))
-        };
-        let id = |number: &usize| ids.get(*number).copied().ok_or_else(|| missing(number));
-        let instances = numbers.iter().map(id).collect::<PyResult<Vec<_>>>()?;
+        let instances = ids_of(&scene, &numbers)?;
         let (poses, moved) = (poses_of("poses", &poses)?, poses_of("move", &moved)?);
         sensor.sensor.rays(&scene.effects).map_err(raised)?;
         let moves = Moves { instances: &instances, poses: &moved };
@@ -194,6 +194,17 @@ fn array<T: numpy::Element>(
     numbers: Vec<T>,
 ) -> PyResult<Bound<'_, PyArray2<T>>> {
     Ok(Array2::from_shape_vec(shape, numbers).map_err(raised)?.into_pyarray(py))
+}
+
+/// The handles of the instances of these numbers.
+fn ids_of(scene: &sim_gpu::Scene, numbers: &[usize]) -> PyResult<Vec<sim_gpu::InstanceId>> {
+    let ids: Vec<_> = scene.ids().collect();
+    let id = |&number: &usize| {
+        let n = ids.len();
+        let missing = || format!("expected the number of one of {n} instances, found {number}");
+        ids.get(number).copied().ok_or_else(|| raised(missing()))
+    };
+    numbers.iter().map(id).collect()
 }
 
 /// Where a sensor stands.

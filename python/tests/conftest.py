@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,19 @@ def edgepuck(*words: object, code: int = 0) -> subprocess.CompletedProcess[str]:
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert done.returncode == code, done.stderr
     return done
+
+
+def all_around() -> "ep.Sensor":
+    """A sensor of 120 x 61 even directions, at any range."""
+    import edgepuck as ep
+
+    with tempfile.TemporaryDirectory() as folder:
+        profile = Path(folder, "all-around.toml")
+        profile.write_text(
+            'name = "all-around"\n[range]\nmax_m = 1e6\n[uniform]\nazimuth_from_deg = -180\nazimuth_to_deg = 177\n'
+            "azimuth_steps = 120\nelevation_from_deg = -90\nelevation_to_deg = 90\nelevation_steps = 61\n"
+        )
+        return ep.Sensor(profile)
 
 
 @pytest.fixture(scope="session")

@@ -1,5 +1,7 @@
 """`Scene.cast`: ranges from many poses, each in a world of its own."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -62,6 +64,54 @@ def test_the_image_has_a_row_for_each_ring() -> None:
         in_time = of_ring[np.argsort(SENSOR.times[of_ring])]
         np.testing.assert_array_equal(image[0, ring, : len(in_time)], batch.ranges[0, in_time])
         assert np.isinf(image[0, ring, len(in_time) :]).all()
+
+
+def test_noise_is_that_of_scans() -> None:
+    scene, _ = world()
+    settings = {"noise": 0.02, "dropout": 0.3, "effects": {"returns": "last"}}
+    batch = scene.cast(SENSOR, np.stack([np.eye(4)] * 2), seed=5, **settings)
+    assert 0.25 < np.isinf(batch.ranges).mean() < 0.35
+    for ranges, seed in zip(batch.ranges, batch.seeds, strict=True):
+        scan = scene.scan(SENSOR, pose=np.eye(4), seed=int(seed), **settings)
+        np.testing.assert_array_equal(ranges[scan.beam], scan.range)
+        assert np.isfinite(ranges).sum() == len(scan)
+
+
+def test_many_instances_move_at_once_and_stay_so_when_pickled() -> None:
+    box, half = ep.Mesh(*ep.box((0.5, 0.5, 0.5)), normalize="none"), np.sqrt(0.5)
+    many, alone = ep.Scene(), ep.Scene()
+    numbers = [many.add(box) for _ in range(3)]
+    # Quarter turns about z, as quaternions and as matrices.
+    quaternions = np.array([[3.0, i, 0.2, half, 0, 0, half] for i in range(3)])
+    for x, y, z, *_ in quaternions:
+        alone.add(box, [[0, -1, 0, x], [1, 0, 0, y], [0, 0, 1, z], [0, 0, 0, 1]])
+    many.move(numbers, quaternions)
+    quaternions[:] = np.nan
+    for scene in [many, pickle.loads(pickle.dumps(many))]:
+        found, expected = scene.cast(SENSOR, np.eye(4)[None]), alone.cast(SENSOR, np.eye(4)[None])
+        np.testing.assert_array_equal(found.object, expected.object)
+        np.testing.assert_allclose(found.ranges, expected.ranges, rtol=1e-6)
+    assert set(found.object[0]) == {-1, 0, 1, 2}
+
+
+@pytest.mark.parametrize(
+    ("numbers", "poses", "message"),
+    [
+        ([0, 1], np.eye(4), "pose: expected shape [2, 4, 4] or [2, 7], found [4, 4]"),
+        ([0, 1], np.stack([np.eye(4), np.diag([1, 1, 1.01, 1])]), "pose[1]: expected a rotation in the first three rows"),
+        ([0, 1], np.stack([np.eye(4), np.diag([1, 1, 1.01, 1])]), "off by 2.01e-2, with determinant 1.0100"),
+        ([0, 2], np.stack([np.eye(4)] * 2), "expected the number of one of 2 instances, found 2"),
+        ([0, -1], np.stack([np.eye(4)] * 2), "instance: expected a whole number from 0"),
+        ([0, 1], None, "expected the poses of all instances"),
+    ],
+)
+def test_of_many_instances_all_move_or_none(numbers, poses, message: str) -> None:
+    scene, _ = world()
+    before = scene.cast(SENSOR, np.eye(4)[None]).ranges
+    with pytest.raises(ep.Error) as caught:
+        scene.move(numbers, poses)
+    assert message in str(caught.value)
+    np.testing.assert_array_equal(scene.cast(SENSOR, np.eye(4)[None]).ranges, before)
 
 
 @pytest.mark.parametrize(
