@@ -75,7 +75,9 @@ def sequence():
     # The camera looks along its z, to where the car drives; it sways by a degree or two.
     driven = read.poses[-1][:3, 3]
     expected = SPEED_M_S * PERIOD_S * (N_TURNS - 1)
-    assert abs(numpy.linalg.norm(driven) - expected) < 1e-6, driven
+    # The speed is that on a map; the street climbs by 2 degrees at most.
+    longest = expected / numpy.cos(numpy.radians(2))
+    assert expected - 1e-6 < numpy.linalg.norm(driven) < longest + 1e-6, driven
     assert driven[2] > 0.99 * expected, driven
     tr = read.calib.T_cam0_velo
     assert numpy.allclose(tr[:3, :3] @ tr[:3, :3].T, numpy.eye(3)) and numpy.linalg.det(tr) > 0

@@ -49,13 +49,17 @@ struct Shard {
     of: u32,
 }
 
-/// What a shard says of itself: it is part `number` of `of` parts of what this `version` made with
-/// these `settings`.
+/// What a shard says of itself.
 pub struct Part<'a, Settings> {
+    /// Its folder.
     pub path: &'a Path,
+    /// Its number, from 0.
     pub number: u32,
+    /// The number of all parts.
     pub of: u32,
+    /// The version of Edgepuck that made it.
     pub version: &'a str,
+    /// What all parts have in common.
     pub settings: &'a Settings,
 }
 
