@@ -176,6 +176,18 @@ fn points_of_a_sequence_lie_on_their_objects_when_its_poses_move_them() {
     }
 }
 
+/// Raindrops are outliers of SemanticKITTI, and of no object.
+#[test]
+fn points_in_the_air_are_of_no_object_of_a_sequence() {
+    let folder = Folder::new();
+    let rain = "noise_m = 0\neffects = { weather = { rain_mm_h = 50 } }";
+    folder.write("rain.toml", CARS.replace("noise_m = 0", rain));
+    folder.succeeds("gen-drive rain.toml --seconds 0.1 --layout semantickitti --out sequences/04");
+    let labels: Vec<[f32; 1]> = rows(&folder, "labels/000000.label");
+    let outliers = labels.iter().filter(|[label]| label.to_bits() == 1).count();
+    assert!((10..labels.len() / 2).contains(&outliers), "{outliers} of {}", labels.len());
+}
+
 /// Rows of 32-bit numbers of a file of the sequence, little-endian.
 fn rows<const N: usize>(folder: &Folder, file: &str) -> Vec<[f32; N]> {
     let bytes = folder.bytes(&format!("sequences/04/{file}"));
