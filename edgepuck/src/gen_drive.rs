@@ -1,17 +1,24 @@
+//! `edgepuck gen-drive`: a drive through a street, as a capture or as a sequence of sweeps.
+
+mod turns;
+
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::Context;
-use edgepuck_scenes::{Drive, Sighting, Sightings, Stage};
-use formats::atomic::Unfinished;
-use formats::vlp32c::{Capture, SEQUENCE_US, SEQUENCES_PER_PACKET, START_S};
+use anyhow::{Context, ensure};
+use clap::builder::ArgPredicate;
+use edgepuck_scenes::{Drive, Packet, Sighting, Sightings, Stage};
+use formats::atomic::{Unfinished, UnfinishedFolder};
+use formats::vlp32c::{Capture, SEQUENCES_PER_PACKET, START_S};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::Outcome;
 use crate::flags::number;
-use crate::gen_scenes::read_recipe;
+use crate::gen_scenes::sequence::Sequence;
+use crate::gen_scenes::{is_written, read_recipe};
+use crate::{Outcome, Usage};
 use formats::outputs::{Overwrite, need_extension};
+use turns::{Turns, whole_turns};
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -20,9 +27,17 @@ pub struct Args {
     recipe: PathBuf,
 
     /// Capture to write (.pcap); the sensor's poses (.tum) and the objects that it saw
-    /// (.truth.jsonl) are written beside it
-    #[arg(long, default_value = "data/drive.pcap", value_name = "FILE")]
+    /// (.truth.jsonl) are written beside it. With --layout, the folder of a sequence
+    /// [default: data/drive.pcap, or data/sequences/00]
+    #[arg(long, value_name = "PATH", hide_default_value = true, default_value = "data/drive.pcap")]
+    #[arg(default_value_if("layout", ArgPredicate::IsPresent, "data/sequences/00"))]
     out: PathBuf,
+
+    /// Write the sweeps of the drive as a sequence in place of the capture: semantickitti, with the
+    /// class and the object of each point, and poses. Sweeps are whole turns without the sensor's
+    /// motion during the turn
+    #[arg(long, value_name = "LAYOUT", value_parser = ["semantickitti"])]
+    layout: Option<String>,
 
     /// Duration of the drive, seconds
     #[arg(long, default_value_t = 60.0, value_name = "S")]
@@ -34,7 +49,8 @@ pub struct Args {
     #[arg(value_parser = speed)]
     speed: f64,
 
-    /// Sensor: vlp32c, with the recipe's noise and effects, or the path of a VLP-32C's profile
+    /// Sensor, with the recipe's noise and effects if the recipe has it: vlp32c, or the path of a
+    /// VLP-32C's profile; with --layout any sensor whose head turns, such as hdl64e
     #[arg(long, default_value = "vlp32c", value_name = "NAME")]
     sensor: String,
 
@@ -65,9 +81,14 @@ fn speed(word: &str) -> Result<f64, String> {
 }
 
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
-    need_extension("--out", &args.out, &["pcap"])?;
-    let [poses, truth] = ["tum", "truth.jsonl"].map(|end| args.out.with_extension(end));
-    args.overwrite.check([&*args.out, &poses, &truth])?;
+    match args.layout {
+        Some(_) => args.overwrite.check_cleared([&*args.out], is_written)?,
+        None => {
+            need_extension("--out", &args.out, &["pcap"])?;
+            let [poses, truth] = ["tum", "truth.jsonl"].map(|end| args.out.with_extension(end));
+            args.overwrite.check([&*args.out, &poses, &truth])?;
+        }
+    }
     let mut recipe = read_recipe(&args.recipe)?;
     recipe.use_sensors(std::slice::from_ref(&args.sensor));
     let stage = Stage::new(recipe, &args.recipe, args.meshes.as_deref(), args.seed)?;
@@ -75,7 +96,14 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let what = || format!("{} with the recipe {}", args.sensor, args.recipe.display());
     let mut drive = Drive::new(&stage, args.speed).with_context(what)?;
     let started = Instant::now();
-    let n_points = write(&mut drive, args.seconds, &args.out)?;
+    let n_points = match args.layout {
+        Some(_) => write_sequence(&stage, &mut drive, args)?,
+        None => {
+            let (revolution, returns) = drive.in_packets().with_context(what)?;
+            let capture = Capture::create(&args.out, revolution.rpm, returns)?;
+            write(&mut drive, args.seconds, capture, &args.out)?
+        }
+    };
     formats::say!(
         "{} s, {n_points} points: {}, in {:.1} s",
         args.seconds,
@@ -85,30 +113,64 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-/// Writes the three files of a drive and returns the number of points.
-fn write(drive: &mut Drive, seconds: f64, out: &Path) -> anyhow::Result<usize> {
-    let packet_s = SEQUENCE_US * 1e-6 * f64::from(SEQUENCES_PER_PACKET);
-    let n_packets = (seconds / packet_s).ceil() as u32;
-    let mut capture = Capture::create(out, drive.revolution().rpm, drive.returns())?;
-    let mut poses = Unfinished::create(&out.with_extension("tum"))?;
-    let mut truth = Unfinished::create(&out.with_extension("truth.jsonl"))?;
-
+/// Fires the first `n` packets of a drive and calls `each` with packets in order, and the number of
+/// the first of them. Returns the number of points.
+fn fire(
+    drive: &mut Drive<'_>,
+    n: f64,
+    mut each: impl FnMut(&Drive<'_>, u32, &[Packet]) -> anyhow::Result<()>,
+) -> anyhow::Result<usize> {
+    let most = f64::from(u32::MAX / SEQUENCES_PER_PACKET);
+    let cause =
+        || format!("--seconds: expected at most {:.0} of this sensor", most * drive.packet_s());
+    ensure!(n <= most, Usage(cause()));
+    let n = n as u32;
     let style =
         ProgressStyle::with_template("{bar:40} {percent}% of the packets, {per_sec}, {eta} left")?;
-    let bar = ProgressBar::new(n_packets.into()).with_style(style);
-    let (mut n_points, mut sightings) = (0, Sightings::default());
-    for first in (0..n_packets).step_by(BATCH) {
-        let packets = drive.fire(first..n_packets.min(first + BATCH as u32))?;
-        for packet in &packets {
-            capture.push(&packet.scan)?;
-            n_points += packet.scan.len();
-        }
-        append(&mut truth, &sightings.add(drive, &packets))?;
+    let bar = ProgressBar::new(n.into()).with_style(style);
+    let mut n_points = 0;
+    for first in (0..n).step_by(BATCH) {
+        let packets = drive.fire(first..n.min(first + BATCH as u32))?;
+        n_points += packets.iter().map(|packet| packet.scan.len()).sum::<usize>();
+        each(drive, first, &packets)?;
         bar.inc(packets.len() as u64);
     }
-    append(&mut truth, &sightings.finish(drive))?;
-    write_poses(&mut poses, drive, f64::from(n_packets) * packet_s)?;
     bar.finish_and_clear();
+    Ok(n_points)
+}
+
+/// Writes the whole turns of a drive as a sequence and returns the number of points.
+fn write_sequence(stage: &Stage, drive: &mut Drive<'_>, args: &Args) -> anyhow::Result<usize> {
+    let n_turns = whole_turns(drive, args.seconds)?;
+    args.overwrite.clear([&*args.out], is_written)?;
+    let begun = UnfinishedFolder::begin(&args.out);
+    let mut turns = Turns::new(stage, Sequence(args.out.clone()));
+    let n_packets = (f64::from(n_turns) * drive.period_s() / drive.packet_s()).ceil();
+    fire(drive, n_packets, |drive, first, packets| {
+        (first..).zip(packets).try_for_each(|(number, packet)| turns.add(drive, number, packet))
+    })?;
+    let n_points = turns.finish(drive, n_turns)?;
+    begun.finish();
+    Ok(n_points)
+}
+
+/// Writes the capture of a drive with its truth and returns the number of points.
+fn write(
+    drive: &mut Drive<'_>,
+    seconds: f64,
+    mut capture: Capture,
+    out: &Path,
+) -> anyhow::Result<usize> {
+    let n_packets = (seconds / drive.packet_s()).ceil();
+    let mut poses = Unfinished::create(&out.with_extension("tum"))?;
+    let mut truth = Unfinished::create(&out.with_extension("truth.jsonl"))?;
+    let mut sightings = Sightings::default();
+    let n_points = fire(drive, n_packets, |drive, _, packets| {
+        packets.iter().try_for_each(|packet| capture.push(&packet.scan))?;
+        append(&mut truth, &sightings.add(drive, packets))
+    })?;
+    append(&mut truth, &sightings.finish(drive))?;
+    write_poses(&mut poses, drive, n_packets * drive.packet_s())?;
     poses.finish()?;
     truth.finish()?;
     capture.finish()?;
@@ -125,7 +187,7 @@ fn append(truth: &mut Unfinished, sightings: &[Sighting]) -> anyhow::Result<()> 
 
 /// Writes the sensor's poses in the format of the TUM RGB-D benchmark, up to the first pose after
 /// the end of the drive. Linear interpolation of the orientation is exact to 1e-3 degrees.
-fn write_poses(file: &mut Unfinished, drive: &Drive, seconds: f64) -> anyhow::Result<()> {
+fn write_poses(file: &mut Unfinished, drive: &Drive<'_>, seconds: f64) -> anyhow::Result<()> {
     file.append(|writer| writeln!(writer, "# timestamp tx ty tz qx qy qz qw"))?;
     for n in 0..=(seconds * f64::from(POSES_HZ)).ceil() as u32 {
         let time_s = f64::from(n) / f64::from(POSES_HZ);

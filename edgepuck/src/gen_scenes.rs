@@ -1,7 +1,9 @@
 //! `edgepuck gen-scenes`: scans street scenes and packs their clusters as a training set.
 
 mod layout;
-mod sweep_file;
+pub mod parts;
+pub mod sequence;
+pub mod sweep_file;
 
 use std::ffi::OsStr;
 use std::io::Write;
@@ -10,15 +12,17 @@ use std::time::Instant;
 
 use anyhow::{Context, bail, ensure};
 use edgepuck_assets::SCENE_RECIPES;
-use edgepuck_scenes::{LabelledScene, Recipe, Stage, generate};
+use edgepuck_scenes::{ClusterCounts, LabelledScene, Recipe, Stage, generate};
 use edgepuck_segment::Settings;
 use formats::atomic::{self, UnfinishedFolder};
+use formats::hash::of_bytes;
 use indicatif::{ProgressBar, ProgressStyle};
 use layout::{Layout, Writer};
 use serde_json::{Value, json};
 use sweep_file::SweepFormat;
 
 use crate::caster::CasterArgs;
+use crate::shard::Shard;
 use crate::{Outcome, Usage, preview, segment};
 use formats::outputs::Overwrite;
 
@@ -64,6 +68,11 @@ pub(crate) struct Args {
     #[arg(long, default_value_t = 0)]
     seed: u64,
 
+    /// Make only part I of N of the scenes; `merge-dataset` joins the parts. `auto/N` and `auto` take
+    /// the part from a job array, as in gen-dataset
+    #[arg(long, value_name = "I/N|auto/N|auto")]
+    shard: Option<Shard>,
+
     #[command(flatten)]
     overwrite: Overwrite,
 
@@ -74,14 +83,20 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let cause = "--format: this build does not include las".to_owned();
     ensure!(args.format != SweepFormat::Las || cfg!(feature = "las"), Usage(cause));
+    let numbers = args.shard.map_or(0..args.sweeps, |shard| shard.part_of(args.sweeps));
+    if let Some(Shard { of, .. }) = args.shard.filter(|shard| shard.of > args.sweeps) {
+        let cause =
+            format!("--shard: expected at most {} parts, one a sweep, found {of}", args.sweeps);
+        return Err(Usage(cause).into());
+    }
     let mut recipe = read_recipe(&args.recipe)?;
-    let preview = args.out.join("preview.png");
+    let [preview, record] = [args.out.join("preview.png"), parts::record(&args.out)];
     let mut folders = ["packed", "sweeps"].map(|folder| args.out.join(folder)).to_vec();
     let set = args.layout.map(|layout| args.out.join(layout.name()));
     folders.extend(set.clone());
     let outputs = || folders.iter().map(PathBuf::as_path);
     args.overwrite.check_cleared(outputs(), is_written)?;
-    args.overwrite.check([preview.as_path()])?;
+    args.overwrite.check([&*preview, &*record])?;
     let layouts = Layout::ALL.iter().map(|layout| args.out.join(layout.name()));
     for other in layouts.filter(|other| set.as_ref() != Some(other) && other.exists()) {
         formats::say!("warning: {}: it is of another run, and stays", other.display());
@@ -93,17 +108,21 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let stage = stage.with_culling(args.caster.culling());
     stage.warnings().iter().for_each(|warning| formats::say!("warning: {warning}"));
     args.overwrite.clear(outputs(), is_written)?;
+    if record.exists() {
+        std::fs::remove_file(&record).with_context(|| record.display().to_string())?;
+    }
     let started = Instant::now();
     let style = ProgressStyle::with_template("{bar:40} {pos}/{len} scenes, {per_sec}, {eta} left")?;
-    let bar = ProgressBar::new(args.sweeps.into()).with_style(style);
+    let bar = ProgressBar::new(numbers.len() as u64).with_style(style);
     let mut n_points = 0;
     let mut stand = vec![false; stage.recipe().object.len()];
     let packed = args.out.join("packed");
     // Saved sweeps are complete, one by one; of packed clusters, only all are.
     let begun = UnfinishedFolder::begin(&packed);
     let begun_set = set.as_deref().map(UnfinishedFolder::begin);
-    let mut set = args.layout.zip(set).map(|(layout, folder)| Writer::new(layout, folder));
-    let counts = generate(&stage, &Settings::default(), args.sweeps, &packed, |done| {
+    let set = args.layout.zip(set);
+    let set = set.map(|(layout, folder)| Writer::new(layout, folder, args.sweeps));
+    let counts = generate(&stage, &Settings::default(), numbers.clone(), &packed, |done| {
         bar.inc(1);
         n_points += done.sweep.points().len();
         done.scene.objects.iter().for_each(|object| stand[object.entry] = true);
@@ -112,7 +131,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
             let tints: Vec<_> = labels.iter().map(|&label| segment::tint(label)).collect();
             preview::draw_from_above(&sweep.scan, &tints, &[], "scene 0", &preview)?;
         }
-        if let Some(set) = &mut set {
+        if let Some(set) = &set {
             set.add(&stage, done)?;
         }
         if done.scene.number < args.save { save(&stage, done, args) } else { Ok(()) }
@@ -120,28 +139,18 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     set.map_or(Ok(()), |set| set.finish())?;
     begun_set.into_iter().for_each(UnfinishedFolder::finish);
     begun.finish();
+    if let Some(shard) = args.shard {
+        parts::write_record(&args.out, shard, settings(&stage, args))?;
+    }
     bar.finish_and_clear();
     let seconds = started.elapsed().as_secs_f64();
     formats::say!(
         "{} sweeps of {} points on average in {seconds:.1} s ({:.1} a second)",
-        args.sweeps,
-        n_points / args.sweeps as usize,
-        f64::from(args.sweeps) / seconds
+        numbers.len(),
+        n_points / numbers.len(),
+        numbers.len() as f64 / seconds
     );
-    let mut out = std::io::stdout().lock();
-    writeln!(out, "{:<16} {:>9} {:>9}", "class", "train", "test")?;
-    for ((class, train), test) in stage.classes().iter().zip(&counts.train).zip(&counts.test) {
-        writeln!(out, "{class:<16} {train:>9} {test:>9}")?;
-    }
-    for (i, object) in stage.recipe().object.iter().enumerate().filter(|(i, _)| !stand[*i]) {
-        formats::say!(
-            "warning: object[{i}]: no scene has a {}: does it fit there, and is its count above 0?",
-            object.class
-        );
-    }
-    if counts.test.iter().all(|n| *n == 0) {
-        formats::say!("warning: no cluster is in the test part, which has every tenth of --sweeps");
-    }
+    report(&stage, &counts, &stand, args.shard.is_none())?;
     formats::say!("Clusters: {}. Picture: {}.", packed.display(), preview.display());
     if n_points == 0 {
         formats::say!("warning: no beam returned a point");
@@ -150,8 +159,47 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
+/// Prints the clusters of each class, and what a whole set, of which a part need not have all, lacks.
+fn report(
+    stage: &Stage,
+    counts: &ClusterCounts,
+    stand: &[bool],
+    is_whole: bool,
+) -> std::io::Result<()> {
+    let mut out = std::io::stdout().lock();
+    writeln!(out, "{:<16} {:>9} {:>9}", "class", "train", "test")?;
+    for ((class, train), test) in stage.classes().iter().zip(&counts.train).zip(&counts.test) {
+        writeln!(out, "{class:<16} {train:>9} {test:>9}")?;
+    }
+    let missing = stage.recipe().object.iter().enumerate();
+    for (i, object) in missing.filter(|(i, _)| is_whole && !stand[*i]) {
+        formats::say!(
+            "warning: object[{i}]: no scene has a {}: does it fit there, and is its count above 0?",
+            object.class
+        );
+    }
+    if is_whole && counts.test.iter().all(|n| *n == 0) {
+        formats::say!("warning: no cluster is in the test part, which has every tenth of --sweeps");
+    }
+    Ok(())
+}
+
+/// What decides of the files that are written, but for users' meshes.
+fn settings(stage: &Stage, args: &Args) -> Value {
+    let sensors = stage.profiles().map(|profile| of_bytes(format!("{profile:?}").as_bytes()));
+    json!({
+        "recipe": of_bytes(format!("{:?}", stage.recipe()).as_bytes()),
+        "sensors": sensors.collect::<Vec<_>>(),
+        "sweeps": args.sweeps,
+        "seed": args.seed,
+        "save": args.save,
+        "format": args.format.to_string(),
+        "layout": args.layout.map(Layout::name),
+    })
+}
+
 /// Whether this command writes files of this name: packed clusters, and sweeps by their numbers.
-fn is_written(file: &Path) -> bool {
+pub fn is_written(file: &Path) -> bool {
     let text = |part: Option<&OsStr>| part.unwrap_or_default().to_string_lossy().into_owned();
     let (stem, extension) = (text(file.file_stem()), text(file.extension()));
     match &*extension {

@@ -32,6 +32,7 @@ mod profile;
 mod sample_surfaces;
 mod scan;
 mod segment;
+mod shard;
 mod shell;
 mod signals;
 pub mod significant_digits;

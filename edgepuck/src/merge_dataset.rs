@@ -1,4 +1,5 @@
 use crate::flags::dataset_folder;
+use crate::gen_scenes::parts;
 use crate::{Outcome, gen_dataset};
 use edgepuck_dataset::merge;
 use std::path::PathBuf;
@@ -16,7 +17,13 @@ pub struct Args {
 
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let folders = args.shards.iter().map(|shard| dataset_folder(shard).to_path_buf());
-    let manifest = merge(&folders.collect::<Vec<_>>(), &args.out)?;
+    let folders: Vec<PathBuf> = folders.collect();
+    if folders.iter().any(|folder| parts::record(folder).exists()) {
+        parts::merge(&folders, &args.out)?;
+        formats::say!("{} parts: {}", folders.len(), args.out.display());
+        return Ok(Outcome::Success);
+    }
+    let manifest = merge(&folders, &args.out)?;
     formats::say!("{} meshes: {}", manifest.meshes.len(), args.out.display());
     if manifest.adapters.len() > 1 {
         formats::say!(

@@ -15,6 +15,7 @@
 //! | `classes`, may be absent | text | `[k]` | class names in the order of the labels |
 //! | `range_m`, with `offsets` | floating | `[m]` | distance from the sensor, metres; may be absent |
 //! | `height_m`, with `offsets` | floating | `[m]` | height of the lowest point above the ground, metres, NaN if unknown; may be absent |
+//! | `truth_share`, with `offsets` | floating | `[m]` | share of the points on the labelled object; may be absent |
 //! | `sensor`, with `offsets` | text | `[m]` | the sensor's name; may be absent |
 //! | `ids`, with `offsets` | text | `[m]` | `FRAME#TRACK`, or any other name of the object; may be absent |
 //! | `sensor_origin`, with `offsets` | floating | `[3]` or `[m, 3]` | where the sensor was, from where `points` are then counted; may be absent |
@@ -48,6 +49,8 @@ pub struct LabelledSet {
     /// Height of each cloud's lowest point above the ground under it, metres, NaN
     /// where that is unknown; where the set lists them.
     pub height_m: Option<Vec<f32>>,
+    /// Share of each cloud's points that lie on the labelled object, where the set lists them.
+    pub truth_share: Option<Vec<f32>>,
     /// Name of the sensor of each cloud, where the set lists them.
     pub sensor: Option<Vec<String>>,
     /// Frame and track of each cloud, `FRAME#TRACK`, where the set lists them.
@@ -69,6 +72,7 @@ impl Default for LabelledSet {
             classes: None,
             range_m: None,
             height_m: None,
+            truth_share: None,
             sensor: None,
             ids: None,
             raw_labels: None,
@@ -138,6 +142,7 @@ impl LabelledSet {
             classes: self.classes.clone(),
             range_m: chosen(self.range_m.as_ref(), indices),
             height_m: chosen(self.height_m.as_ref(), indices),
+            truth_share: chosen(self.truth_share.as_ref(), indices),
             sensor: chosen(self.sensor.as_ref(), indices),
             ids: chosen(self.ids.as_ref(), indices),
             raw_labels: chosen(self.raw_labels.as_ref(), indices),

@@ -1,5 +1,6 @@
-//! `gen-drive`: a drive as a capture, with its ground truth.
+//! `gen-drive`: a drive as a capture with its ground truth, and as a sequence.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 
 use formats::velodyne::{Decoder, Header, Model};
@@ -53,8 +54,9 @@ fn a_drive_comes_back_from_its_packets_when_the_sensors_motion_is_undone() {
                     [pose, motion.pose(0.0, 0.0)].map(|p| p.to_world(at).to_array());
                 if moved[2] > 0.3 {
                     n += 1;
-                    n_inside += u32::from(truth.iter().any(|wall| holds(wall, moved)));
-                    n_inside_as_seen += u32::from(truth.iter().any(|wall| holds(wall, still)));
+                    n_inside += u32::from(truth.iter().any(|wall| holds(wall, moved, 0.03)));
+                    n_inside_as_seen +=
+                        u32::from(truth.iter().any(|wall| holds(wall, still, 0.03)));
                 }
             })
             .unwrap();
@@ -67,14 +69,130 @@ fn a_drive_comes_back_from_its_packets_when_the_sensors_motion_is_undone() {
     assert!(f64::from(n_inside_as_seen) < 0.9 * f64::from(n), "{n_inside_as_seen} of {n}");
 }
 
-/// Whether a point of the world is on a wall of the ground truth. Packets have distances in steps
-/// of 4 mm and azimuths in steps of 0.01 degrees, which are 5 mm at 30 m.
-fn holds(wall: &Value, at: [f64; 3]) -> bool {
+/// Whether a point of the world is on an object of the ground truth. Packets have distances in steps
+/// of 4 mm and azimuths in steps of 0.01 degrees, which are 5 mm at 30 m. Vertices, and the points of
+/// sequences, are rounded by less than a millimetre.
+fn holds(wall: &Value, at: [f64; 3], margin_m: f64) -> bool {
     let number = |value: &Value| value.as_f64().unwrap();
     let (sin, cos) = number(&wall["yaw_deg"]).to_radians().sin_cos();
     let off = [0, 1, 2].map(|axis| at[axis] - number(&wall["centre_m"][axis]));
     let along = [cos * off[0] + sin * off[1], cos * off[1] - sin * off[0], off[2]];
-    (0..3).all(|axis| along[axis].abs() < number(&wall["size_m"][axis]) / 2.0 + 0.03)
+    (0..3).all(|axis| along[axis].abs() < number(&wall["size_m"][axis]) / 2.0 + margin_m)
+}
+
+/// Cars that stand and cars that move, on a street with a slope, past a sensor that is tilted and
+/// sways.
+const CARS: &str = r#"
+variants = 2
+[ground]
+road_width_m = [12, 12]
+slope_deg = [3, 3]
+[mount]
+height_m = [1.8, 1.8]
+tilt_deg = [2, 2]
+sway_deg = [1, 1]
+[[sensor]]
+profile = "vlp32c"
+noise_m = 0
+[[object]]
+kind = "car"
+class = "car"
+count = [10, 10]
+place = "parked"
+distance_m = [4, 30]
+[[object]]
+kind = "car"
+class = "car"
+count = [8, 8]
+place = "road"
+distance_m = [5, 40]
+speed_m_s = [8, 9]
+"#;
+
+/// The sequence's own poses move each point on a car to the car's box in the truth of the capture of the same
+/// drive, whose first pose they are relative to: the capture and the sequence have the same objects.
+#[test]
+fn points_of_a_sequence_lie_on_their_objects_when_its_poses_move_them() {
+    let folder = Folder::new();
+    folder.write("cars.toml", CARS);
+    let drive = "gen-drive cars.toml --seconds 0.65 --speed 15";
+    folder.succeeds(&format!("{drive} --out a.pcap"));
+    folder.succeeds(&format!("{drive} --layout semantickitti --out sequences/04"));
+    let motion = EgoMotion::read(&folder.at("a.tum")).unwrap();
+    let truth = folder.text("a.truth.jsonl");
+    let truth = truth.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
+    let key = |seen: &Value| ["turn", "object"].map(|key| seen[key].as_u64().unwrap());
+    let truth: BTreeMap<[u64; 2], Value> = truth.map(|seen| (key(&seen), seen)).collect();
+    let text = |file: &str| folder.text(&format!("sequences/04/{file}"));
+    assert!(text("calib.txt").ends_with("\nTr: 0 -1 0 0 0 0 -1 0 1 0 0 0\n"));
+    let times: Vec<f64> = text("times.txt").lines().map(|time| time.parse().unwrap()).collect();
+    assert_eq!(times, [0.0, 0.1, 0.2, 0.3, 0.4, 0.5], "whole turns");
+    let poses = text("poses.txt");
+    assert!(poses.starts_with("1 0 0 0 0 1 0 0 0 0 1 0\n"), "{poses}");
+    // The middle of a turn is a time of the poses of the capture, which are written to a micrometre.
+    let first = motion.pose(946_684_800.05, 0.0);
+    let (mut n, mut classes) = (0, BTreeSet::new());
+    for (turn, pose) in poses.lines().enumerate() {
+        let pose: Vec<f64> = pose.split(' ').map(|word| word.parse().unwrap()).collect();
+        let points: Vec<[f32; 4]> = rows(&folder, &format!("velodyne/{turn:06}.bin"));
+        let labels: Vec<[f32; 1]> = rows(&folder, &format!("labels/{turn:06}.label"));
+        assert_eq!(points.len(), labels.len());
+        for ([x, y, z, _], [label]) in points.into_iter().zip(labels) {
+            let [class, instance] = [label.to_bits() & 0xFFFF, label.to_bits() >> 16];
+            classes.insert(class);
+            // To the camera, to the first camera, and from that to the first sensor.
+            let camera = [-y, -z, x].map(f64::from);
+            let row = |i: usize| {
+                (0..3).map(|k| pose[4 * i + k] * camera[k]).sum::<f64>() + pose[4 * i + 3]
+            };
+            let at = first.to_world([row(2), -row(0), -row(1)].into()).to_array();
+            let Some(car) = truth.get(&[turn as u64, instance.into()]) else {
+                assert_eq!((class, instance), (49, 0), "neither a car nor ground");
+                continue;
+            };
+            let is_still = car["velocity_m_s"] == serde_json::json!([0.0, 0.0, 0.0]);
+            assert_eq!(class, if is_still { 10 } else { 252 }, "car and moving car of its labels");
+            if is_still {
+                n += 1;
+                assert!(holds(car, at, 2e-3), "{at:?} of {car}");
+            }
+        }
+    }
+    assert!(n > 1000, "{n} points on cars that stand");
+    assert_eq!(classes, [10, 49, 252].into());
+
+    let said = folder.exits(2, &format!("{drive} --layout semantickitti --out sequences/04"));
+    assert!(said.contains("sequences/04: it exists already: --overwrite replaces it"), "{said}");
+    // Another sensor, of which no packets are written; its sequence is the same every time.
+    let other = "gen-drive cars.toml --sensor hdl64e --seconds 0.2 --layout semantickitti --out";
+    for out in ["sequences/04 --overwrite", "sequences/05"] {
+        folder.succeeds(&format!("{other} {out}"));
+    }
+    assert!(!folder.at("sequences/04/velodyne/000002.bin").exists());
+    for file in ["velodyne/000001.bin", "labels/000001.label", "poses.txt"] {
+        let [one, again] =
+            ["04", "05"].map(|number| folder.bytes(&format!("sequences/{number}/{file}")));
+        assert!(one == again && !one.is_empty(), "{file}");
+    }
+}
+
+/// Raindrops are outliers of SemanticKITTI, and of no object.
+#[test]
+fn points_in_the_air_are_of_no_object_of_a_sequence() {
+    let folder = Folder::new();
+    let rain = "noise_m = 0\neffects = { weather = { rain_mm_h = 50 } }";
+    folder.write("rain.toml", CARS.replace("noise_m = 0", rain));
+    folder.succeeds("gen-drive rain.toml --seconds 0.1 --layout semantickitti --out sequences/04");
+    let labels: Vec<[f32; 1]> = rows(&folder, "labels/000000.label");
+    let outliers = labels.iter().filter(|[label]| label.to_bits() == 1).count();
+    assert!((10..labels.len() / 2).contains(&outliers), "{outliers} of {}", labels.len());
+}
+
+/// Rows of 32-bit numbers of a file of the sequence, little-endian.
+fn rows<const N: usize>(folder: &Folder, file: &str) -> Vec<[f32; N]> {
+    let bytes = folder.bytes(&format!("sequences/04/{file}"));
+    let numbers = bytes.as_chunks::<4>().0.iter().map(|x| f32::from_le_bytes(*x));
+    numbers.collect::<Vec<_>>().as_chunks::<N>().0.to_vec()
 }
 
 #[test]
@@ -92,6 +210,14 @@ fn a_drive_that_cannot_be_made_is_refused_and_leaves_nothing() {
     refused("walls.toml --out a.npz", 2, "expected a name with .pcap, found a.npz");
     refused("walls.toml --sensor vlp16 --out a.pcap", 1, "vlp16 with the recipe walls.toml: rot");
     refused("absent.toml --out a.pcap", 1, "absent.toml");
+    let sequence = "walls.toml --layout semantickitti --out a.pcap";
+    refused(
+        &format!("{sequence} --seconds 0.05"),
+        2,
+        "--seconds: expected at least 0.1, found 0.05",
+    );
+    refused(&format!("{sequence} --sensor mid70"), 1, "rotating: expected a head that turns");
+    refused("walls.toml --layout kitti --out a.pcap", 2, "possible values: semantickitti");
     folder.write("taken.pcap/file", "");
     for flag in ["", "--overwrite"] {
         let words = format!("walls.toml --seconds 0.1 --out taken.pcap {flag}");

@@ -74,6 +74,7 @@ fn a_program_that_is_ended_leaves_nothing_unfinished() {
     for (words, kept) in [
         ("gen-shapes --train 100000 --out d", &[][..]),
         ("gen-drive --seconds 3600 --out d/d.pcap", &[][..]),
+        ("gen-drive --seconds 3600 --layout semantickitti --out d/sequences", &[][..]),
         ("gen-scenes --sweeps 100000 --save 1 --out d", &["preview.png", "sweeps"]),
     ] {
         let folder = Folder::new();

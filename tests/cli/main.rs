@@ -10,6 +10,7 @@ mod checkpoints;
 mod clusters;
 mod corrupt;
 mod datasets;
+mod detectors;
 mod drives;
 mod end_to_end;
 mod export_onnx;

@@ -4,7 +4,6 @@ use crate::{Folder, in_repository};
 use formats::cloud_file::write_cloud;
 use formats::labelled::read_labelled;
 use serde_json::Value;
-use std::f64::consts::FRAC_PI_2;
 use test_support::{need, shared_data};
 
 #[test]
@@ -110,90 +109,6 @@ fn a_sweep_is_cut_and_its_clusters_are_named() {
 
     let said = folder.succeeds(&format!("detect {sweep} --model edge-64 --out whole.json"));
     assert!(said.contains("warning: edge-64: expected a model of clusters in metres"), "{said}");
-}
-
-/// Ten scenes of cars, one behind a wall of bins, with a small sensor.
-const CARS: &str = "mount = { height_m = [1.5, 1.7], tilt_deg = [0, 2] }\n\
-    [[sensor]]\nprofile = \"vlp16\"\n\
-    [[object]]\nkind = \"car\"\nclass = \"car\"\ncount = [4, 4]\nplace = \"anywhere\"\n\
-    distance_m = [6, 20]\n\
-    [[object]]\nkind = \"person\"\nclass = \"person\"\ncount = [6, 6]\nplace = \"anywhere\"\n\
-    distance_m = [4, 20]\n";
-
-/// Boxes hold the points of their objects: at least 99 % of them, to within 5 cm, as meshes' extents
-/// do but for noise.
-#[test]
-fn boxes_of_data_sets_for_detectors_hold_their_points() {
-    let folder = Folder::new();
-    folder.write("cars.toml", CARS);
-    let words = "gen-scenes cars.toml --adapter cpu --sweeps 10 --save 10 --format semantickitti";
-    for layout in ["semantickitti", "openpcdet", "kitti"] {
-        folder.succeeds(&format!("{words} --layout {layout} --out {layout}"));
-    }
-    let lists = ["train", "val"]
-        .map(|part| folder.text(&format!("openpcdet/openpcdet/ImageSets/{part}.txt")));
-    assert_eq!((lists[0].lines().count(), &*lists[1]), (9, "000009\n"));
-    let (mut n_boxes, mut n_points, mut n_inside, mut n_hidden) = (0, 0, 0, 0);
-    for name in lists.concat().lines() {
-        let cloud = folder.bytes(&format!("openpcdet/openpcdet/points/{name}.npy"));
-        let points: Vec<[f32; 4]> = rows(&cloud[128..]);
-        let labels = folder.bytes(&format!("openpcdet/sweeps/labels/{name}.label"));
-        let labels = labels.as_chunks::<4>().0.iter().map(|l| u16::from_le_bytes([l[2], l[3]]));
-        let labels: Vec<u16> = labels.collect();
-        assert_eq!(points.len(), labels.len());
-        let about: Value =
-            serde_json::from_slice(&folder.bytes(&format!("openpcdet/sweeps/{name}.json")))
-                .unwrap();
-        let seen = about["objects"].as_array().unwrap().iter().filter(|o| o["points"] != 0);
-        let boxes = folder.text(&format!("openpcdet/openpcdet/labels/{name}.txt"));
-        let kitti = folder.text(&format!("kitti/kitti/training/label_2/{name}.txt"));
-        let mut ahead = kitti.lines().map(|line| line.split(' ').collect::<Vec<_>>()).peekable();
-        assert_eq!(boxes.lines().count(), seen.clone().count());
-        for (line, object) in boxes.lines().zip(seen) {
-            let words: Vec<&str> = line.split(' ').collect();
-            assert_eq!(words[7], object["class"]);
-            let number = |i: usize| words[i].parse::<f64>().unwrap();
-            let own = points.iter().zip(&labels);
-            let own = own.filter(|(_, of)| u64::from(**of) == object["object"].as_u64().unwrap());
-            for ([x, y, z, _], _) in own {
-                let [x, y, z] = [(x, 0), (y, 1), (z, 2)].map(|(at, i)| f64::from(*at) - number(i));
-                let (sin, cos) = number(6).sin_cos();
-                let off = [x * cos + y * sin, y * cos - x * sin, z];
-                n_points += 1;
-                n_inside += usize::from((0..3).all(|i| off[i].abs() <= number(3 + i) / 2.0 + 0.05));
-            }
-            n_boxes += 1;
-            // The camera's x is to the right, y down and z ahead; boxes stand on their bases.
-            let (base_z, rotation) = (number(2) - number(5) / 2.0, -number(6) - FRAC_PI_2);
-            let is_it = |label: &Vec<&str>| {
-                let near =
-                    |i: usize, other: f64| (label[i].parse::<f64>().unwrap() - other).abs() < 0.011;
-                near(11, -number(1)) && near(12, -base_z) && near(13, number(0))
-            };
-            if let Some(label) = ahead.next_if(is_it) {
-                let found = label[14].parse::<f64>().unwrap() - rotation;
-                assert!((found.cos() - 1.0).abs() < 1e-3, "{label:?}: {line}");
-                assert_eq!(label[0], if words[7] == "car" { "Car" } else { "Pedestrian" });
-                n_hidden += usize::from(label[2] != "0");
-            }
-        }
-        assert_eq!(ahead.next(), None, "{name}: a label that is no box");
-    }
-    assert!(n_boxes > 60 && n_inside * 100 >= n_points * 99, "{n_inside} of {n_points}");
-    assert!(n_hidden > 0, "nothing hides anything");
-    let sequence = |file| folder.text(&format!("semantickitti/semantickitti/sequences/00/{file}"));
-    assert_eq!(sequence("poses.txt"), "1 0 0 0 0 1 0 0 0 0 1 0\n".repeat(9));
-    assert_eq!(sequence("times.txt").lines().nth(8), Some("8.000000e-1"));
-    assert!(sequence("calib.txt").contains("\nTr: 0 -1 0 0 0 0 -1 0 1 0 0 0\n"));
-    let labels = "semantickitti/sequences/00/labels/000003.label";
-    let first = folder.bytes(&format!("semantickitti/{labels}"));
-    assert_eq!(first, folder.bytes("semantickitti/sweeps/labels/000003.label"));
-}
-
-/// Rows of f32, little-endian.
-fn rows<const N: usize>(bytes: &[u8]) -> Vec<[f32; N]> {
-    let numbers = bytes.as_chunks::<4>().0.iter().map(|x| f32::from_le_bytes(*x));
-    numbers.collect::<Vec<_>>().as_chunks::<N>().0.to_vec()
 }
 
 /// SemanticKITTI's label (semantic-kitti.yaml) and the ASPRS's code (LAS 1.4, table 17) of a kind.

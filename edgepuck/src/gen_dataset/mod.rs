@@ -3,11 +3,11 @@
 mod bar;
 mod example;
 mod settings;
-mod shard;
 mod summary;
 mod tars;
 
 use crate::caster::CasterArgs;
+use crate::shard::Shard;
 use crate::{Outcome, Usage, flags, gen_shapes, outcome, signals};
 use anyhow::Context;
 use clap::error::ErrorKind;
@@ -20,7 +20,6 @@ use edgepuck_shapes as shapes;
 use formats::hash::Hashing;
 use formats::outputs::check_place;
 use settings::Settings;
-use shard::Shard;
 use sim_gpu::{Caster, Tally};
 use std::io::Write;
 use std::path::{Path, PathBuf};

@@ -3,19 +3,19 @@
 //! Points and boxes are in the level frame of the sensor: the origin is the sensor, x is ahead and z
 //! is up. KITTI's calibrations are those of a camera in the sensor, which looks along x.
 
-use std::fmt::Write;
 use std::path::PathBuf;
 
-use edgepuck_scenes::{LabelledScene, ObjectBox, SceneError, Stage, is_test};
+use edgepuck_scenes::{LabelledScene, ObjectBox, SceneError, Stage, is_test, place_in_set};
 use edgepuck_segment::OrientedBox;
 use formats::hash::Hashing;
 use formats::scan::Column;
 use formats::{FormatError, atomic, rows};
 use glam::DVec3;
-use sim_gpu::glam;
+use sim_gpu::{Pose, glam};
 
+use super::sequence::Sequence;
 use super::sweep_file::semantic_labels;
-use crate::kitti::{Camera, corners, line};
+use crate::kitti::{CALIBRATION, Camera, corners, line};
 
 formats::named! {
     /// A layout of data sets of sweeps.
@@ -29,17 +29,6 @@ formats::named! {
     }
 }
 
-/// The camera: a focal length and a middle of KITTI's order, and no distance to the sensor.
-const CALIBRATION: &str = "\
-P0: 720 0 621 0 0 720 187.5 0 0 0 1 0
-P1: 720 0 621 0 0 720 187.5 0 0 0 1 0
-P2: 720 0 621 0 0 720 187.5 0 0 0 1 0
-P3: 720 0 621 0 0 720 187.5 0 0 0 1 0
-R0_rect: 1 0 0 0 1 0 0 0 1
-Tr_velo_to_cam: 0 -1 0 0 0 0 -1 0 1 0 0 0
-Tr_imu_to_velo: 1 0 0 0 0 1 0 0 0 0 1 0
-";
-
 /// The size of KITTI's pictures, pixels.
 const PICTURE: [f64; 2] = [1242.0, 375.0];
 
@@ -50,27 +39,21 @@ const PERIOD_S: f64 = 0.1;
 pub struct Writer {
     layout: Layout,
     folder: PathBuf,
-    /// The names of the sweeps for training and for validation.
-    splits: [Vec<String>; 2],
+    /// The number of all sweeps, of which a part may be written here.
+    n_sweeps: u32,
     camera: Camera,
 }
 
 impl Writer {
-    pub fn new(layout: Layout, folder: PathBuf) -> Self {
+    pub fn new(layout: Layout, folder: PathBuf, n_sweeps: u32) -> Self {
         let camera = Camera::parse(CALIBRATION).expect("invariant: the calibration is valid");
-        Self { layout, folder, splits: Default::default(), camera }
+        Self { layout, folder, n_sweeps, camera }
     }
 
     /// Writes a sweep.
-    pub fn add(&mut self, stage: &Stage, done: &LabelledScene) -> anyhow::Result<()> {
-        let is_test = is_test(done.scene.number);
-        let split = &mut self.splits[usize::from(is_test)];
-        // Sequences have sweeps without gaps in their numbers.
-        let name = match self.layout {
-            Layout::SemanticKitti => format!("{:06}", split.len()),
-            _ => format!("{:06}", done.scene.number),
-        };
-        split.push(name.clone());
+    pub fn add(&self, stage: &Stage, done: &LabelledScene) -> anyhow::Result<()> {
+        let number = done.scene.number;
+        let name = name(number);
         let level = done.scene.level_from_sensor();
         let to_level =
             |at: &[f32; 3]| (level * DVec3::from(at.map(f64::from))).as_vec3().to_array();
@@ -86,11 +69,10 @@ impl Writer {
         };
         match self.layout {
             Layout::SemanticKitti => {
-                let sequence = sequence(is_test);
+                // Sequences have sweeps without gaps in their numbers.
+                let place = place_in_set(number) as usize;
                 let labels = semantic_labels(stage, done)?;
-                let labels = [(vec!["label"], Column::U32(&labels))];
-                write(&format!("{sequence}/velodyne/{name}.bin"), b"", &columns)?;
-                write(&format!("{sequence}/labels/{name}.label"), b"", &labels)?;
+                self.sequence(is_test(number)).add(place, &positions, intensity, &labels)?;
             }
             Layout::Kitti => {
                 write(&format!("training/velodyne/{name}.bin"), b"", &columns)?;
@@ -108,33 +90,25 @@ impl Writer {
         Ok(())
     }
 
-    /// Writes what is about all sweeps.
+    /// Writes what is about all sweeps, those of other parts included.
     pub fn finish(&self) -> Result<(), FormatError> {
-        for (split, is_test) in self.splits.iter().zip([false, true]) {
+        for of_test in [false, true] {
+            let numbers = (0..self.n_sweeps).filter(|number| is_test(*number) == of_test);
             if self.layout == Layout::SemanticKitti {
-                self.finish_sequence(split.len(), is_test)?;
+                // Each sweep is a scene of its own: their poses are equal.
+                self.sequence(of_test).finish(numbers.map(|_| Pose::IDENTITY), PERIOD_S)?;
                 continue;
             }
-            let name = if is_test { "val" } else { "train" };
-            let list: String = split.iter().map(|name| format!("{name}\n")).collect();
-            self.text(&format!("ImageSets/{name}.txt"), &list)?;
+            let set = if of_test { "val" } else { "train" };
+            let list: String = numbers.map(|number| name(number) + "\n").collect();
+            self.text(&format!("ImageSets/{set}.txt"), &list)?;
         }
         Ok(())
     }
 
-    /// Each sweep is a scene of its own: their poses are equal.
-    fn finish_sequence(&self, n: usize, is_test: bool) -> Result<(), FormatError> {
-        let sequence = sequence(is_test);
-        let transform = CALIBRATION.lines().find_map(|line| line.strip_prefix("Tr_velo_to_cam"));
-        let transform = transform.expect("invariant: the calibration has it");
-        let cameras: String = CALIBRATION.lines().take(4).map(|line| format!("{line}\n")).collect();
-        self.text(&format!("{sequence}/calib.txt"), &format!("{cameras}Tr{transform}\n"))?;
-        self.text(&format!("{sequence}/poses.txt"), &"1 0 0 0 0 1 0 0 0 0 1 0\n".repeat(n))?;
-        let times = (0..n).fold(String::new(), |mut text, i| {
-            writeln!(text, "{:.6e}", i as f64 * PERIOD_S).expect("invariant: a string takes all");
-            text
-        });
-        self.text(&format!("{sequence}/times.txt"), &times)
+    /// SemanticKITTI validates on sequence 08.
+    fn sequence(&self, is_test: bool) -> Sequence {
+        Sequence(self.folder.join(if is_test { "sequences/08" } else { "sequences/00" }))
     }
 
     fn text(&self, file: &str, text: &str) -> Result<(), FormatError> {
@@ -158,9 +132,9 @@ impl Writer {
     }
 }
 
-/// SemanticKITTI validates on sequence 08.
-fn sequence(is_test: bool) -> &'static str {
-    if is_test { "sequences/08" } else { "sequences/00" }
+/// The name of the files of a sweep.
+fn name(number: u32) -> String {
+    format!("{number:06}")
 }
 
 /// The lines that `line` makes of the classes and the boxes of a sweep's objects.

@@ -3,11 +3,13 @@
 use std::path::Path;
 
 use anyhow::{Context, ensure};
-use edgepuck_scenes::{DrawnScene, LabelledScene, Stage};
+use edgepuck_scenes::{DrawnScene, LabelledScene, Objects, Stage};
 use formats::hash::Hashing;
 use formats::rows;
 use formats::scan::Column;
 use formats::scan_file::{ScanFormat, write_scan};
+
+use super::sequence::Sequence;
 
 formats::named! {
     /// A file format of sweeps.
@@ -46,6 +48,9 @@ const CODES: [(&[&str], u16, u8); 17] = [
 ];
 /// Other objects, and unclassified points.
 const OTHER: (u16, u8) = (99, 1);
+/// SemanticKITTI's labels of cars, bicyclists, persons, motorcyclists, buses and trucks, and of those
+/// that move.
+const MOVING: [(u16, u16); 6] = [(10, 252), (31, 253), (30, 254), (32, 255), (13, 257), (18, 258)];
 
 /// What a point lies on.
 #[derive(Clone, Copy)]
@@ -82,25 +87,22 @@ pub fn write(
         (rows::AXES.to_vec(), Column::Vector(&scan.positions)),
         (vec!["intensity"], Column::F32(intensity)),
     ];
-    let write = |file: &Path, header: &str, columns: &rows::Columns<'_>| {
-        rows::write(file, Hashing::None, header, columns).map(|_| ())
-    };
     match format {
         SweepFormat::Npz => {
             write_scan(&file("npz"), ScanFormat::Npz, Hashing::None, scan)?;
         }
         SweepFormat::SemanticKitti => {
-            let of_pair = |folder, end| sweeps.join(format!("{folder}/{number:06}.{end}"));
             let labels = column(semantic_label);
-            write(&of_pair("velodyne", "bin"), "", &columns)?;
-            write(&of_pair("labels", "label"), "", &[(vec!["label"], Column::U32(&labels))])?;
+            let sequence = Sequence(sweeps.to_path_buf());
+            sequence.add(number as usize, &scan.positions, intensity, &labels)?;
         }
         SweepFormat::Pcd => {
             let [label, instance] = [column(|s| s.class.into()), column(|s| s.object.into())];
             columns.push((vec!["ring"], Column::U16(done.sweep.rings())));
             columns.push((vec!["label"], Column::U32(&label)));
             columns.push((vec!["instance"], Column::U32(&instance)));
-            write(&file("pcd"), &rows::pcd_header(None, &columns), &columns)?;
+            let header = rows::pcd_header(None, &columns);
+            rows::write(&file("pcd"), Hashing::None, &header, &columns)?;
         }
         #[cfg(feature = "las")]
         SweepFormat::Las => {
@@ -130,6 +132,23 @@ fn semantic_label(of: &Surface) -> u32 {
     u32::from(of.object) << 16 | u32::from(of.codes.0)
 }
 
+/// SemanticKITTI's class of objects of this `kind`, which may move.
+pub fn semantic_class(kind: &str, moves: bool) -> u16 {
+    let (class, _) = codes(kind);
+    let moving = MOVING.iter().find(|(still, _)| moves && *still == class);
+    moving.map_or(class, |(_, moving)| *moving)
+}
+
+/// The kind by which [`CODES`] has the objects of an entry of a recipe.
+pub fn kind(entry: &Objects) -> &str {
+    entry.built_in().map_or(&*entry.class, |_| &entry.kind)
+}
+
+fn codes(kind: &str) -> (u16, u8) {
+    let codes = CODES.iter().find(|(names, ..)| names.contains(&kind));
+    codes.map_or(OTHER, |&(_, label, code)| (label, code))
+}
+
 /// What each point lies on.
 fn of_points(stage: &Stage, done: &LabelledScene) -> anyhow::Result<Vec<Surface>> {
     let n_objects = done.scene.objects.len();
@@ -144,15 +163,13 @@ fn surfaces(stage: &Stage, scene: &DrawnScene) -> Vec<Surface> {
     let classes = classes(stage);
     let surface = |object: u16, kind: &str, class: &str| {
         let class = classes.iter().position(|known| *known == class);
-        let codes = CODES.iter().find(|(names, ..)| names.contains(&kind));
-        let codes = codes.map_or(OTHER, |&(_, label, code)| (label, code));
+        let codes = codes(kind);
         let class = class.expect("invariant: a stage has the classes of all its objects") as u16;
         Surface { class, object, codes }
     };
     let objects = (1..).zip(&scene.objects).map(|(number, object)| {
         let entry = &stage.recipe().object[object.entry];
-        let kind = entry.built_in().map_or(&*entry.class, |_| &entry.kind);
-        surface(number, kind, &entry.class)
+        surface(number, kind(entry), &entry.class)
     });
     let ground = surface(0, "ground", "ground");
     std::iter::once(ground).chain(objects).chain([surface(0, "air", "air")]).collect()

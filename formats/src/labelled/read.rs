@@ -46,6 +46,7 @@ pub fn read_labelled(path: &Path) -> Result<LabelledSet, FormatError> {
         n_raw: column(&mut npz, "n_raw", of_all, read_whole_numbers)?,
         range_m: column(&mut npz, "range_m", of_ragged, numbers)?,
         height_m: column(&mut npz, "height_m", of_ragged, numbers)?,
+        truth_share: column(&mut npz, "truth_share", of_ragged, numbers)?,
         sensor: column(&mut npz, "sensor", of_ragged, NpzReader::text)?,
         ids: column(&mut npz, "ids", of_ragged, NpzReader::text)?,
         raw_labels: column(&mut npz, "raw_labels", of_ragged, NpzReader::text)?,

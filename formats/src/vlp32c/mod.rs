@@ -132,20 +132,8 @@ impl Revolution {
     /// The encoder's azimuth at the start of `sequence`, units of 0.01 degree.
     #[must_use]
     pub fn azimuth(&self, sequence: u32) -> u16 {
-        self.units(sequence).rem_euclid(UNITS_PER_TURN) as u16
-    }
-
-    /// The number of times that the encoder of a sensor that keeps turning has passed 0 at the start
-    /// of `sequence`.
-    #[must_use]
-    pub fn turn(&self, sequence: u32) -> u32 {
-        (self.units(sequence) / UNITS_PER_TURN) as u32
-    }
-
-    /// Whole units of azimuth since sequence 0.
-    fn units(&self, sequence: u32) -> f64 {
         let turned = f64::from(sequence) * SEQUENCE_US * 1e-6 * self.rpm / 60.0;
-        (turned * UNITS_PER_TURN).round()
+        (turned * UNITS_PER_TURN).round().rem_euclid(UNITS_PER_TURN) as u16
     }
 }
 

@@ -87,6 +87,7 @@ pub use sim_gpu::internals::simplify::Simplify;
 pub mod internals {
     pub use crate::finish::finish;
     pub use crate::journal::{Journal, Terms};
+    pub use crate::merge::{Part, check_parts, link};
     pub mod layout {
         pub use crate::layout::*;
     }

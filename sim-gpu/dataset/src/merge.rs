@@ -1,3 +1,4 @@
+use crate::config::DatasetConfig;
 use crate::difference::difference;
 use crate::error::DatasetError;
 use crate::finish::complete;
@@ -8,6 +9,7 @@ use crate::record::Entry;
 use crate::verify::first_problem;
 use formats::atomic;
 use rayon::prelude::*;
+use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io;
@@ -22,18 +24,17 @@ use std::path::{Path, PathBuf};
 /// # Errors
 /// Shards that do not make one dataset, are not finished or have a file that was changed; a file that cannot be read or written.
 pub fn merge(shards: &[PathBuf], out: &Path) -> Result<Manifest, DatasetError> {
-    let parts: Vec<Part> = shards.iter().map(|path| Part::read(path)).collect::<Result<_, _>>()?;
-    check_agreement(&parts)?;
-    check_numbers(&parts, out)?;
-    check_entries(&parts)?;
-    check_empty(out)?;
-    for Part { path, manifest, .. } in &parts {
+    let shards: Vec<Shard> =
+        shards.iter().map(|path| Shard::read(path)).collect::<Result<_, _>>()?;
+    check_parts(&shards.iter().map(Shard::part).collect::<Vec<_>>(), out)?;
+    check_entries(&shards)?;
+    for Shard { path, manifest, .. } in &shards {
         if let Some(problem) = first_problem(path, manifest) {
             return Err(DatasetError::malformed(path, problem));
         }
     }
-    let merged = parts.iter().try_for_each(|part| link_scans(part, out));
-    let merged = merged.and_then(|()| complete(out, union(parts)));
+    let merged = shards.iter().try_for_each(|shard| link_scans(shard, out));
+    let merged = merged.and_then(|()| complete(out, union(shards)));
     if merged.is_err() {
         // The first error is returned; the files that are left have no manifest.
         let _ = empty(out);
@@ -41,15 +42,28 @@ pub fn merge(shards: &[PathBuf], out: &Path) -> Result<Manifest, DatasetError> {
     merged
 }
 
-/// A shard: part `number` of `of` parts.
-struct Part {
+struct Shard {
     path: PathBuf,
     manifest: Manifest,
     number: u32,
     of: u32,
 }
 
-impl Part {
+/// What a shard says of itself.
+pub struct Part<'a, Settings> {
+    /// Its folder.
+    pub path: &'a Path,
+    /// Its number, from 0.
+    pub number: u32,
+    /// The number of all parts.
+    pub of: u32,
+    /// The version of Edgepuck that made it.
+    pub version: &'a str,
+    /// What all parts have in common.
+    pub settings: &'a Settings,
+}
+
+impl Shard {
     fn read(path: &Path) -> Result<Self, DatasetError> {
         if Journal::at(path).exists() {
             return Err(DatasetError::Unfinished { path: path.into() });
@@ -63,14 +77,19 @@ impl Part {
         };
         Ok(Self { path: path.into(), manifest, number, of })
     }
+
+    fn part(&self) -> Part<'_, DatasetConfig> {
+        let Self { path, manifest: Manifest { version, config, .. }, number, of } = self;
+        Part { path, number: *number, of: *of, version, settings: config }
+    }
 }
 
-fn check_agreement(parts: &[Part]) -> Result<(), DatasetError> {
+/// Checks that `parts` are all parts of one whole, which can be written to the folder `out`.
+pub fn check_parts(parts: &[Part<'_, impl Serialize>], out: &Path) -> Result<(), DatasetError> {
     let ours = env!("CARGO_PKG_VERSION");
-    for part in parts {
-        let Part { path, manifest, of, .. } = part;
-        if manifest.version != ours {
-            let cause = format!("was made by version {}; this is {ours}", manifest.version);
+    for Part { path, of, version, settings, .. } in parts {
+        if *version != ours {
+            let cause = format!("was made by version {version}; this is {ours}");
             return Err(DatasetError::malformed(path, cause));
         }
         let first = &parts[0];
@@ -78,21 +97,22 @@ fn check_agreement(parts: &[Part]) -> Result<(), DatasetError> {
             let cause = format!("is one of {of}; {} is one of {}", first.path.display(), first.of);
             return Err(DatasetError::malformed(path, cause));
         }
-        if let Some(difference) = difference(&manifest.config, &first.manifest.config) {
+        if let Some(difference) = difference(settings, first.settings) {
             let cause = format!("differs from {}: {difference}", first.path.display());
             return Err(DatasetError::malformed(path, cause));
         }
     }
-    Ok(())
+    check_numbers(parts, out)?;
+    check_empty(out)
 }
 
 /// Checks that each part occurs exactly once.
-fn check_numbers(parts: &[Part], out: &Path) -> Result<(), DatasetError> {
+fn check_numbers<Settings>(parts: &[Part<'_, Settings>], out: &Path) -> Result<(), DatasetError> {
     let mut seen = BTreeMap::new();
     for part in parts {
-        if let Some(first) = seen.insert(part.number, &part.path) {
+        if let Some(first) = seen.insert(part.number, part.path) {
             let cause = format!("is the same part as {}", first.display());
-            return Err(DatasetError::malformed(&part.path, cause));
+            return Err(DatasetError::malformed(part.path, cause));
         }
     }
     let of = parts.first().map_or(1, |part| part.of);
@@ -108,7 +128,7 @@ fn check_numbers(parts: &[Part], out: &Path) -> Result<(), DatasetError> {
     }
 }
 
-fn check_entries(parts: &[Part]) -> Result<(), DatasetError> {
+fn check_entries(parts: &[Shard]) -> Result<(), DatasetError> {
     let mut seen = BTreeMap::new();
     for part in parts {
         for entry in part.manifest.entries() {
@@ -134,12 +154,13 @@ fn check_empty(out: &Path) -> Result<(), DatasetError> {
 }
 
 /// Links or copies all scans of one shard into `out`.
-fn link_scans(part: &Part, out: &Path) -> Result<(), DatasetError> {
+fn link_scans(part: &Shard, out: &Path) -> Result<(), DatasetError> {
     let files: Vec<PathBuf> = part.manifest.scan_files().map(|(file, ..)| file).collect();
     files.par_iter().try_for_each(|file| link(&part.path.join(file), &out.join(file)))
 }
 
-fn link(from: &Path, to: &Path) -> Result<(), DatasetError> {
+/// Makes `to` the same file as `from`, or else a copy of it.
+pub fn link(from: &Path, to: &Path) -> Result<(), DatasetError> {
     if let Some(folder) = to.parent() {
         fs::create_dir_all(folder).map_err(|error| DatasetError::io(folder, error))?;
     }
@@ -151,7 +172,7 @@ fn link(from: &Path, to: &Path) -> Result<(), DatasetError> {
 }
 
 /// The manifest of the whole, without poses, packed files and layouts.
-fn union(parts: Vec<Part>) -> Manifest {
+fn union(parts: Vec<Shard>) -> Manifest {
     let mut manifests = parts.into_iter().map(|part| part.manifest);
     let mut whole = manifests.next().expect("invariant: check_numbers wants one part at least");
     whole.shard = None;

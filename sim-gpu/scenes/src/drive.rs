@@ -1,4 +1,4 @@
-//! A drive through a street, as the packets of a rotating VLP-32C.
+//! A drive through a street with a rotating sensor, as packets.
 //!
 //! Each beam is cast from the pose that the sensor has when the beam fires, at the objects where
 //! they are at that time.
@@ -11,7 +11,7 @@ use edgepuck_shapes::Sampler;
 use formats::Scan;
 use formats::scan::Attribute;
 use formats::streams::Stream;
-use formats::vlp32c::{Returns, Revolution, SEQUENCE_US, SEQUENCES_PER_PACKET};
+use formats::vlp32c::{AZIMUTH_UNIT_DEG, Returns, Revolution, SEQUENCES_PER_PACKET};
 use glam::DVec3;
 use rayon::prelude::*;
 use sim_gpu::internals::config::InvalidValue;
@@ -32,6 +32,9 @@ use crate::sway::Sway;
 /// there and open their doors.
 const FROM_KERB_M: f64 = 2.3;
 
+/// The number that [`Packet::scan`] has for objects in the air, such as raindrops.
+pub const AIR: u32 = u32::MAX;
+
 /// A sensor that drives along a street.
 ///
 /// ```
@@ -46,7 +49,6 @@ const FROM_KERB_M: f64 = 2.3;
 pub struct Drive<'a> {
     pub(crate) street: Street<'a>,
     sensor: SensorProfile,
-    revolution: Revolution,
     /// The pose of the sensor at time 0.
     start: Pose,
     velocity_m_s: DVec3,
@@ -57,8 +59,8 @@ pub struct Drive<'a> {
 /// The points of one packet.
 #[derive(Clone, Debug)]
 pub struct Packet {
-    /// Beams, ranges and objects in the order of firing, with positions in the world. Object 0 is
-    /// the ground, and object `i` is [`Drive::object`] `i`.
+    /// Beams, ranges, intensities and objects in the order of firing, with positions in the world.
+    /// Object 0 is the ground, object `i` is [`Drive::object`] `i`, and [`AIR`] is none.
     pub scan: Scan,
     pub(crate) points: ObjectPoints,
 }
@@ -77,16 +79,16 @@ impl<'a> Drive<'a> {
     /// Starts a drive at the origin, along x at `speed_m_s`, with the first sensor of `stage`.
     ///
     /// # Errors
-    /// The sensor is not a VLP-32C, or it has effects that its packets cannot represent.
+    /// The sensor has no head that turns and fires whole sequences, or its effects move it.
     pub fn new(stage: &'a Stage, speed_m_s: f64) -> Result<Self, SceneError> {
-        let sensor = packets::with_packet_geometry(stage.sensors[0].sensor.profile())?;
-        let effects = stage.sensors[0].caster.effects();
-        packets::returns(effects, None)?;
-        if effects.motion.is_some() {
+        let profile = stage.sensors[0].sensor.profile();
+        check_head(profile)?;
+        // Packets round azimuths, which only a VLP-32C's are written with.
+        let sensor = packets::with_packet_geometry(profile).unwrap_or_else(|_| profile.clone());
+        if stage.sensors[0].caster.effects().motion.is_some() {
             let cause = "expected no motion, because a drive moves the sensor itself";
             return Err(InvalidValue::new("effects.motion", cause).into());
         }
-        let revolution = packets::revolution(&sensor)?;
         let (recipe, seed) = (stage.recipe(), stage.seed());
         let s = &mut Sampler::new(Stream::Drive {}.key(seed));
         let start = draw_mount(stage, s);
@@ -100,20 +102,37 @@ impl<'a> Drive<'a> {
         let velocity_m_s = ground.along(speed_m_s);
         let street = Street::new(stage, ground, s);
         let sway = Sway::draw(recipe.mount.sway_deg, speed_m_s, seed);
-        Ok(Self { street, sensor, revolution, start, velocity_m_s, sway, glass_returned })
+        Ok(Self { street, sensor, start, velocity_m_s, sway, glass_returned })
     }
 
-    /// The rotation of the sensor's head.
-    #[must_use]
-    pub fn revolution(&self) -> &Revolution {
-        &self.revolution
-    }
-
-    /// The returns of each beam that the packets hold.
-    #[must_use]
-    pub fn returns(&self) -> Returns {
+    /// The rotation of the sensor's head and the returns of each beam, as packets hold them.
+    ///
+    /// # Errors
+    /// The sensor is not a VLP-32C, or it has effects that its packets cannot represent.
+    pub fn in_packets(&self) -> Result<(Revolution, Returns), SceneError> {
         let effects = self.street.stage.sensors[0].caster.effects();
-        packets::returns(effects, None).expect("invariant: `Drive::new` has checked the effects")
+        Ok((packets::revolution(&self.sensor)?, packets::returns(effects, None)?))
+    }
+
+    /// The time between two turns of the head, seconds.
+    #[must_use]
+    pub fn period_s(&self) -> f64 {
+        self.head().period_s()
+    }
+
+    /// The time between two packets, seconds.
+    #[must_use]
+    pub fn packet_s(&self) -> f64 {
+        f64::from(SEQUENCES_PER_PACKET) * self.head().sequence_us * 1e-6
+    }
+
+    /// The number of times that the encoder had passed 0 when this `beam` of this packet fired.
+    #[must_use]
+    pub fn turn(&self, packet: u32, beam: u32) -> u32 {
+        let sequence = packet * SEQUENCES_PER_PACKET + beam / self.head().beam.len() as u32;
+        let turned = f64::from(sequence) * self.head().sequence_us * 1e-6 * self.head().rpm / 60.0;
+        let units_per_turn = 360.0 / AZIMUTH_UNIT_DEG;
+        ((turned * units_per_turn).round() / units_per_turn) as u32
     }
 
     /// The pose of the sensor `time_s` after the start.
@@ -135,8 +154,9 @@ impl<'a> Drive<'a> {
     /// # Errors
     /// The caster fails.
     pub fn fire(&mut self, numbers: Range<u32>) -> Result<Vec<Packet>, SceneError> {
+        let sequence_us = self.head().sequence_us;
         let [from_s, to_s] = [numbers.start, numbers.end]
-            .map(|number| f64::from(number * SEQUENCES_PER_PACKET) * SEQUENCE_US * 1e-6);
+            .map(|number| f64::from(number * SEQUENCES_PER_PACKET) * sequence_us * 1e-6);
         let place = |time_s| (self.pose(time_s).position_m.x, time_s);
         self.street.draw_around([place(from_s), place(to_s)]);
         let this = &*self;
@@ -200,34 +220,36 @@ impl<'a> Drive<'a> {
         let mut request = ScanRequest::new(&self.sensor, &pattern, pose);
         request.motion = trajectory([from_s, to_s].map(|time_s| (time_s, self.pose(time_s))));
         request.deskew = true;
-        request.attributes = [Attribute::Beam, Attribute::Range, Attribute::Object].into();
+        request.attributes =
+            [Attribute::Beam, Attribute::Range, Attribute::Intensity, Attribute::Object].into();
         request.stream = Stream::DriveBeams { packet: number }.key(stage.seed());
         let placed = world.placed(|_, _| None);
         let mut scan = scan_objects(caster, &placed, &request)?.scan;
         for object in scan.object.iter_mut().flatten() {
-            // Points in the air belong to no target; like those on the ground, they get 0.
-            let in_sight = (*object as usize).checked_sub(n_tiles);
-            *object = in_sight.and_then(|i| numbers.get(i)).map_or(0, |number| *number);
+            // Tiles of the ground come first; points in the air belong to no target.
+            *object = match (*object as usize).checked_sub(n_tiles) {
+                None => 0,
+                Some(in_sight) => numbers.get(in_sight).map_or(AIR, |number| *number),
+            };
         }
-        let points = self.points_on_objects(first, &pattern, &scan);
+        let points = self.points_on_objects(number, &pattern, &scan);
         Ok(Packet { scan, points })
     }
 
     fn head(&self) -> &Rotating {
         match &self.sensor.layout {
             Layout::Rotating(head) => head,
-            _ => unreachable!("invariant: a VLP-32C rotates"),
+            _ => unreachable!("invariant: `Drive::new` has checked the head"),
         }
     }
 
-    /// The points of `scan` on objects; `first` is the number of its first firing sequence.
-    fn points_on_objects(&self, first: u32, pattern: &BeamPattern, scan: &Scan) -> ObjectPoints {
-        let n_lasers = self.head().beam.len() as u32;
+    /// The points of `scan`, that of packet `number`, on objects.
+    fn points_on_objects(&self, number: u32, pattern: &BeamPattern, scan: &Scan) -> ObjectPoints {
         let mut points = ObjectPoints::new();
         let beams = scan.beam.iter().flatten();
         for (&beam, &object) in beams.zip(scan.object.iter().flatten()) {
-            if object > 0 {
-                let turn = self.revolution.turn(first + beam / n_lasers);
+            if self.object(object).is_some() {
+                let turn = self.turn(number, beam);
                 let sum = points.entry((turn, object)).or_default();
                 sum.count += 1;
                 sum.time_s += pattern.time_s[(beam * pattern.rays_per_beam) as usize];
@@ -235,6 +257,29 @@ impl<'a> Drive<'a> {
         }
         points
     }
+}
+
+/// Checks that all beams of the sensor fire in sequences, of which a packet is half a turn at most.
+fn check_head(sensor: &SensorProfile) -> Result<(), InvalidValue> {
+    let Layout::Rotating(head) = &sensor.layout else {
+        let cause = "expected a head that turns, which a drive needs, found another layout";
+        return Err(InvalidValue::new("rotating", cause));
+    };
+    let others = [
+        ("decimation", sensor.decimation.get() != 1),
+        ("rings", sensor.rings.is_some()),
+        ("sample", sensor.sample.is_some()),
+    ];
+    if let Some((key, _)) = others.into_iter().find(|(_, is_there)| *is_there) {
+        return Err(InvalidValue::new(key, "expected none in a drive, which fires all beams"));
+    }
+    let per_turn = head.period_s() * 1e6 / head.sequence_us;
+    let least = 2 * SEQUENCES_PER_PACKET;
+    if per_turn < f64::from(least) {
+        let cause = format!("expected at least {least} sequences a turn, found {per_turn:.1}");
+        return Err(InvalidValue::new("rotating.sequence_us", cause));
+    }
+    Ok(())
 }
 
 /// The trajectory between two poses; `None` if they are equal.

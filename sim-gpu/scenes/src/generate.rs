@@ -1,5 +1,6 @@
 //! Makes a training set of clusters from many scenes.
 
+use std::ops::Range;
 use std::path::Path;
 
 use edgepuck_segment::{Label, Segmenter, Settings, Sweep as Points};
@@ -39,7 +40,7 @@ pub struct ClusterCounts {
     pub test: Vec<usize>,
 }
 
-/// Scans the first `count` scenes of `stage`, segments them with `settings`, and packs the
+/// Scans the scenes of `stage` with these `numbers`, segments them with `settings`, and packs the
 /// clusters into `train.npz` and `test.npz` in `folder`; every tenth scene goes to the test set.
 /// `each` is called with every scene, in order.
 ///
@@ -49,7 +50,7 @@ pub struct ClusterCounts {
 pub fn generate<E: From<SceneError>>(
     stage: &Stage,
     settings: &Settings,
-    count: u32,
+    numbers: Range<u32>,
     folder: &Path,
     mut each: impl FnMut(&LabelledScene) -> Result<(), E>,
 ) -> Result<ClusterCounts, E> {
@@ -60,9 +61,8 @@ pub fn generate<E: From<SceneError>>(
         (writer("train.npz").map_err(SceneError::from)?, vec![0; n_classes]),
         (writer("test.npz").map_err(SceneError::from)?, vec![0; n_classes]),
     ];
-    for first in (0..count).step_by(BATCH as usize) {
-        let numbers = first..count.min(first.saturating_add(BATCH));
-        let batch: Vec<LabelledScene> = numbers
+    for first in numbers.clone().step_by(BATCH as usize) {
+        let batch: Vec<LabelledScene> = (first..numbers.end.min(first.saturating_add(BATCH)))
             .into_par_iter()
             .map(|number| LabelledScene::new(stage, number, settings))
             .collect::<Result<_, SceneError>>()?;
@@ -82,6 +82,13 @@ pub fn generate<E: From<SceneError>>(
 #[must_use]
 pub fn is_test(number: u32) -> bool {
     number % TEST_EACH == TEST_EACH - 1
+}
+
+/// How many scenes with smaller numbers than this are in the same set.
+#[must_use]
+pub fn place_in_set(number: u32) -> u32 {
+    let n_tests = number / TEST_EACH;
+    if is_test(number) { n_tests } else { number - n_tests }
 }
 
 impl LabelledScene {

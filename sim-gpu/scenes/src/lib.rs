@@ -41,9 +41,9 @@ struct Readme;
 
 pub use boxes::ObjectBox;
 pub use clusters::{LabelledCluster, label_clusters};
-pub use drive::{Drive, Packet};
+pub use drive::{AIR, Drive, Packet};
 pub use error::SceneError;
-pub use generate::{ClusterCounts, LabelledScene, generate, is_test};
+pub use generate::{ClusterCounts, LabelledScene, generate, is_test, place_in_set};
 pub use placed_object::PlacedObject;
 pub use recipe::{Ground, Mount, OTHER, Objects, Place, Recipe, SensorChoice, Span};
 pub use scene::DrawnScene;

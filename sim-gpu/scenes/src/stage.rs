@@ -9,6 +9,7 @@ use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel};
 use sim_gpu::internals::caster::OpenCaster;
 use sim_gpu::internals::config::InvalidValue;
 use sim_gpu::internals::job::Culling;
+use sim_gpu::internals::sensor::SensorProfile;
 use sim_gpu::{Caster, Glass, InstanceId, Mesh, Pose, Scene, Sensor};
 
 use crate::error::SceneError;
@@ -108,6 +109,11 @@ impl Stage {
     #[must_use]
     pub fn recipe(&self) -> &Recipe {
         &self.recipe
+    }
+
+    /// The profiles of the recipe's sensors.
+    pub fn profiles(&self) -> impl Iterator<Item = &SensorProfile> {
+        self.sensors.iter().map(|sensor| sensor.sensor.profile())
     }
 
     /// The seed of all random numbers.

@@ -97,35 +97,28 @@ pub fn table(classes: &[OfClass]) -> Table {
 mod tests {
     use super::*;
 
-    /// The values are those of nuscenes-devkit 1.2.0 for these boxes
-    /// (`accumulate` and `calc_ap`, least recall and precision 0.1).
+    /// Boxes, and their precisions by nuscenes-devkit 1.2.0, which tests/peers/detectors.py computes.
     #[test]
     fn the_precision_is_that_of_nuscenes() {
+        #[derive(serde::Deserialize)]
+        struct Case {
+            labelled: Vec<(usize, f64, f64)>,
+            found: Vec<(usize, f64, f64, f64)>,
+            precision: Vec<(f64, f64)>,
+        }
         let place = |frame, x, y, score| Place { frame, centre_m: [x, y], score };
-        let labelled =
-            [(0, 10.0, 0.0), (0, 20.0, 5.0), (0, 21.5, 5.0), (1, 8.0, -3.0), (1, 30.0, 1.0)];
-        let found = [
-            (0, 10.3, 0.1, 0.9),
-            (0, 20.9, 5.2, 0.8),
-            (0, 20.1, 5.0, 0.8),
-            (0, 40.0, 0.0, 0.7),
-            (1, 8.0, -1.5, 0.95),
-            (1, 8.1, -3.2, 0.6),
-            (1, 33.5, 1.0, 0.5),
-            (1, 10.0, 0.0, 0.4),
-        ];
-        let of = OfClass {
-            class: "car",
-            found: found.map(|(frame, x, y, score)| place(frame, x, y, score)).to_vec(),
-            labelled: labelled.map(|(frame, x, y)| place(frame, x, y, 0.0)).to_vec(),
-        };
-        let none = OfClass { class: "car", found: Vec::new(), labelled: of.labelled.clone() };
-        assert_eq!(none.average_precision(4.0), 0.0);
-        let expected =
-            [0.2380658436213992, 0.43477366255144034, 0.7716049382716051, 0.9186507936507938];
-        for (within_m, expected) in DISTANCES_M.into_iter().zip(expected) {
-            let ap = of.average_precision(within_m);
-            assert!((ap - expected).abs() < 1e-12, "{within_m} m: {ap}");
+        let cases: Vec<Case> = serde_json::from_str(include_str!("precision.json")).unwrap();
+        for Case { labelled, found, precision } in cases {
+            let of = OfClass {
+                class: "car",
+                found: found.into_iter().map(|(frame, x, y, s)| place(frame, x, y, s)).collect(),
+                labelled: labelled.into_iter().map(|(frame, x, y)| place(frame, x, y, 0.0)).collect(),
+            };
+            assert_eq!(precision.len(), DISTANCES_M.len());
+            for ((within_m, expected), ours_m) in precision.into_iter().zip(DISTANCES_M) {
+                let ap = of.average_precision(within_m);
+                assert!(within_m == ours_m && (ap - expected).abs() < 1e-12, "{within_m} m: {ap}");
+            }
         }
     }
 }

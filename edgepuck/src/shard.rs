@@ -1,5 +1,6 @@
 //! The part of a dataset that a task of a job array makes.
 
+use std::ops::Range;
 use std::str::FromStr;
 
 /// The environment variables that hold the number of a task: of Slurm, of Kubernetes' Indexed Jobs
@@ -22,6 +23,13 @@ impl FromStr for Shard {
 }
 
 impl Shard {
+    /// This part of `count` things in order.
+    pub fn part_of(&self, count: u32) -> Range<u32> {
+        let [start, end] = [self.number, self.number + 1]
+            .map(|n| (u64::from(count) * u64::from(n) / u64::from(self.of)) as u32);
+        start..end
+    }
+
     /// The part that `text` names. `variable` looks up an environment variable.
     fn parse(text: &str, variable: impl Fn(&str) -> Option<String>) -> Result<Self, String> {
         match text.split_once('/') {
@@ -102,6 +110,15 @@ mod tests {
             ("SLURM_ARRAY_TASK_COUNT", "8"),
         ];
         assert_eq!(parsed("auto", &array), Ok((3, 8)));
+    }
+
+    #[test]
+    fn parts_are_all_once() {
+        for (count, of) in [(1, 1), (7, 3), (10_000_000, u32::MAX), (u32::MAX, 7)] {
+            let part = |number| Shard { number, of }.part_of(count);
+            assert_eq!((part(0).start, part(of - 1).end), (0, count));
+            (1..of.min(100)).for_each(|n| assert_eq!(part(n - 1).end, part(n).start));
+        }
     }
 
     #[test]
