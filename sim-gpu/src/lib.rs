@@ -35,6 +35,7 @@ pub mod effects;
 mod fixed_frame;
 #[cfg(feature = "gpu")]
 mod gpu;
+mod import;
 mod job;
 mod lanes;
 mod material;
@@ -60,6 +61,7 @@ pub use effects::Effects;
 pub use formats;
 pub use formats::scan::Attribute;
 pub use glam;
+pub use import::Import;
 pub use material::Materials;
 pub use pose::{Pose, Trajectory};
 pub use scan::{Glass, Tally};
@@ -88,7 +90,7 @@ pub mod internals {
     }
 
     modules! {
-        bvh cast_error caster config corruption cpu job material mesh motion packets pose ray resolve
+        bvh cast_error caster config corruption cpu import job material mesh motion packets pose ray resolve
         scan scene sensor simplify surface_points target weather
     }
 

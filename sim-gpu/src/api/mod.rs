@@ -3,6 +3,7 @@
 mod batch;
 mod caster;
 mod error;
+mod import;
 mod mesh;
 mod plausibility;
 mod scan;
