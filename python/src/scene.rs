@@ -12,7 +12,8 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use sim_gpu::internals::scene::check_object;
-use sim_gpu::{Moves, Pose};
+use sim_gpu::{Import, Moves, Pose};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Mutex;
 
@@ -38,11 +39,23 @@ impl Scene {
         Self { scene: Mutex::default() }
     }
 
-    /// Read a scene's TOML file.
+    /// Read a scene's TOML file, a glTF file or a robot.
     #[staticmethod]
-    fn read(py: Python<'_>, file: PathBuf) -> PyResult<Self> {
+    fn read(
+        py: Python<'_>,
+        file: PathBuf,
+        joints: BTreeMap<String, f64>,
+        collision: bool,
+        base_colours: bool,
+    ) -> PyResult<Self> {
+        let import = Import { joints, collision, base_colours };
         let scene = process::run(py, || {
-            let scene = sim_gpu::Scene::read(&file)?;
+            let mut scene = sim_gpu::Scene::new();
+            if import == Import::default() {
+                scene = sim_gpu::Scene::read(&file)?;
+            } else {
+                scene.add_file(&file, &import)?;
+            }
             for instance in scene.instances() {
                 let _ = instance.mesh.target();
             }

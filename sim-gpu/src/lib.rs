@@ -57,6 +57,8 @@ pub use api::{
     Batch, Caster, Error, Instance, InstanceId, Mesh, MountedSensor, Moves, NO_OBJECT, Scan,
     ScanBuilder, Scene, Sensor,
 };
+#[doc(hidden)]
+pub use api::{Extent, FilePlace};
 pub use effects::Effects;
 pub use formats;
 pub use formats::scan::Attribute;

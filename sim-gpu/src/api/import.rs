@@ -14,6 +14,18 @@ use crate::mesh::frame::{Up, z_up};
 use crate::mesh::{AssembledMesh, Assembly, BaseColour};
 use crate::pose::Pose;
 
+/// Where a file's instances stand, and what they are called.
+#[doc(hidden)]
+#[derive(Clone, Debug, Default)]
+pub struct FilePlace {
+    /// The axis of the file that points up, if it is not the format's.
+    pub up: Option<Up>,
+    /// From the file, z up, to the world; it may scale.
+    pub world_from_upright: DAffine3,
+    /// What the names of instances begin with.
+    pub prefix: String,
+}
+
 impl Scene {
     /// Adds what stands in a glTF file (`.glb`, `.gltf`) or a robot (`.urdf`) where the file has it: each
     /// node, or geometry of a link, is an instance with its name; its label is the name of the mesh, or
@@ -30,27 +42,25 @@ impl Scene {
         path: impl AsRef<Path>,
         import: &Import,
     ) -> Result<Vec<InstanceId>, Error> {
-        self.add_file_at(path.as_ref(), import, None, DAffine3::IDENTITY)
+        self.add_file_at(path.as_ref(), import, &FilePlace::default())
     }
 
-    /// As [`Scene::add_file`], of a file whose upward axis may be another, at a place that may scale it.
+    /// As [`Scene::add_file`], at a place.
     #[doc(hidden)]
     pub fn add_file_at(
         &mut self,
         path: &Path,
         import: &Import,
-        up: Option<Up>,
-        world_from_upright: DAffine3,
+        place: &FilePlace,
     ) -> Result<Vec<InstanceId>, Error> {
         let format = Format::from_path(path).ok_or_else(|| {
             let found = path.display();
             InvalidValue::new("file", format!("expected .glb, .gltf or .urdf, found {found}"))
         })?;
         format.check(import)?;
-        let up = up.unwrap_or(format.default_up());
-        let upright_from_file = upright_from_file(up);
+        let upright_from_file = upright_from_file(place.up.unwrap_or(format.default_up()));
         let Assembly { meshes, parts, colours, mut warnings } =
-            format.load(path, import, world_from_upright * upright_from_file)?;
+            format.load(path, import, place.world_from_upright * upright_from_file)?;
         let mut images = colours.iter().filter(|colour| import.base_colours && colour.has_image);
         warnings.extend(images.next().map(|colour| {
             format!("material {:?}: its image is left out of base colours", colour.name)
@@ -87,7 +97,7 @@ impl Scene {
             self[id] = Instance {
                 scale,
                 motion: part.motion,
-                name: Some(names.free(part.name)),
+                name: Some(names.free(place.prefix.clone() + &part.name)),
                 label: part.label,
                 reflectivity,
                 materials,
@@ -138,5 +148,85 @@ impl Names {
         }
         self.0.insert(free.clone(), 1);
         free
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use base64::Engine;
+    use base64::engine::general_purpose::STANDARD;
+    use std::fs;
+
+    /// Nodes over one triangle with two corners at x and y = 1, in two materials.
+    fn gltf(nodes: &str) -> String {
+        let corners = [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+        let bytes: Vec<u8> = corners.iter().flat_map(|x| x.to_le_bytes()).collect();
+        let primitive =
+            |material| format!(r#"{{"attributes": {{"POSITION": 0}}, "material": {material}}}"#);
+        format!(
+            r#"{{"asset": {{"version": "2.0"}}, "scenes": [{{"nodes": [0, 1, 2]}}], "nodes": [{nodes}],
+            "meshes": [{{"name": "tile", "primitives": [{}, {}]}}, {{"primitives": [{}]}}],
+            "materials": [{{"pbrMetallicRoughness": {{"baseColorFactor": [1, 0, 0.5, 1]}}}}, {{}}],
+            "accessors": [{{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
+                "min": [0, 0, 0], "max": [1, 1, 0]}}],
+            "bufferViews": [{{"buffer": 0, "byteLength": 36}}],
+            "buffers": [{{"byteLength": 36, "uri": "data:;base64,{}"}}]}}"#,
+            primitive(0),
+            primitive(1),
+            primitive(0),
+            STANDARD.encode(bytes)
+        )
+    }
+
+    const NODES: &str = r#"{"name": "a", "mesh": 0, "translation": [1, 2, 3], "scale": [1, 2, 3]},
+        {"name": "a", "mesh": 0}, {"mesh": 1, "scale": [-1, 1, 1]}"#;
+
+    #[test]
+    fn nodes_become_instances_with_z_up() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("tiles.gltf");
+        fs::write(&file, gltf(NODES)).unwrap();
+        let scene = Scene::read(&file).unwrap();
+        let [a, b, c] = scene.instances() else { panic!("expected three instances") };
+        let names = [a, b, c].map(|instance| instance.name.as_deref().unwrap());
+        assert_eq!(names, ["a", "a (2)", "nodes[2]"]);
+        assert_eq!([&a.label, &c.label], [&Some("tile".to_owned()), &None]);
+        // (x, y, z) becomes (x, -z, y), of places and of factors.
+        assert_eq!(a.pose, Pose::at([1.0, -3.0, 2.0]));
+        assert_eq!(a.scale, DVec3::new(1.0, 3.0, 2.0));
+        assert_eq!(a.mesh.vertices()[2], DVec3::Z);
+        assert!(std::ptr::eq(a.mesh.vertices(), b.mesh.vertices()));
+        assert_eq!(c.mesh.vertices()[1], DVec3::new(-1.0, 0.0, 0.0));
+        assert_eq!((a.reflectivity, a.materials.is_none()), (1.0, true));
+
+        let mut scene = Scene::new();
+        let import = Import { base_colours: true, ..Import::default() };
+        let ids = scene.add_file(&file, &import).unwrap();
+        let materials = scene[ids[0]].materials.as_ref().unwrap();
+        // 0.2126 + 0.0722 / 2, by the weights of BT.709.
+        let found = [0, 1].map(|triangle| materials.at(triangle, || DVec3::ZERO).reflectivity);
+        assert_eq!(found.map(|x| (1e9 * x).round()), [248_700_000.0, 1e9]);
+        assert!((scene[ids[2]].reflectivity - 0.2487).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_scene_s_file_places_files_and_gives_them_a_label() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("tiles.gltf"), gltf(NODES)).unwrap();
+        let robot = "<robot><link name=\"l\"/><joint name=\"j\" type=\"prismatic\"><parent link=\"l\"/><child link=\"m\"/></joint><link name=\"m\"><visual><geometry><box size=\"1 1 1\"/></geometry></visual></link></robot>";
+        fs::write(folder.path().join("robot.urdf"), robot).unwrap();
+        let file = folder.path().join("scene.toml");
+        let text = "[[object]]\nscene = \"tiles.gltf\"\nname = \"floor\"\nlabel = \"ground\"\nposition_m = [10, 0, 0]\n\
+                    yaw_deg = 90\nreflectivity = 0.25\n[[object]]\nscene = \"robot.urdf\"\njoints = { j = 2 }\n\
+                    [[sensor]]\nprofile = \"vlp16\"\nposition_m = [0, 0, 1]\nyaw_deg = 0\n";
+        fs::write(&file, text).unwrap();
+        let scene = Scene::read(&file).unwrap();
+        let [a, _, _, hand] = scene.instances() else { panic!("expected four instances") };
+        assert_eq!(a.name.as_deref(), Some("floor/a"));
+        assert_eq!((a.label.as_deref(), a.reflectivity), (Some("ground"), 0.25));
+        assert!(a.pose.position_m.distance(DVec3::new(13.0, 1.0, 2.0)) < 1e-12);
+        assert_eq!((hand.name.as_deref(), hand.label.as_deref()), (Some("robot/m"), Some("m")));
+        assert_eq!(hand.pose.position_m, DVec3::new(2.0, 0.0, 0.0));
     }
 }
