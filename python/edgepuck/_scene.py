@@ -116,6 +116,24 @@ class Scene:
         """The number of instances."""
         return len(self._scene)
 
+    @property
+    def names(self) -> list[str | None]:
+        """The names of the instances, by their numbers."""
+        return self._scene.names()
+
+    @property
+    def labels(self) -> list[str | None]:
+        """The labels of the instances, by their numbers."""
+        return self._scene.labels()
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """The least and the largest coordinates of the instances, metres, [n, 2, 3].
+
+        Those of animated instances are at time 0.
+        """
+        return np.array(self._scene.bounds()).reshape(-1, 2, 3)
+
     def add(
         self,
         mesh: Mesh,

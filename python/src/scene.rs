@@ -71,6 +71,23 @@ impl Scene {
         lock(&self.scene).instances().len()
     }
 
+    /// The names of the instances.
+    fn names(&self) -> Vec<Option<String>> {
+        lock(&self.scene).instances().iter().map(|instance| instance.name.clone()).collect()
+    }
+
+    /// The labels of the instances.
+    fn labels(&self) -> Vec<Option<String>> {
+        lock(&self.scene).instances().iter().map(|instance| instance.label.clone()).collect()
+    }
+
+    /// The bounding boxes of the instances.
+    fn bounds(&self) -> Vec<[[f64; 3]; 2]> {
+        let extents = lock(&self.scene).clone();
+        let extents = extents.instances().iter().map(sim_gpu::Instance::extent);
+        extents.map(|extent| [extent.low.to_array(), extent.high.to_array()]).collect()
+    }
+
     /// Add a mesh at this pose, and give its number.
     #[expect(clippy::too_many_arguments, reason = "Python's side has names for them")]
     fn add(
