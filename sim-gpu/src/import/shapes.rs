@@ -34,7 +34,7 @@ pub fn capsule(radius_m: f64, length_m: f64) -> TriangleMesh {
     let quarter = n / 4;
     let point = |i: usize, z: f64| {
         let angle = TAU * i as f64 / n as f64;
-        let r = if i % (2 * quarter) == 0 { 0.0 } else { radius_m * angle.sin() };
+        let r = if i.is_multiple_of(2 * quarter) { 0.0 } else { radius_m * angle.sin() };
         (r, z - radius_m * angle.cos())
     };
     let lower = (0..=quarter).map(|i| point(i, -0.5 * length_m));

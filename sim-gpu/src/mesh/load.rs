@@ -92,7 +92,9 @@ fn explained(
     format: MeshFormat,
     folder: Option<&Path>,
 ) -> ParseError {
-    let is_other = |other: &MeshFormat| *other != format && parse_as(bytes, *other, folder).is_ok();
+    let is_gltf = |it: MeshFormat| matches!(it, MeshFormat::Glb | MeshFormat::Gltf);
+    let is_same = |other: MeshFormat| other == format || is_gltf(other) && is_gltf(format);
+    let is_other = |other: &MeshFormat| !is_same(*other) && parse_as(bytes, *other, folder).is_ok();
     let expected = format.name().to_uppercase();
     match (foreign(bytes), MeshFormat::ALL.into_iter().find(is_other)) {
         (Some(found), _) => Malformed::Syntax(format!("expected a mesh, found {found}")).into(),

@@ -14,7 +14,7 @@ use roxmltree::Document;
 
 use super::Import;
 use crate::mesh::{Assembly, Malformed, MeshError, ParseError, read};
-use element::{fault, named, within};
+use element::{fault, within};
 use geometry::Builder;
 use robot::Robot;
 
@@ -25,11 +25,17 @@ pub(super) fn load(
     world_from_file: DAffine3,
 ) -> Result<Assembly, MeshError> {
     let bytes = read(path)?;
-    let text = std::str::from_utf8(&bytes).map_err(|_| {
-        let found = foreign(&bytes).unwrap_or("other bytes");
-        ParseError::from(Malformed::Syntax(format!("expected URDF, found {found}"))).of(path)
-    })?;
-    parse(text, Some(path), import, world_from_file).map_err(|error| error.of(path))
+    let no_text = |_| ParseError::from(Malformed::Syntax("expected URDF, found no UTF-8".into()));
+    let parsed = std::str::from_utf8(&bytes)
+        .map_err(no_text)
+        .and_then(|text| parse(text, Some(path), import, world_from_file));
+    parsed.map_err(|error| match foreign(&bytes) {
+        _ if bytes.is_empty() => ParseError::from(Malformed::Empty).of(path),
+        Some(found) => {
+            ParseError::from(Malformed::Syntax(format!("expected URDF, found {found}"))).of(path)
+        }
+        None => error.of(path),
+    })
 }
 
 /// The robot of this text; without its path, it has no files of meshes.
@@ -51,18 +57,18 @@ pub fn parse(
     let robot = Robot::new(root)?;
     let mut builder = Builder::of(path);
     let positions = robot.positions(import, &mut builder.assembly.warnings)?;
-    let mut open = vec![(robot.root()?, world_from_file)];
+    let mut open = vec![(robot.root, world_from_file)];
     let mut n_reached = 0;
-    while let Some((link, world_from_link)) = open.pop() {
+    while let Some((number, world_from_link)) = open.pop() {
         n_reached += 1;
-        let name = named(link)?;
+        let (name, link) = robot.links[number];
         builder
             .add_link(link, name, import.collision, world_from_link)
             .map_err(|error| within("link", name, error))?;
-        for joint in robot.joints_of(name).rev() {
-            let (_, child) = joint.links;
-            let link_from_child = joint.at(positions[joint.name])?;
-            open.push((robot.links[child], world_from_link * link_from_child));
+        for &number in robot.below[number].iter().rev() {
+            let joint = &robot.joints[number];
+            let link_from_child = joint.at(positions[number])?;
+            open.push((joint.links.1, world_from_link * link_from_child));
         }
     }
     if n_reached < robot.links.len() {

@@ -1,6 +1,6 @@
 //! Links and joints.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 
 use glam::{DAffine3, DVec3};
 use roxmltree::Node;
@@ -68,95 +68,77 @@ impl<'a> Joint<'a> {
 
     /// What is doubtful about this position.
     fn doubt(&self, position: f64) -> Result<Option<String>, ParseError> {
-        let limit = child(self.node, "limit").filter(|_| self.kind != "continuous" && self.moves());
+        let (name, kind) = (self.name, self.kind);
+        if ["floating", "planar"].contains(&kind) {
+            return Ok(Some(format!("joint {name:?}: a {kind} joint stays at its origin")));
+        }
+        let limit = child(self.node, "limit").filter(|_| kind != "continuous" && self.moves());
         let Some(limit) = limit else { return Ok(None) };
-        let [lower, upper] = ["lower", "upper"].map(|end| {
-            let number = numbers::<1>(limit, end);
-            number.map_err(|error| within("joint", self.name, error))
-        });
-        let (lower, upper) = (lower?.map(|[x]| x), upper?.map(|[x]| x));
+        let end = |end: &str| {
+            let found = numbers(limit, end).map_err(|error| within("joint", name, error))?;
+            Ok::<_, ParseError>(found.map(|[end]| end))
+        };
+        let (lower, upper) = (end("lower")?, end("upper")?);
         let is_outside = lower.is_some_and(|lower| position < lower)
             || upper.is_some_and(|upper| position > upper);
+        let [lower, upper] = [lower, upper].map(Option::unwrap_or_default);
         Ok(is_outside.then(|| {
-            let [lower, upper] = [lower, upper].map(|end| end.unwrap_or(0.0));
-            format!(
-                "joint {:?}: expected a position from {lower} to {upper}, its limits, found {position}",
-                self.name
-            )
+            format!("joint {name:?}: expected a position from {lower} to {upper}, its limits, found {position}")
         }))
     }
 }
 
-/// The links and joints of a robot, a tree.
+/// The links and joints of a robot; each link but the root has one joint above.
 pub struct Robot<'a> {
     node: Node<'a, 'a>,
-    pub links: Vec<Node<'a, 'a>>,
-    numbers: HashMap<&'a str, usize>,
-    joints: Vec<Joint<'a>>,
+    pub links: Vec<(&'a str, Node<'a, 'a>)>,
+    pub root: usize,
+    pub joints: Vec<Joint<'a>>,
     /// The joints below each link.
-    below: Vec<Vec<usize>>,
+    pub below: Vec<Vec<usize>>,
 }
 
 impl<'a> Robot<'a> {
     pub fn new(node: Node<'a, 'a>) -> Result<Self, ParseError> {
-        let links: Vec<_> = node.children().filter(|node| node.has_tag_name("link")).collect();
-        let mut numbers = HashMap::new();
-        for (i, link) in links.iter().enumerate() {
-            if numbers.insert(named(*link)?, i).is_some() {
-                let cause =
-                    format!("expected links of different names, found two {:?}", named(*link)?);
-                return Err(fault(*link, cause));
+        let (mut links, mut numbers) = (Vec::new(), HashMap::new());
+        for link in node.children().filter(|node| node.has_tag_name("link")) {
+            let name = named(link)?;
+            if numbers.insert(name, links.len()).is_some() {
+                let cause = format!("expected links of different names, found two {name:?}");
+                return Err(fault(link, cause));
             }
+            links.push((name, link));
         }
         let joints = node.children().filter(|node| node.has_tag_name("joint"));
-        let joints =
-            joints.map(|joint| Joint::new(joint, &numbers)).collect::<Result<Vec<_>, _>>()?;
+        let joints: Vec<_> =
+            joints.map(|joint| Joint::new(joint, &numbers)).collect::<Result<_, _>>()?;
         let mut below = vec![Vec::new(); links.len()];
         let mut above = vec![None; links.len()];
         for (i, joint) in joints.iter().enumerate() {
             let (parent, child) = joint.links;
             if let Some(other) = above[child].replace(joint.name) {
-                let (link, name) = (named(links[child])?, joint.name);
-                let cause = format!(
-                    "link {link:?}: expected one joint above, found {other:?} and {name:?}"
-                );
-                return Err(fault(joint.node, cause));
+                let cause =
+                    format!("expected one joint above, found {other:?} and {:?}", joint.name);
+                return Err(within("link", links[child].0, fault(joint.node, cause)));
             }
             below[parent].push(i);
         }
-        Ok(Self { node, links, numbers, joints, below })
+        let roots: Vec<usize> = (0..links.len()).filter(|i| above[*i].is_none()).collect();
+        let [root] = roots[..] else {
+            let found: Vec<_> = roots.iter().take(2).map(|i| links[*i].0).collect();
+            let found = if found.is_empty() { "none".to_owned() } else { found.join(" and ") };
+            let cause = format!("expected one link without a joint above, found {found}");
+            return Err(fault(node, cause));
+        };
+        Ok(Self { node, links, root, joints, below })
     }
 
-    /// The link that no joint moves.
-    pub fn root(&self) -> Result<Node<'a, 'a>, ParseError> {
-        let mut is_moved = vec![false; self.links.len()];
-        self.joints.iter().for_each(|joint| is_moved[joint.links.1] = true);
-        let mut roots = self.links.iter().zip(is_moved).filter(|(_, moved)| !moved);
-        match (roots.next(), roots.next()) {
-            (Some((root, _)), None) => Ok(*root),
-            (Some((a, _)), Some((b, _))) => {
-                let (a, b) = (named(*a)?, named(*b)?);
-                let cause =
-                    format!("expected one link without a joint above, found {a:?} and {b:?}");
-                Err(fault(self.node, cause))
-            }
-            (None, _) => {
-                let cause = "expected a link without a joint above, found none";
-                Err(fault(self.node, cause.to_owned()))
-            }
-        }
-    }
-
-    pub fn joints_of(&self, link: &str) -> impl DoubleEndedIterator<Item = &Joint<'a>> {
-        self.below[self.numbers[link]].iter().map(|joint| &self.joints[*joint])
-    }
-
-    /// The positions of all joints by name.
+    /// The positions of all joints.
     pub fn positions(
         &self,
         import: &Import,
         warnings: &mut Vec<String>,
-    ) -> Result<BTreeMap<&'a str, f64>, ParseError> {
+    ) -> Result<Vec<f64>, ParseError> {
         let by_name: HashMap<&str, &Joint> =
             self.joints.iter().map(|joint| (joint.name, joint)).collect();
         if by_name.len() < self.joints.len() {
@@ -164,38 +146,32 @@ impl<'a> Robot<'a> {
             return Err(fault(self.node, cause.to_owned()));
         }
         for (name, position) in &import.joints {
-            let wrong = |cause: String| fault(self.node, format!("joint {name:?}: {cause}"));
-            let Some(joint) = by_name.get(name.as_str()) else {
-                let known = self.joints.iter().filter(|joint| joint.moves());
-                let known: Vec<_> = known.map(|joint| joint.name).collect();
-                return Err(wrong(format!("expected one of {}, found none", known.join(", "))));
+            let cause = match by_name.get(name.as_str()) {
+                None => {
+                    let known = self.joints.iter().filter(|joint| joint.moves());
+                    let known: Vec<_> = known.map(|joint| joint.name).collect();
+                    format!("expected one of {}, found none", known.join(", "))
+                }
+                Some(joint) if !joint.moves() => {
+                    format!("expected a joint that moves, found type {:?}", joint.kind)
+                }
+                Some(joint) if child(joint.node, "mimic").is_some() => {
+                    "expected a joint that follows no other, found a mimic".to_owned()
+                }
+                Some(_) if !position.is_finite() => {
+                    format!("expected a finite position, found {position}")
+                }
+                Some(_) => continue,
             };
-            if !joint.moves() {
-                return Err(wrong(format!(
-                    "expected a joint that moves, found type {:?}",
-                    joint.kind
-                )));
-            }
-            if child(joint.node, "mimic").is_some() {
-                return Err(wrong(
-                    "expected a joint that follows no other, found a mimic".to_owned(),
-                ));
-            }
-            if !position.is_finite() {
-                return Err(wrong(format!("expected a finite position, found {position}")));
-            }
+            return Err(within("joint", name, fault(self.node, cause)));
         }
-        let mut positions = BTreeMap::new();
-        for joint in &self.joints {
-            let position = self.position(joint, &by_name, import)?;
+        let position = |joint| {
+            let position = self.position(joint, &by_name, import);
+            let position = position.map_err(|error| within("joint", joint.name, error))?;
             warnings.extend(joint.doubt(position)?);
-            if ["floating", "planar"].contains(&joint.kind) {
-                let (name, kind) = (joint.name, joint.kind);
-                warnings.push(format!("joint {name:?}: a {kind} joint stays at its origin"));
-            }
-            positions.insert(joint.name, position);
-        }
-        Ok(positions)
+            Ok(position)
+        };
+        self.joints.iter().map(position).collect()
     }
 
     /// The position of a joint: its own, or what it makes of that of the joint which it follows.
@@ -205,24 +181,21 @@ impl<'a> Robot<'a> {
         by_name: &HashMap<&str, &Joint<'a>>,
         import: &Import,
     ) -> Result<f64, ParseError> {
+        const MOST_FOLLOWED: usize = 100;
         let (mut at, mut factor, mut offset) = (joint, 1.0, 0.0);
-        for _ in 0..self.joints.len() {
+        for _ in 0..MOST_FOLLOWED {
             let Some(mimic) = child(at.node, "mimic") else {
                 let own = import.joints.get(at.name).copied().unwrap_or_default();
                 return Ok(factor * own + offset);
             };
-            let read = || {
-                let number = |name, otherwise| {
-                    numbers(mimic, name).map(|found| found.map_or(otherwise, |[number]| number))
-                };
-                let of = attribute(mimic, "joint")?;
-                let missing = || fault(mimic, format!("mimic: expected a joint, found {of:?}"));
-                let of = by_name.get(of).copied().ok_or_else(missing)?;
-                Ok::<_, ParseError>((number("multiplier", 1.0)?, number("offset", 0.0)?, of))
-            };
-            let (by, and, of) = read().map_err(|error| within("joint", at.name, error))?;
-            (offset, factor, at) = (factor * and + offset, factor * by, of);
+            let of = attribute(mimic, "joint")?;
+            let missing = || fault(mimic, format!("mimic: expected a joint, found {of:?}"));
+            at = by_name.get(of).copied().ok_or_else(missing)?;
+            let [by] = numbers(mimic, "multiplier")?.unwrap_or([1.0]);
+            let [and] = numbers(mimic, "offset")?.unwrap_or([0.0]);
+            (offset, factor) = (factor * and + offset, factor * by);
         }
-        Err(fault(joint.node, format!("joint {:?}: it follows itself by mimic", joint.name)))
+        let cause = format!("expected it to follow up to {MOST_FOLLOWED} joints, found a circle");
+        Err(fault(joint.node, cause))
     }
 }

@@ -109,6 +109,9 @@ fn meshes_are_found_beside_the_robot_and_in_packages() {
             DVec3::new(0.5, 0.0, 0.0)
         );
     }
+    fs::write(folder.path().join("empty.urdf"), "").unwrap();
+    let empty = load(&folder.path().join("empty.urdf"), &Import::default(), DAffine3::IDENTITY);
+    assert!(empty.unwrap_err().to_string().ends_with("empty.urdf: the file is empty"));
     for (name, expected) in [
         (
             "package://other/hand.obj",
@@ -133,7 +136,7 @@ fn what_is_wrong_is_named_with_its_line() {
     for (text, expected) in [
         ("<robot>".to_owned(), "expected URDF, which is XML"),
         ("<a/>".to_owned(), "line 1: expected the element robot, found a"),
-        ("<robot/>".to_owned(), "line 1: expected a link without a joint above, found none"),
+        ("<robot/>".to_owned(), "line 1: expected one link without a joint above, found none"),
         ("<robot><link name=\"a\"/></robot>".to_owned(), "expected a link with visual geometry"),
         (swap("</link>", ""), "line 25: expected URDF, which is XML: expected 'link' tag"),
         (
@@ -147,7 +150,7 @@ fn what_is_wrong_is_named_with_its_line() {
         ),
         (
             swap("child link=\"lower\"", "child link=\"base\""),
-            "expected a link without a joint above, found none",
+            "expected joints from one root to each link, found a circle",
         ),
         (swap("parent link=\"upper\"", "parent link=\"hand\""), "found a circle of links"),
         (
@@ -175,7 +178,7 @@ fn what_is_wrong_is_named_with_its_line() {
         (swap("<sphere radius=\"0.2\"/>", ""), "expected a shape in geometry"),
         (
             swap("mimic joint=\"shoulder\"", "mimic joint=\"elbow\""),
-            "joint \"elbow\": it follows itself",
+            "joint \"elbow\": expected it to follow up to 100 joints",
         ),
     ] {
         let error = read_at(&text, &[]).unwrap_err().to_string();

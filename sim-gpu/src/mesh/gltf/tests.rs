@@ -374,7 +374,8 @@ fn wrong_animation_is_named_with_its_place() {
             "nodes[0]: expected a rotation of length 1, found length 0",
         ),
     ] {
-        let error = assemble(&bytes, None, DAffine3::IDENTITY).unwrap_err().to_string();
+        let error =
+            crate::mesh::parse_assembly(&bytes, None, DAffine3::IDENTITY).unwrap_err().to_string();
         assert!(error.contains(expected), "{expected}: {error}");
     }
 }
