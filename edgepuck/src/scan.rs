@@ -10,19 +10,21 @@ use formats::outputs::Overwrite;
 use formats::scan::Attribute;
 use formats::scan_file::ScanFormat;
 use formats::vlp32c::{self, Returns};
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
+use sim_gpu::internals::import::Format;
 use sim_gpu::internals::mesh::MeshFormat;
 use sim_gpu::internals::mesh::frame::{Normalize, Unit, Up};
 use sim_gpu::internals::packets;
 use sim_gpu::internals::scene::SceneFile;
 use sim_gpu::internals::simplify::Simplify;
-use sim_gpu::{Mesh, MountedSensor, Pose, Scan, Scene, Sensor};
+use sim_gpu::{Extent, FilePlace, Import, Mesh, MountedSensor, Pose, Scan, Scene, Sensor};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub struct Args {
-    /// Scene file (TOML), or meshes (OBJ, OFF, PLY, STL, glTF) where their files have them [default: two
-    /// chairs, written to data/default-scene for you to edit]
+    /// Scene file (TOML), or meshes (OBJ, OFF, PLY, STL), glTF files and robots (URDF) where their files
+    /// have them. The nodes of glTF and the links of robots are objects; joints are at 0, and animation
+    /// runs from time 0 on [default: two chairs, written to data/default-scene for you to edit]
     #[arg(value_name = "SCENE|MESH...")]
     inputs: Vec<PathBuf>,
 
@@ -169,7 +171,8 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
 
 /// The scene that the command line asks for, and its name in messages.
 fn scene(args: &Args) -> anyhow::Result<(Scene, String)> {
-    let is_mesh = |file: &PathBuf| MeshFormat::from_path(file).is_some();
+    let is_mesh =
+        |file: &PathBuf| MeshFormat::from_path(file).is_some() || Format::from_path(file).is_some();
     if !args.inputs.is_empty() && args.inputs.iter().all(is_mesh) {
         return Ok((scene_of_meshes(args)?, args.inputs[0].display().to_string()));
     }
@@ -180,7 +183,7 @@ fn scene(args: &Args) -> anyhow::Result<(Scene, String)> {
             let other = args.inputs.iter().find(|file| !is_mesh(file));
             let other = other.map(|file| file.display().to_string()).unwrap_or_default();
             let cause = format!(
-                "expected one scene, or meshes (.obj, .off, .ply, .stl, .glb, .gltf), found {other}"
+                "expected one scene, or meshes (.obj, .off, .ply, .stl, .glb, .gltf, .urdf), found {other}"
             );
             return Err(Usage(cause).into());
         }
@@ -197,7 +200,8 @@ fn scene(args: &Args) -> anyhow::Result<(Scene, String)> {
             true => "no extension".to_owned(),
             false => format!("the extension .{}", extension.display()),
         };
-        let cause = "expected a mesh (.obj, .off, .ply, .stl, .glb, .gltf) or a scene (.toml)";
+        let cause =
+            "expected a mesh (.obj, .off, .ply, .stl, .glb, .gltf, .urdf) or a scene (.toml)";
         return Err(Usage(format!("{what}: {cause}, found {found}")).into());
     }
     if let Some(flag) = args.meshes.given().or(args.effects.given()) {
@@ -217,8 +221,7 @@ fn scene(args: &Args) -> anyhow::Result<(Scene, String)> {
 
 /// The meshes where their files have them, and a sensor that looks at their middle.
 fn scene_of_meshes(args: &Args) -> anyhow::Result<Scene> {
-    let (up, unit) = (args.meshes.up, args.meshes.units.unwrap_or_default());
-    let normalize = args.meshes.normalize.unwrap_or(Normalize::None);
+    let unit = args.meshes.units.unwrap_or_default();
     ensure!(args.simplify.is_none(), Usage("--simplify applies to scenes only".to_owned()));
     let mut scene = Scene::new();
     scene.seed = args.meshes.seed.unwrap_or_default();
@@ -228,29 +231,27 @@ fn scene_of_meshes(args: &Args) -> anyhow::Result<Scene> {
     }
     let with_intensity = scene.attributes.contains(&Attribute::Intensity);
     scene.effects = args.effects.effects(0.0, with_intensity)?;
-    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let mut extents = Vec::new();
     for file in &args.inputs {
-        let mesh = Mesh::read_in(file, up, unit)?.normalized(normalize);
-        let [least, most] = mesh.bounds_m().map(DVec3::from_array);
-        (low, high) = (low.min(least), high.max(most));
-        if let Some(doubt) = mesh.doubtful_size(unit) {
+        let extent = add_input(&mut scene, args, file)?;
+        if let Some(doubt) = extent.doubtful_size(unit) {
             formats::say!("warning: {}: {doubt}; --units names another unit", file.display());
         }
-        if let Some(doubt) = mesh.doubtful_effects(&scene.effects) {
+        if let Some(doubt) = extent.doubtful_effects(&scene.effects) {
             formats::say!("warning: {}: {doubt}", file.display());
         }
-        let id = scene.add(mesh, Pose::IDENTITY);
-        scene[id].name = file.file_stem().map(|stem| stem.to_string_lossy().into_owned());
+        extents.push(extent);
     }
+    let all = extents.iter().copied().reduce(Extent::and);
     let MeshArgs { distance, elevation, azimuth, .. } = args.meshes;
     let mut pose = Pose::looking_at_origin_deg(
         distance.unwrap_or(3.0),
         elevation.unwrap_or(20.0),
         azimuth.unwrap_or_default(),
     );
-    pose.position_m += 0.5 * (low + high);
-    for (file, instance) in args.inputs.iter().zip(scene.instances()) {
-        if instance.mesh.surrounds(&[pose.position_m]) {
+    pose.position_m += all.map_or(DVec3::ZERO, |all| 0.5 * (all.low + all.high));
+    for (file, extent) in args.inputs.iter().zip(extents) {
+        if extent.surrounds(&[pose.position_m]) {
             let file = file.display();
             formats::say!(
                 "warning: {file}: the sensor stands inside its bounding box: expected a larger --distance, or another of --units"
@@ -260,6 +261,34 @@ fn scene_of_meshes(args: &Args) -> anyhow::Result<Scene> {
     let sensor = Sensor::resolve(args.meshes.sensor.as_deref().unwrap_or("vlp32c"))?;
     scene.mount(sensor.name(), &sensor, pose);
     Ok(scene)
+}
+
+/// Adds what stands in `file`. Returns its bounding box.
+fn add_input(scene: &mut Scene, args: &Args, file: &Path) -> anyhow::Result<Extent> {
+    let (up, unit) = (args.meshes.up, args.meshes.units.unwrap_or_default());
+    let normalize = args.meshes.normalize.unwrap_or(Normalize::None);
+    let stem = file.file_stem().map(|stem| stem.to_string_lossy().into_owned());
+    // What is scaled to a unit is one mesh.
+    let is_one = normalize != Normalize::None && MeshFormat::from_path(file).is_some();
+    if Format::from_path(file).is_none() || is_one {
+        let mesh = Mesh::read_in(file, up, unit)?.normalized(normalize);
+        let extent = mesh.extent();
+        let id = scene.add(mesh, Pose::IDENTITY);
+        scene[id].name = stem;
+        return Ok(extent);
+    }
+    let cause =
+        format!("{}: --normalize scales meshes: expected it without a robot", file.display());
+    ensure!(normalize == Normalize::None, Usage(cause));
+    let several = args.inputs.len() > 1;
+    let place = FilePlace {
+        up,
+        world_from_upright: DAffine3::from_scale(DVec3::splat(unit.metres())),
+        prefix: stem.filter(|_| several).map(|stem| stem + "/").unwrap_or_default(),
+    };
+    let ids = scene.add_file_at(file, &Import::default(), &place)?;
+    let extents = ids.iter().map(|id| scene[*id].extent());
+    extents.reduce(Extent::and).context("invariant: a file has a part")
 }
 
 /// Lists the objects of `scene`, and what simplification made of them.

@@ -37,20 +37,38 @@ class Scene:
 
     def __init__(self) -> None:
         self._scene = _edgepuck.Scene()
-        self._file: str | None = None
+        self._file: tuple[str, dict[str, float], bool, bool] | None = None
         self._added: list[tuple[Mesh, tuple[Any, ...]]] = []
         self._poses: dict[int, list[float]] = {}
 
     @classmethod
-    def read(cls, file: str | os.PathLike[str]) -> Scene:
-        """Read the TOML file of a scene, like `edgepuck scan`, and the meshes that it names.
+    def read(
+        cls,
+        file: str | os.PathLike[str],
+        *,
+        joints: Mapping[str, float] | None = None,
+        collision: bool = False,
+        base_colours: bool = False,
+    ) -> Scene:
+        """Read the TOML file of a scene, a glTF file or a robot, like `edgepuck scan`, and the files that it
+        names.
+
+        Each node of glTF that has a mesh, and each geometry of a robot's links, is an instance with its name;
+        its label is the name of the mesh or of the link. Animated nodes move while a scan runs.
+
+        Args:
+            file: A TOML, .glb, .gltf or .urdf file.
+            joints: The positions of a robot's joints by name, radians or metres; 0 by default.
+            collision: Whether a robot is made of its collision geometry in place of the visual one.
+            base_colours: Whether the luminances of the base colours of a glTF file's materials are taken for
+                reflectivities, which are 1 by default. They are those of visible light.
 
         Raises:
             Error: The file, or a mesh or sensor that it names, cannot be read.
         """
         scene = cls()
-        scene._file = os.path.abspath(file)
-        scene._scene = _edgepuck.Scene.read(os.fspath(file))
+        scene._file = os.path.abspath(file), dict(joints or {}), bool(collision), bool(base_colours)
+        scene._scene = _edgepuck.Scene.read(os.fspath(file), *scene._file[1:])
         return scene
 
     @classmethod
@@ -97,6 +115,24 @@ class Scene:
     def __len__(self) -> int:
         """The number of instances."""
         return len(self._scene)
+
+    @property
+    def names(self) -> list[str | None]:
+        """The names of the instances, by their numbers."""
+        return self._scene.names()
+
+    @property
+    def labels(self) -> list[str | None]:
+        """The labels of the instances, by their numbers."""
+        return self._scene.labels()
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """The least and the largest coordinates of the instances, metres, [n, 2, 3].
+
+        Those of animated instances are at time 0.
+        """
+        return np.array(self._scene.bounds()).reshape(-1, 2, 3)
 
     def add(
         self,
@@ -323,10 +359,15 @@ def scan_scene(file: str | os.PathLike[str], *, adapter: str = "cpu") -> dict[st
 
 
 def _remade(
-    file: str | None, added: list[tuple[Mesh, tuple[Any, ...]]], poses: dict[int, list[float]]
+    read: tuple[str, dict[str, float], bool, bool] | None,
+    added: list[tuple[Mesh, tuple[Any, ...]]],
+    poses: dict[int, list[float]],
 ) -> Scene:
     """The scene that was pickled."""
-    scene = Scene() if file is None else Scene.read(file)
+    scene = Scene()
+    if read is not None:
+        file, joints, collision, base_colours = read
+        scene = Scene.read(file, joints=joints, collision=collision, base_colours=base_colours)
     scene._added, scene._poses = added, poses
     for mesh, settings in added:
         scene._scene.add(native(mesh), np.eye(4).ravel().tolist(), *settings)

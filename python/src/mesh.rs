@@ -81,7 +81,7 @@ impl Mesh {
 
     /// Why its source's unit is probably not `units`, if its size says so.
     fn doubtful_size(&self, units: &str) -> PyResult<Option<String>> {
-        Ok(self.mesh.doubtful_size(units.parse().map_err(raised)?))
+        Ok(self.mesh.extent().doubtful_size(units.parse().map_err(raised)?))
     }
 
     /// What became the origin, in the source's units.

@@ -12,7 +12,8 @@ use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use sim_gpu::internals::scene::check_object;
-use sim_gpu::{Batch, Effects, Moves, Pose};
+use sim_gpu::{Batch, Effects, Import, Moves, Pose};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Mutex;
 
@@ -34,11 +35,23 @@ impl Scene {
         Self { scene: Mutex::default() }
     }
 
-    /// Read a scene's TOML file.
+    /// Read a scene's TOML file, a glTF file or a robot.
     #[staticmethod]
-    fn read(py: Python<'_>, file: PathBuf) -> PyResult<Self> {
+    fn read(
+        py: Python<'_>,
+        file: PathBuf,
+        joints: BTreeMap<String, f64>,
+        collision: bool,
+        base_colours: bool,
+    ) -> PyResult<Self> {
+        let import = Import { joints, collision, base_colours };
         let scene = process::run(py, || {
-            let scene = sim_gpu::Scene::read(&file)?;
+            let mut scene = sim_gpu::Scene::new();
+            if import == Import::default() {
+                scene = sim_gpu::Scene::read(&file)?;
+            } else {
+                scene.add_file(&file, &import)?;
+            }
             for instance in scene.instances() {
                 let _ = instance.mesh.target();
             }
@@ -52,6 +65,23 @@ impl Scene {
     /// How many instances there are.
     fn __len__(&self) -> usize {
         lock(&self.scene).instances().len()
+    }
+
+    /// The names of the instances.
+    fn names(&self) -> Vec<Option<String>> {
+        lock(&self.scene).instances().iter().map(|instance| instance.name.clone()).collect()
+    }
+
+    /// The labels of the instances.
+    fn labels(&self) -> Vec<Option<String>> {
+        lock(&self.scene).instances().iter().map(|instance| instance.label.clone()).collect()
+    }
+
+    /// The bounding boxes of the instances.
+    fn bounds(&self) -> Vec<[[f64; 3]; 2]> {
+        let extents = lock(&self.scene).clone();
+        let extents = extents.instances().iter().map(sim_gpu::Instance::extent);
+        extents.map(|extent| [extent.low.to_array(), extent.high.to_array()]).collect()
     }
 
     /// Add a mesh at this pose, and give its number.

@@ -35,6 +35,7 @@ pub mod effects;
 mod fixed_frame;
 #[cfg(feature = "gpu")]
 mod gpu;
+mod import;
 mod job;
 mod lanes;
 mod material;
@@ -56,10 +57,13 @@ pub use api::{
     Batch, BatchBuilder, Caster, Error, Instance, InstanceId, Mesh, MountedSensor, Moves,
     NO_OBJECT, Scan, ScanBuilder, Scene, Sensor,
 };
+#[doc(hidden)]
+pub use api::{Extent, FilePlace};
 pub use effects::Effects;
 pub use formats;
 pub use formats::scan::Attribute;
 pub use glam;
+pub use import::Import;
 pub use material::Materials;
 pub use pose::{Pose, Trajectory};
 pub use scan::{Glass, Tally};
@@ -88,7 +92,7 @@ pub mod internals {
     }
 
     modules! {
-        bvh cast_error caster config corruption cpu job material mesh motion packets pose ray resolve
+        bvh cast_error caster config corruption cpu import job material mesh motion packets pose ray resolve
         scan scene sensor simplify surface_points target weather
     }
 

@@ -269,6 +269,15 @@ impl Materials {
         Ok(Named::Even(self.even.len() as u32 - 1))
     }
 
+    /// Surfaces that scatter: a reflectivity and the number of triangles in a row that have it.
+    pub(crate) fn of_runs(runs: &[(f64, usize)]) -> Self {
+        let even = runs.iter().map(|(reflectivity, _)| Material::diffuse(*reflectivity)).collect();
+        let runs = runs.iter().zip(0..);
+        let of_triangle =
+            runs.flat_map(|((_, n), place)| std::iter::repeat_n(Paint::Even(place), *n)).collect();
+        Self { even, textures: vec![], of_triangle, warnings: vec![] }
+    }
+
     pub(crate) fn len(&self) -> usize {
         self.of_triangle.len()
     }

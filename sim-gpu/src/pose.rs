@@ -6,7 +6,7 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use glam::{DMat3, DMat4, DQuat, DVec3};
+use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
 use crate::config::{self, ConfigError, InvalidValue};
@@ -36,6 +36,29 @@ impl Pose {
     pub fn matrix(&self) -> [f64; 16] {
         let matrix = DMat4::from_rotation_translation(self.rotation, self.position_m);
         matrix.transpose().to_cols_array()
+    }
+
+    /// `map` as a pose after factors along the axes, all above 0; `None` if it mirrors or shears, or
+    /// flattens an axis.
+    pub(crate) fn of_scaled(map: &DAffine3) -> Option<(Self, DVec3)> {
+        /// Several products of transforms in f32, of which files are made.
+        const ROUNDING: f64 = 1e-6;
+        let axes = map.matrix3;
+        let scale = DVec3::new(axes.x_axis.length(), axes.y_axis.length(), axes.z_axis.length());
+        let rotation = axes * DMat3::from_diagonal(scale.recip());
+        let off = rotation.transpose() * rotation - DMat3::IDENTITY;
+        let is_rotation = off.to_cols_array().into_iter().all(|off| off.abs() <= ROUNDING);
+        let rotation = (is_rotation && rotation.determinant() > 0.0)
+            .then(|| DQuat::from_mat3(&rotation).normalize())?;
+        Some((Self { position_m: map.translation, rotation }, scale))
+    }
+
+    /// The pose at this share of the way to `other`: along a line, and along the shortest arc.
+    pub(crate) fn towards(&self, other: &Self, share: f64) -> Self {
+        Self {
+            position_m: self.position_m.lerp(other.position_m, share),
+            rotation: self.rotation.slerp(other.rotation, share).normalize(),
+        }
     }
 
     /// At this position, metres, not turned.

@@ -147,7 +147,7 @@ fn files_of_another_format_or_size_are_told() {
         2,
         &[(
             "scan a --out x.npz",
-            "a: expected a mesh (.obj, .off, .ply, .stl, .glb, .gltf) or a scene",
+            "a: expected a mesh (.obj, .off, .ply, .stl, .glb, .gltf, .urdf) or a scene",
         )],
     );
 }

@@ -100,9 +100,9 @@ pub(crate) fn doubts(
     let is_scaled = config.normalize != Normalize::None;
     let size = mesh
         .filter(|_| !is_scaled)
-        .and_then(|mesh| mesh.doubtful_size(config.units))
+        .and_then(|mesh| mesh.extent().doubtful_size(config.units))
         .map(|doubt| format!("{doubt}; --units names another unit"));
-    let inside = mesh.is_some_and(|mesh| mesh.surrounds(sensors_m)).then(|| {
+    let inside = mesh.is_some_and(|mesh| mesh.extent().surrounds(sensors_m)).then(|| {
         let units = if is_scaled { "" } else { ", or another of --units" };
         let is_posed = |set: &SetConfig| matches!(set.viewpoints, Viewpoints::Poses(_));
         let place = match config.sets.iter().any(is_posed) {
@@ -111,7 +111,7 @@ pub(crate) fn doubts(
         };
         format!("a sensor stands inside its bounding box: expected {place}{units}")
     });
-    let effects = mesh.and_then(|mesh| mesh.doubtful_effects(&config.effects));
+    let effects = mesh.and_then(|mesh| mesh.extent().doubtful_effects(&config.effects));
     size.into_iter().chain(effects).chain(inside).map(move |doubt| format!("{source}: {doubt}"))
 }
 

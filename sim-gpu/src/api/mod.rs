@@ -3,6 +3,7 @@
 mod batch;
 mod caster;
 mod error;
+mod import;
 mod mesh;
 mod plausibility;
 mod scan;
@@ -14,7 +15,9 @@ mod sensor;
 pub use batch::{Batch, BatchBuilder, Moves, NO_OBJECT};
 pub use caster::Caster;
 pub use error::Error;
+pub use import::FilePlace;
 pub use mesh::Mesh;
+pub use plausibility::Extent;
 pub use scan::Scan;
 pub use scan_builder::ScanBuilder;
 pub use scene::{Instance, InstanceId, MountedSensor, Scene};

@@ -1,20 +1,59 @@
 //! What is probably wrong with the unit or the place of a mesh.
 
-use super::Mesh;
+use super::{Instance, Mesh};
 use crate::effects::Effects;
 use crate::mesh::frame::Unit;
+use crate::mesh::unit_frame::bounding_box;
+use crate::pose::Pose;
 use glam::DVec3;
 
 /// Sizes of meshes that are expected, metres: beyond them, the unit is probably another.
 const EXPECTED_M: std::ops::RangeInclusive<f64> = 0.01..=100.0;
 
+/// A bounding box, metres.
+#[derive(Clone, Copy, Debug)]
+pub struct Extent {
+    /// The least coordinates.
+    pub low: DVec3,
+    /// The largest coordinates.
+    pub high: DVec3,
+}
+
 impl Mesh {
-    /// Why the unit of its source is probably not `unit`, if its size says so.
+    /// Its bounding box.
     #[doc(hidden)]
     #[must_use]
-    pub fn doubtful_size(&self, unit: Unit) -> Option<String> {
+    pub fn extent(&self) -> Extent {
         let [low, high] = self.bounds_m().map(DVec3::from_array);
-        let size = high - low;
+        Extent { low, high }
+    }
+}
+
+impl Instance {
+    /// Its bounding box in the world; if it moves, at time 0.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn extent(&self) -> Extent {
+        let at = self.motion.as_ref().map_or(Pose::IDENTITY, |motion| motion.at(0.0));
+        let vertices = self.mesh.vertices().iter().map(|vertex| {
+            at.rotation * (self.pose.rotation * (self.scale * *vertex) + self.pose.position_m)
+        });
+        let (low, high) = bounding_box(vertices);
+        Extent { low: low + at.position_m, high: high + at.position_m }
+    }
+}
+
+impl Extent {
+    /// The box around both.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        Self { low: self.low.min(other.low), high: self.high.max(other.high) }
+    }
+
+    /// Why the unit of its source is probably not `unit`, if its size says so.
+    #[must_use]
+    pub fn doubtful_size(&self, unit: Unit) -> Option<String> {
+        let size = self.high - self.low;
         let is_expected = size == DVec3::ZERO || EXPECTED_M.contains(&size.max_element());
         (!is_expected).then(|| {
             let likely = match unit {
@@ -34,22 +73,19 @@ impl Mesh {
         })
     }
 
-    /// As [`Mesh::doubtful_size`], of a mesh of a scene, which may be a terrain: only a solid of more
+    /// As [`Extent::doubtful_size`], of a mesh of a scene, which may be a terrain: only a solid of more
     /// than 200 m, or of less than 1 cm, is doubted.
     pub(crate) fn doubtful_unit(&self, unit: Unit) -> Option<String> {
-        let [low, high] = self.bounds_m().map(DVec3::from_array);
-        let size = high - low;
+        let size = self.high - self.low;
         let (least, most) = (size.min_element(), size.max_element());
         let is_doubtful = most > 200.0 && least > most / 10.0 || most < 0.01;
         self.doubtful_size(unit).filter(|_| is_doubtful)
     }
 
     /// Why its form is not to be seen in scans with `effects`: noise or a quantum as large as it is.
-    #[doc(hidden)]
     #[must_use]
     pub fn doubtful_effects(&self, effects: &Effects) -> Option<String> {
-        let [low, high] = self.bounds_m().map(DVec3::from_array);
-        let size = high - low;
+        let size = self.high - self.low;
         let noise = effects.noise.map(|noise| ("noise", noise.sigma_m));
         let quantum = effects.quantum.and_then(|quantum| Some(("a quantum", quantum.step_m?)));
         let largest = noise.into_iter().chain(quantum).find(|(_, m)| *m >= size.max_element())?;
@@ -58,11 +94,10 @@ impl Mesh {
     }
 
     /// Whether one of `sensors_m` stands inside its bounding box: it then sees the mesh from inside.
-    #[doc(hidden)]
     #[must_use]
     pub fn surrounds(&self, sensors_m: &[DVec3]) -> bool {
-        let [low, high] = self.bounds_m().map(DVec3::from_array);
-        let is_inside = |sensor: &DVec3| sensor.cmpgt(low).all() && sensor.cmplt(high).all();
+        let is_inside =
+            |sensor: &DVec3| sensor.cmpgt(self.low).all() && sensor.cmplt(self.high).all();
         sensors_m.iter().any(is_inside)
     }
 }
@@ -105,7 +140,7 @@ mod tests {
             (0.01, Unit::Metre, None),
             (100.0, Unit::Inch, None),
         ] {
-            let found = tetrahedron(size).doubtful_size(unit);
+            let found = tetrahedron(size).extent().doubtful_size(unit);
             assert_eq!(found.is_some(), expected.is_some(), "{size}: {found:?}");
             let (found, part) = (found.unwrap_or_default(), expected.unwrap_or_default());
             assert!(found.contains(part), "{found}");
@@ -114,11 +149,11 @@ mod tests {
 
     #[test]
     fn of_a_scene_s_meshes_terrains_are_not_doubted() {
-        let solid = |size| tetrahedron(size).doubtful_unit(Unit::Metre).is_some();
+        let solid = |size| tetrahedron(size).extent().doubtful_unit(Unit::Metre).is_some();
         assert_eq!([0.001, 1.0, 150.0, 4300.0].map(solid), [true, false, false, true]);
         let corners = [[0.0; 3], [900.0, 0.0, 0.0], [0.0, 900.0, 30.0]];
         let terrain = Mesh::from_triangles(corners.to_vec(), vec![[0, 1, 2]]).unwrap();
-        assert_eq!(terrain.doubtful_unit(Unit::Metre), None);
+        assert_eq!(terrain.extent().doubtful_unit(Unit::Metre), None);
     }
 
     #[test]
@@ -133,7 +168,7 @@ mod tests {
             ("quantise_m = true", None),
         ] {
             let effects: Effects = toml::from_str(effects).unwrap();
-            let found = tetrahedron(2.0).doubtful_effects(&effects);
+            let found = tetrahedron(2.0).extent().doubtful_effects(&effects);
             assert_eq!(found, doubt.map(|doubt| format!("expected {doubt}")));
         }
     }
@@ -141,7 +176,7 @@ mod tests {
     #[test]
     fn a_sensor_inside_the_bounding_box_is_found() {
         let mesh = tetrahedron(2.0);
-        assert!(mesh.surrounds(&[DVec3::splat(9.0), DVec3::splat(1.9)]));
-        assert!(!mesh.surrounds(&[DVec3::new(1.0, 1.0, 2.0), DVec3::splat(-0.1)]));
+        assert!(mesh.extent().surrounds(&[DVec3::splat(9.0), DVec3::splat(1.9)]));
+        assert!(!mesh.extent().surrounds(&[DVec3::new(1.0, 1.0, 2.0), DVec3::splat(-0.1)]));
     }
 }

@@ -2,6 +2,7 @@
 
 use super::{Error, Mesh, Sensor};
 use crate::effects::Effects;
+use crate::import::{Format, Import};
 use crate::material::Materials;
 use crate::pose::{Pose, Trajectory};
 use crate::scan::{Glass, PlacedTarget};
@@ -126,11 +127,17 @@ impl Scene {
         }
     }
 
-    /// Reads a scene's TOML file, and the meshes and sensor profiles that it names.
+    /// Reads a scene's TOML file, and the meshes and sensor profiles that it names; or a glTF file or a
+    /// robot, as [`Scene::add_file`] does.
     ///
     /// # Errors
-    /// With the file, the key or line, and the cause.
+    /// With the file, the key, line or node, and the cause.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, Error> {
+        if Format::from_path(path.as_ref()).is_some() {
+            let mut scene = Self::new();
+            scene.add_file(path, &Import::default())?;
+            return Ok(scene);
+        }
         Self::try_from(&SceneFile::load(path.as_ref())?)
     }
 

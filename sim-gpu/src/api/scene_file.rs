@@ -1,7 +1,10 @@
 //! From a scene's file to the scene: meshes and materials are read, meshes are simplified.
 
+use super::import::FilePlace;
 use super::{Error, Instance, Mesh, MountedSensor, Scene, Sensor};
 use crate::bvh::Builder;
+use crate::config::InvalidValue;
+use crate::import::Import;
 use crate::material::{Material, Materials};
 use crate::mesh::frame::{Normalize, to_world};
 use crate::mesh::validate::triangle_stats;
@@ -22,7 +25,11 @@ impl TryFrom<&SceneFile> for Scene {
         scene.effects.clone_from(&file.effects);
         scene.attributes.clone_from(&file.attributes);
         scene.sensors = file.sensors.iter().map(MountedSensor::from).collect();
-        for object in &file.objects {
+        for (i, object) in file.objects.iter().enumerate() {
+            if let Some(import) = &object.import {
+                scene.add_object(object, import, &format!("object[{i}]"))?;
+                continue;
+            }
             let (mesh, simplified) = mesh(file, object)?;
             let materials = materials(object)?;
             let warnings = materials.as_ref().map_or(&[][..], |materials| &materials.warnings);
@@ -42,6 +49,40 @@ impl TryFrom<&SceneFile> for Scene {
             };
         }
         Ok(scene)
+    }
+}
+
+impl Scene {
+    /// Adds the instances of an object that is a file with more than one mesh.
+    fn add_object(
+        &mut self,
+        object: &SceneObject,
+        import: &Import,
+        key: &str,
+    ) -> Result<(), Error> {
+        let metres = DAffine3::from_scale(DVec3::splat(object.units.metres()));
+        let place = FilePlace {
+            up: object.up,
+            world_from_upright: object.world_from_object() * metres,
+            prefix: format!("{}/", object.name),
+        };
+        for id in self.add_file_at(&object.mesh, import, &place)? {
+            let instance = &mut self[id];
+            if let (Some(_), Some(name)) =
+                (object.motion.as_ref().zip(instance.motion.as_ref()), &instance.name)
+            {
+                let cause =
+                    format!("cannot stand beside the animation of the file, which moves {name}");
+                return Err(InvalidValue::new(format!("{key}.trajectory"), cause).into());
+            }
+            instance.motion = instance.motion.take().or_else(|| object.motion.clone());
+            instance.label = object.label.clone().or_else(|| instance.label.take());
+            if !import.base_colours {
+                instance.reflectivity = object.reflectivity;
+                instance.retroreflection = object.retroreflection;
+            }
+        }
+        Ok(())
     }
 }
 
@@ -76,7 +117,7 @@ fn mesh(file: &SceneFile, object: &SceneObject) -> Result<(Mesh, Option<Simplifi
         }
     };
     if normalize == Normalize::None {
-        let doubt = mesh.doubtful_unit(object.units);
+        let doubt = mesh.extent().doubtful_unit(object.units);
         warnings.extend(doubt.map(|doubt| doubt + "; `units` of the object names another unit"));
     }
     Ok((mesh.with_warnings(&object.mesh, &warnings), simplified))

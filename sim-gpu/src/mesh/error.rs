@@ -1,7 +1,7 @@
 //! Errors of mesh files.
 
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::format::mesh_extensions;
 
@@ -91,6 +91,13 @@ pub struct ParseError {
     pub cause: Malformed,
 }
 
+impl ParseError {
+    /// The error of the file at `path`.
+    pub(crate) fn of(self, path: &Path) -> MeshError {
+        MeshError::Malformed { path: path.into(), line: self.line, cause: self.cause }
+    }
+}
+
 impl Malformed {
     pub(super) fn expected(expected: &str, found: &[u8]) -> Self {
         Self::Syntax(format!("expected {expected}, found {:?}", excerpt(found)))
@@ -104,7 +111,7 @@ impl Malformed {
         Err(Self::Syntax(format!("expected at most {} vertices, found {n_vertices}", u32::MAX)))
     }
 
-    pub(super) fn at(self, line: usize) -> ParseError {
+    pub(crate) fn at(self, line: usize) -> ParseError {
         ParseError { line: Some(line), cause: self }
     }
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use super::error::MeshError;
 
 /// The bytes of the file at `path`, which is no folder, pipe or device.
-pub(super) fn read(path: &Path) -> Result<Vec<u8>, MeshError> {
+pub(crate) fn read(path: &Path) -> Result<Vec<u8>, MeshError> {
     let failed = |source| MeshError::Read { path: path.into(), source };
     let kind = fs::metadata(path).map_err(failed)?;
     if !kind.is_file() {

@@ -4,8 +4,9 @@ use std::path::Path;
 
 use formats::foreign::foreign;
 use formats::hash::{FileHash, Hashing};
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 
+use super::assembly::Assembly;
 use super::error::{Malformed, MeshError, ParseError};
 use super::file::read;
 use super::format::MeshFormat;
@@ -42,10 +43,32 @@ pub fn load_hashed(
     let bytes = read(path)?;
     let format = format?;
     let parsed = parse_in(&bytes, format, path.parent());
-    let Parsed { mesh, dropped_faces, warnings, .. } = parsed.map_err(|error| {
-        MeshError::Malformed { path: path.into(), line: error.line, cause: error.cause }
-    })?;
+    let Parsed { mesh, dropped_faces, warnings, .. } = parsed.map_err(|error| error.of(path))?;
     Ok((LoadedMesh { mesh, format, dropped_faces, warnings }, hashing.of_bytes(&bytes)))
+}
+
+/// Reads the nodes of the glTF file at `path` and their animation; `world_from_file` stands above its
+/// roots.
+pub fn load_assembly(path: &Path, world_from_file: DAffine3) -> Result<Assembly, MeshError> {
+    let (bytes, folder) = (read(path)?, path.parent());
+    parse_assembly(&bytes, folder, world_from_file).map_err(|error| error.of(path))
+}
+
+/// As [`load_assembly`], from a file's bytes; files that it names are in `folder`.
+pub fn parse_assembly(
+    bytes: &[u8],
+    folder: Option<&Path>,
+    world_from_file: DAffine3,
+) -> Result<Assembly, ParseError> {
+    if bytes.is_empty() {
+        return Err(Malformed::Empty.into());
+    }
+    gltf::assemble(without_mark(bytes), folder, world_from_file)
+        .and_then(|found| match found.parts.is_empty() {
+            true => Err(Malformed::NoTriangle.into()),
+            false => Ok(found),
+        })
+        .map_err(|error| explained(error, bytes, MeshFormat::Glb, folder))
 }
 
 /// Reads a mesh of `format` from a file's bytes, which need no other file.
@@ -55,23 +78,33 @@ pub fn parse(bytes: &[u8], format: MeshFormat) -> Result<Parsed, ParseError> {
 
 /// As [`parse`], with the files in `folder` that this one names.
 fn parse_in(bytes: &[u8], format: MeshFormat, folder: Option<&Path>) -> Result<Parsed, ParseError> {
-    let mut parsed = parse_as(bytes, format, folder).map_err(|error| {
-        let is_other =
-            |other: &MeshFormat| *other != format && parse_as(bytes, *other, folder).is_ok();
-        let expected = format.name().to_uppercase();
-        match (foreign(bytes), MeshFormat::ALL.into_iter().find(is_other)) {
-            (Some(found), _) => Malformed::Syntax(format!("expected a mesh, found {found}")).into(),
-            (None, Some(other)) => {
-                let found = other.name().to_uppercase();
-                let cause = format!("expected {expected}, found {found}: rename it to .{other}");
-                Malformed::Syntax(cause).into()
-            }
-            (None, None) => error,
-        }
-    })?;
+    let mut parsed =
+        parse_as(bytes, format, folder).map_err(|error| explained(error, bytes, format, folder))?;
     parsed.cut_polygons(|_, _| ());
     parsed.warnings.extend(flat(&parsed.mesh));
     Ok(parsed)
+}
+
+/// `error`, or what the bytes are if they are not of this format at all.
+fn explained(
+    error: ParseError,
+    bytes: &[u8],
+    format: MeshFormat,
+    folder: Option<&Path>,
+) -> ParseError {
+    let is_gltf = |it: MeshFormat| matches!(it, MeshFormat::Glb | MeshFormat::Gltf);
+    let is_same = |other: MeshFormat| other == format || is_gltf(other) && is_gltf(format);
+    let is_other = |other: &MeshFormat| !is_same(*other) && parse_as(bytes, *other, folder).is_ok();
+    let expected = format.name().to_uppercase();
+    match (foreign(bytes), MeshFormat::ALL.into_iter().find(is_other)) {
+        (Some(found), _) => Malformed::Syntax(format!("expected a mesh, found {found}")).into(),
+        (None, Some(other)) => {
+            let found = other.name().to_uppercase();
+            let cause = format!("expected {expected}, found {found}: rename it to .{other}");
+            Malformed::Syntax(cause).into()
+        }
+        (None, None) => error,
+    }
 }
 
 fn parse_as(bytes: &[u8], format: MeshFormat, folder: Option<&Path>) -> Result<Parsed, ParseError> {

@@ -59,10 +59,7 @@ impl Trajectory {
             return end.expect("invariant: there is a pose").1;
         };
         let share = (time_s - a.0) / (b.0 - a.0);
-        Pose {
-            position_m: a.1.position_m.lerp(b.1.position_m, share),
-            rotation: a.1.rotation.slerp(b.1.rotation, share).normalize(),
-        }
+        a.1.towards(&b.1, share)
     }
 
     /// Bounds of the distance, metres, and turn, radians, from the pose at `from_s` until `to_s`.

@@ -8,6 +8,7 @@ use glam::{DAffine3, DQuat, DVec3};
 
 use crate::config::{self, ConfigError, InvalidValue};
 use crate::effects::Effects;
+use crate::import::Import;
 use crate::material::MaterialChoice;
 use crate::mesh::frame::{Normalize, Unit, Up};
 use crate::pose::{Pose, Trajectory};
@@ -42,9 +43,11 @@ pub struct SceneFile {
 /// An object of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneObject {
-    /// The mesh's file; relative paths were relative to the scene's file.
+    /// The file of its mesh or meshes; relative paths were relative to the scene's file.
     pub mesh: PathBuf,
-    /// Default: the stem of the mesh's file name.
+    /// How its file becomes several instances, if it is a glTF file with its nodes or a robot.
+    pub import: Option<Import>,
+    /// Default: the stem of the file's name.
     pub name: String,
     /// A class name, if it has one.
     pub label: Option<String>,
@@ -155,7 +158,7 @@ impl SceneFile {
     /// The simplification of the mesh of `object`.
     #[must_use]
     pub fn simplify_of(&self, object: &SceneObject) -> Option<Simplify> {
-        object.simplify.unwrap_or(self.simplify)
+        object.simplify.unwrap_or(self.simplify).filter(|_| object.import.is_none())
     }
 
     /// Whether any mesh is simplified.

@@ -15,6 +15,7 @@ use serde::{Deserialize, Deserializer};
 use super::{SceneObject, SceneSensor};
 use crate::config::{self, InvalidValue, one_of, positive, within};
 use crate::effects::Effects;
+use crate::import::{Format, Import};
 use crate::material::{ColourSource, MaterialChoice, MaterialTable};
 use crate::mesh::frame::{Normalize, Unit, Up};
 use crate::pose::{Pose, PoseKeys, Trajectory};
@@ -45,8 +46,19 @@ pub(super) struct SceneTable {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ObjectTable {
-    /// The mesh's file, from the folder of the scene's file.
-    mesh: PathBuf,
+    /// The mesh's file, from the folder of the scene's file. Required without `scene`.
+    mesh: Option<PathBuf>,
+    /// A glTF file, whose nodes become objects, or a robot (`.urdf`), instead of a mesh.
+    scene: Option<PathBuf>,
+    /// The positions of the robot's joints by name, radians or metres; 0 by default.
+    #[serde(default)]
+    joints: BTreeMap<String, f64>,
+    /// Whether the robot is made of its collision geometry.
+    #[serde(default)]
+    collision: bool,
+    /// Whether base colours of the glTF file's materials are taken for reflectivities.
+    #[serde(default)]
+    base_colours: bool,
     name: Option<String>,
     label: Option<String>,
     up: Option<Up>,
@@ -265,11 +277,63 @@ enum OwnSimplify {
 }
 
 impl ObjectTable {
+    /// How its file becomes several instances; none of a mesh's keys stands beside those.
+    fn import(&self, key: impl Fn(&str) -> String) -> Result<Option<Import>, InvalidValue> {
+        let Self { joints, collision, base_colours, .. } = self;
+        let (joints, collision, base_colours) = (joints.clone(), *collision, *base_colours);
+        let import = Import { joints, collision, base_colours };
+        let Some(file) = &self.scene else {
+            let given = [!import.joints.is_empty(), collision, base_colours];
+            let names = ["joints", "collision", "base_colours"].into_iter().zip(given);
+            return match names.into_iter().find(|(_, is_given)| *is_given) {
+                Some((name, _)) => {
+                    Err(InvalidValue::new(key(name), "expected it only for a scene"))
+                }
+                None => Ok(None),
+            };
+        };
+        let given = [
+            ("normalize", self.normalize.is_some()),
+            ("colours", self.colours.is_some()),
+            ("materials", !self.materials.is_empty()),
+            ("simplify", self.simplify.is_some()),
+        ];
+        let of_all = [
+            ("reflectivity", self.reflectivity.is_some()),
+            ("retroreflection", self.retroreflection != 0.0),
+        ];
+        let of_all =
+            of_all.into_iter().filter(|_| base_colours).map(|it| (it, "without base_colours"));
+        let mut given = given.into_iter().map(|it| (it, "for a mesh")).chain(of_all);
+        if let Some(((name, _), only)) = given.find(|((_, is_given), _)| *is_given) {
+            return Err(InvalidValue::new(key(name), format!("expected it only {only}")));
+        }
+        let found = || {
+            let cause = format!("expected .glb, .gltf or .urdf, found {}", file.display());
+            InvalidValue::new(key("scene"), cause)
+        };
+        let format = Format::from_path(file).ok_or_else(found)?;
+        format
+            .check(&import)
+            .map_err(|invalid| InvalidValue::new(key(&invalid.key), invalid.cause))?;
+        Ok(Some(import))
+    }
+
     pub fn validate(self, index: usize, folder: &Path) -> Result<SceneObject, Vec<InvalidValue>> {
         let table = format!("object[{index}]");
         let key = |field: &str| format!("{table}.{field}");
-        let Some(stem) = self.mesh.file_stem() else {
-            return Err(InvalidValue::new(key("mesh"), "expected the path of a file").into());
+        let import = self.import(key)?;
+        let (which, file) = match (&self.mesh, &self.scene) {
+            (Some(mesh), None) => ("mesh", mesh),
+            (None, Some(scene)) => ("scene", scene),
+            (mesh, _) => {
+                let found = if mesh.is_some() { "both" } else { "neither" };
+                let cause = format!("expected mesh or scene, found {found}");
+                return Err(InvalidValue::new(table, cause).into());
+            }
+        };
+        let Some(stem) = file.file_stem() else {
+            return Err(InvalidValue::new(key(which), "expected the path of a file").into());
         };
         let scale = match self.scale.unwrap_or(Scale::Uniform(1.0)) {
             Scale::Uniform(factor) => [factor; 3],
@@ -308,7 +372,8 @@ impl ObjectTable {
         let name = self.name.unwrap_or_else(|| stem.to_string_lossy().into_owned());
         Ok(SceneObject {
             name: named(&table, name)?,
-            mesh: folder.join(&self.mesh),
+            mesh: folder.join(file),
+            import,
             label: self.label,
             up: self.up,
             normalize: self.normalize,

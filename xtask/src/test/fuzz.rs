@@ -9,7 +9,8 @@ use std::process::Command;
 use std::thread::available_parallelism;
 use xtask::workspace::{cargo, root};
 
-const TARGETS: [&str; 7] = ["off", "mesh", "clouds", "model", "packets", "captures", "live"];
+const TARGETS: [&str; 9] =
+    ["off", "mesh", "gltf", "urdf", "clouds", "model", "packets", "captures", "live"];
 
 /// The target is named, so that build scripts are compiled without the flags below.
 const TRIPLE: &str = "x86_64-unknown-linux-gnu";

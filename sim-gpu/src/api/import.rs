@@ -1,0 +1,232 @@
+//! From the parts of a file to instances.
+
+use std::collections::HashMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use glam::{DAffine3, DVec3};
+
+use super::{Error, Instance, InstanceId, Mesh, Scene};
+use crate::config::{InvalidValue, within};
+use crate::import::{Format, Import};
+use crate::material::Materials;
+use crate::mesh::frame::{Up, z_up};
+use crate::mesh::{AssembledMesh, Assembly, BaseColour};
+use crate::pose::Pose;
+
+/// Where a file's instances stand, and what they are called.
+#[doc(hidden)]
+#[derive(Clone, Debug, Default)]
+pub struct FilePlace {
+    /// The axis of the file that points up, if it is not the format's.
+    pub up: Option<Up>,
+    /// From the file, z up, to the world; it may scale.
+    pub world_from_upright: DAffine3,
+    /// What the names of instances begin with.
+    pub prefix: String,
+}
+
+impl Scene {
+    /// Adds what stands in a glTF file (`.glb`, `.gltf`) or a robot (`.urdf`) where the file has it: each
+    /// node, or geometry of a link, is an instance with its name; its label is the name of the mesh, or
+    /// of the link. Instances of one mesh share it. Animated nodes have trajectories.
+    ///
+    /// Poses and animations are those of the file, turned z up: trajectories are within 0.1 mm and
+    /// 0.0001 radians of them, and exact where only one node above a mesh moves, in lines or steps. A node
+    /// that mirrors or shears its mesh has a mesh of its own.
+    ///
+    /// # Errors
+    /// The file cannot be read: with the node, accessor, link or joint; `import` does not fit it.
+    pub fn add_file(
+        &mut self,
+        path: impl AsRef<Path>,
+        import: &Import,
+    ) -> Result<Vec<InstanceId>, Error> {
+        self.add_file_at(path.as_ref(), import, &FilePlace::default())
+    }
+
+    /// As [`Scene::add_file`], at a place.
+    #[doc(hidden)]
+    pub fn add_file_at(
+        &mut self,
+        path: &Path,
+        import: &Import,
+        place: &FilePlace,
+    ) -> Result<Vec<InstanceId>, Error> {
+        let format = Format::from_path(path).ok_or_else(|| {
+            let found = path.display();
+            InvalidValue::new("file", format!("expected .glb, .gltf or .urdf, found {found}"))
+        })?;
+        format.check(import)?;
+        let upright_from_file = upright_from_file(place.up.unwrap_or(format.default_up()));
+        let Assembly { meshes, parts, colours, mut warnings } =
+            format.load(path, import, place.world_from_upright * upright_from_file)?;
+        let mut images = colours.iter().filter(|colour| import.base_colours && colour.has_image);
+        warnings.extend(images.next().map(|colour| {
+            format!("material {:?}: its image is left out of base colours", colour.name)
+        }));
+        let of_material = |colour: &BaseColour| {
+            let key = format!("material {:?}: luminance", colour.name);
+            within(&key, colour.luminance, 0.0..=1.0).map(|()| colour.luminance)
+        };
+        let colours = if import.base_colours { colours } else { vec![] };
+        let reflectivities = colours.iter().map(of_material).collect::<Result<Vec<_>, _>>()?;
+        let looks: Vec<_> = meshes.iter().map(|mesh| look(mesh, &reflectivities)).collect();
+        let mut shared = vec![None::<Mesh>; meshes.len()];
+        let mut names = Names::of(self);
+        let mut ids = Vec::new();
+        for part in parts {
+            let upright = |by: &DAffine3| Mesh::try_from(meshes[part.mesh].mesh.moved(by));
+            let of_upright = part.world_from_mesh * upright_from_file.inverse();
+            let (mesh, pose, scale) = match (Pose::of_scaled(&of_upright), &shared[part.mesh]) {
+                (Some((pose, scale)), Some(mesh)) => (mesh.clone(), pose, scale),
+                (Some((pose, scale)), None) => {
+                    let mesh = upright(&upright_from_file)?;
+                    let mesh = mesh.with_warnings(path, &std::mem::take(&mut warnings));
+                    shared[part.mesh] = Some(mesh.clone());
+                    (mesh, pose, scale)
+                }
+                (None, _) => {
+                    let mesh = upright(&part.world_from_mesh)?;
+                    let mesh = mesh.with_warnings(path, &std::mem::take(&mut warnings));
+                    (mesh, Pose::IDENTITY, DVec3::ONE)
+                }
+            };
+            let id = self.add(mesh, pose);
+            let (reflectivity, materials) = looks[part.mesh].clone();
+            self[id] = Instance {
+                scale,
+                motion: part.motion,
+                name: Some(names.free(place.prefix.clone() + &part.name)),
+                label: part.label,
+                reflectivity,
+                materials,
+                ..self[id].clone()
+            };
+            ids.push(id);
+        }
+        Ok(ids)
+    }
+}
+
+/// From the axes of a file to those of the world.
+fn upright_from_file(up: Up) -> DAffine3 {
+    let [x, y, z] = DVec3::AXES.map(|axis| z_up(axis, up));
+    DAffine3::from_cols(x, y, z, DVec3::ZERO)
+}
+
+/// The reflectivity of `mesh`, or those of its faces if they differ; faces without a material have 1.
+fn look(mesh: &AssembledMesh, reflectivities: &[f64]) -> (f64, Option<Arc<Materials>>) {
+    let of =
+        |number: Option<usize>| number.and_then(|i| reflectivities.get(i)).copied().unwrap_or(1.0);
+    let runs: Vec<_> = mesh.colours.iter().map(|(number, n)| (of(*number), *n)).collect();
+    match &runs[..] {
+        [] => (1.0, None),
+        [(first, _), others @ ..] if others.iter().all(|(other, _)| other == first) => {
+            (*first, None)
+        }
+        runs => (1.0, Some(Arc::new(Materials::of_runs(runs)))),
+    }
+}
+
+/// The names of a scene's instances, which key their random numbers.
+struct Names(HashMap<String, usize>);
+
+impl Names {
+    fn of(scene: &Scene) -> Self {
+        let names = scene.instances().iter().filter_map(|instance| instance.name.clone());
+        Self(names.map(|name| (name, 1)).collect())
+    }
+
+    /// `name`, with a number if there is another one.
+    fn free(&mut self, name: String) -> String {
+        let mut free = name.clone();
+        while self.0.contains_key(&free) {
+            let n = self.0.entry(name.clone()).or_insert(1);
+            *n += 1;
+            free = format!("{name} ({n})");
+        }
+        self.0.insert(free.clone(), 1);
+        free
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use base64::Engine;
+    use base64::engine::general_purpose::STANDARD;
+    use std::fs;
+
+    /// Nodes over one triangle with two corners at x and y = 1, in two materials.
+    fn gltf(nodes: &str) -> String {
+        let corners = [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+        let bytes: Vec<u8> = corners.iter().flat_map(|x| x.to_le_bytes()).collect();
+        let primitive =
+            |material| format!(r#"{{"attributes": {{"POSITION": 0}}, "material": {material}}}"#);
+        format!(
+            r#"{{"asset": {{"version": "2.0"}}, "scenes": [{{"nodes": [0, 1, 2]}}], "nodes": [{nodes}],
+            "meshes": [{{"name": "tile", "primitives": [{}, {}]}}, {{"primitives": [{}]}}],
+            "materials": [{{"pbrMetallicRoughness": {{"baseColorFactor": [1, 0, 0.5, 1]}}}}, {{}}],
+            "accessors": [{{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
+                "min": [0, 0, 0], "max": [1, 1, 0]}}],
+            "bufferViews": [{{"buffer": 0, "byteLength": 36}}],
+            "buffers": [{{"byteLength": 36, "uri": "data:;base64,{}"}}]}}"#,
+            primitive(0),
+            primitive(1),
+            primitive(0),
+            STANDARD.encode(bytes)
+        )
+    }
+
+    const NODES: &str = r#"{"name": "a", "mesh": 0, "translation": [1, 2, 3], "scale": [1, 2, 3]},
+        {"name": "a", "mesh": 0}, {"mesh": 1, "scale": [-1, 1, 1]}"#;
+
+    #[test]
+    fn nodes_become_instances_with_z_up() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("tiles.gltf");
+        fs::write(&file, gltf(NODES)).unwrap();
+        let scene = Scene::read(&file).unwrap();
+        let [a, b, c] = scene.instances() else { panic!("expected three instances") };
+        let names = [a, b, c].map(|instance| instance.name.as_deref().unwrap());
+        assert_eq!(names, ["a", "a (2)", "nodes[2]"]);
+        assert_eq!([&a.label, &c.label], [&Some("tile".to_owned()), &None]);
+        // (x, y, z) becomes (x, -z, y), of places and of factors.
+        assert_eq!(a.pose, Pose::at([1.0, -3.0, 2.0]));
+        assert_eq!(a.scale, DVec3::new(1.0, 3.0, 2.0));
+        assert_eq!(a.mesh.vertices()[2], DVec3::Z);
+        assert!(std::ptr::eq(a.mesh.vertices(), b.mesh.vertices()));
+        assert_eq!(c.mesh.vertices()[1], DVec3::new(-1.0, 0.0, 0.0));
+        assert_eq!((a.reflectivity, a.materials.is_none()), (1.0, true));
+
+        let mut scene = Scene::new();
+        let import = Import { base_colours: true, ..Import::default() };
+        let ids = scene.add_file(&file, &import).unwrap();
+        let materials = scene[ids[0]].materials.as_ref().unwrap();
+        // 0.2126 + 0.0722 / 2, by the weights of BT.709.
+        let found = [0, 1].map(|triangle| materials.at(triangle, || DVec3::ZERO).reflectivity);
+        assert_eq!(found.map(|x| (1e9 * x).round()), [248_700_000.0, 1e9]);
+        assert!((scene[ids[2]].reflectivity - 0.2487).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_scene_s_file_places_files_and_gives_them_a_label() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("tiles.gltf"), gltf(NODES)).unwrap();
+        let robot = "<robot><link name=\"l\"/><joint name=\"j\" type=\"prismatic\"><parent link=\"l\"/><child link=\"m\"/></joint><link name=\"m\"><visual><geometry><box size=\"1 1 1\"/></geometry></visual></link></robot>";
+        fs::write(folder.path().join("robot.urdf"), robot).unwrap();
+        let file = folder.path().join("scene.toml");
+        let text = "[[object]]\nscene = \"tiles.gltf\"\nname = \"floor\"\nlabel = \"ground\"\nposition_m = [10, 0, 0]\n\
+                    yaw_deg = 90\nreflectivity = 0.25\n[[object]]\nscene = \"robot.urdf\"\njoints = { j = 2 }\n\
+                    [[sensor]]\nprofile = \"vlp16\"\nposition_m = [0, 0, 1]\nyaw_deg = 0\n";
+        fs::write(&file, text).unwrap();
+        let scene = Scene::read(&file).unwrap();
+        let [a, _, _, hand] = scene.instances() else { panic!("expected four instances") };
+        assert_eq!(a.name.as_deref(), Some("floor/a"));
+        assert_eq!((a.label.as_deref(), a.reflectivity), (Some("ground"), 0.25));
+        assert!(a.pose.position_m.distance(DVec3::new(13.0, 1.0, 2.0)) < 1e-12);
+        assert_eq!((hand.name.as_deref(), hand.label.as_deref()), (Some("robot/m"), Some("m")));
+        assert_eq!(hand.pose.position_m, DVec3::new(2.0, 0.0, 0.0));
+    }
+}

@@ -1,0 +1,314 @@
+//! glTF 2.0, through the crate gltf: the meshes of a scene's nodes, where their transforms and their
+//! animation put them.
+//!
+//! The crate reads and checks the JSON. The format is in metres with y up; its numbers are f32.
+
+mod animation;
+mod buffers;
+#[cfg(test)]
+mod tests;
+mod track;
+
+use std::path::Path;
+
+use glam::{DAffine3, DVec3, Quat, Vec3};
+use gltf::accessor::Dimensions;
+use gltf::mesh::Mode;
+use gltf::scene::Transform;
+use gltf::{Document, Gltf, Node, Primitive};
+
+use super::assembly::{AssembledMesh, Assembly, BaseColour, Part};
+use super::error::{Malformed, ParseError};
+use super::triangle_mesh::{Parsed, TriangleMesh};
+use animation::{Animation, Rest};
+use buffers::{Buffers, MOST_ELEMENTS, is_index};
+
+/// Extensions that change where triangles are, and are not read.
+const COMPRESSIONS: [&str; 3] =
+    ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "EXT_mesh_gpu_instancing"];
+
+/// All nodes at rest as one mesh. Buffers in other files are in `folder`.
+pub(super) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Parsed, ParseError> {
+    let assembly = read(bytes, folder, DAffine3::IDENTITY, When::AtRest).map_err(wrong)?;
+    let too_many =
+        || wrong(format!("expected at most {MOST_ELEMENTS} vertices of all nodes, found more"));
+    assembly.flattened(MOST_ELEMENTS).ok_or_else(too_many)
+}
+
+/// The nodes and their animation; `world_from_file` stands above the roots.
+pub(super) fn assemble(
+    bytes: &[u8],
+    folder: Option<&Path>,
+    world_from_file: DAffine3,
+) -> Result<Assembly, ParseError> {
+    read(bytes, folder, world_from_file, When::Animated).map_err(wrong)
+}
+
+fn wrong(cause: String) -> ParseError {
+    Malformed::Syntax(cause).into()
+}
+
+/// The time of the nodes' places.
+#[derive(Clone, Copy, PartialEq)]
+enum When {
+    AtRest,
+    Animated,
+}
+
+fn read(
+    bytes: &[u8],
+    folder: Option<&Path>,
+    world_from_file: DAffine3,
+    when: When,
+) -> Result<Assembly, String> {
+    let file = opened(bytes)?;
+    let scene = file.default_scene().or_else(|| file.scenes().next());
+    let scene = scene.ok_or("expected a scene, found none")?;
+    let buffers = Buffers::of(&file, folder)?;
+    let mut warnings = Warnings::default();
+    let animation = match when {
+        When::AtRest => Animation::default(),
+        When::Animated => Animation::read(&file, &buffers, &mut warnings)?,
+    };
+    let mut reader = Reader {
+        buffers,
+        animation,
+        assembly: Assembly::default(),
+        numbers: vec![None; file.meshes().len()],
+        warnings,
+    };
+    reader.assembly.colours = file.materials().map(|material| colour(&material)).collect();
+    let mut is_seen = vec![false; file.nodes().len()];
+    let mut open: Vec<_> = scene.nodes().map(|node| (node, None, world_from_file)).collect();
+    open.reverse();
+    while let Some((node, mover, parent)) = open.pop() {
+        if std::mem::replace(&mut is_seen[node.index()], true) {
+            return Err(format!("nodes[{}]: expected one parent, found two", node.index()));
+        }
+        let (mover, own) = reader
+            .place(&node, mover, parent)
+            .map_err(|cause| format!("nodes[{}]: {cause}", node.index()))?;
+        reader.add(&node, mover, own)?;
+        let first = open.len();
+        open.extend(node.children().map(|child| (child, mover, own)));
+        open[first..].reverse();
+    }
+    reader.assembly.warnings = reader.warnings.0;
+    Ok(reader.assembly)
+}
+
+/// The file, if all that the crate takes for granted is so.
+fn opened(bytes: &[u8]) -> Result<Gltf, String> {
+    check_length(bytes)?;
+    let Gltf { document, blob } = Gltf::from_slice_without_validation(bytes)
+        .map_err(|error| format!("expected glTF 2.0: {error}"))?;
+    let mut json = document.into_json();
+    let compression = json.extensions_required.iter().find(|name| COMPRESSIONS.contains(&&***name));
+    if let Some(extension) = compression {
+        return Err(format!("expected a file without {extension}: export it without"));
+    }
+    // Others are of materials and textures.
+    json.extensions_required.clear();
+    // The crate's own checks name the place in the JSON; they take this one for granted.
+    let n = json.accessors.len();
+    for (i, mesh) in json.meshes.iter().enumerate() {
+        let attributes = mesh.primitives.iter().flat_map(|primitive| primitive.attributes.values());
+        if let Some(index) = attributes.map(|index| index.value()).find(|index| *index >= n) {
+            return Err(format!("meshes[{i}]: expected one of {n} accessors, found {index}"));
+        }
+    }
+    let document = Document::from_json(json).map_err(|error| error.to_string())?;
+    Ok(Gltf { document, blob })
+}
+
+/// The crate subtracts the header from the length that the header of a binary file tells.
+fn check_length(bytes: &[u8]) -> Result<(), String> {
+    const HEADER: u32 = 12;
+    let [b'g', b'l', b'T', b'F', _, _, _, _, length @ ..] = bytes else { return Ok(()) };
+    match length.first_chunk().map(|length| u32::from_le_bytes(*length)) {
+        Some(length) if length < HEADER => {
+            Err(format!("expected a length of {HEADER} or more in the header, found {length}"))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Each warning once.
+#[derive(Default)]
+struct Warnings(Vec<String>);
+
+impl Warnings {
+    fn add(&mut self, warning: &str) {
+        if !self.0.iter().any(|told| told == warning) {
+            self.0.push(warning.to_owned());
+        }
+    }
+}
+
+struct Reader<'a> {
+    buffers: Buffers<'a>,
+    animation: Animation,
+    assembly: Assembly,
+    /// The numbers in the assembly of the file's meshes that were read.
+    numbers: Vec<Option<usize>>,
+    warnings: Warnings,
+}
+
+impl Reader<'_> {
+    /// The node that moves `node`, if any, and the map from `node` to it or else to the world; those of
+    /// the node above are `mover` and `parent`.
+    fn place(
+        &mut self,
+        node: &Node<'_>,
+        mover: Option<usize>,
+        parent: DAffine3,
+    ) -> Result<(Option<usize>, DAffine3), String> {
+        let mut rest = match node.transform() {
+            Transform::Matrix { .. } if self.animation.moves(node.index()) => {
+                return Err("expected no matrix, since it is animated, found one".to_owned());
+            }
+            Transform::Matrix { matrix } => {
+                let columns = matrix.map(|[x, y, z, _]| Vec3::new(x, y, z).as_dvec3());
+                let [x, y, z, at] = columns;
+                return Ok((mover, parent * DAffine3::from_cols(x, y, z, at)));
+            }
+            Transform::Decomposed { translation, rotation, scale } => Rest {
+                translation: Vec3::from_array(translation).as_dvec3(),
+                rotation: Quat::from_array(rotation).as_dquat(),
+                scale: Vec3::from_array(scale).as_dvec3(),
+            },
+        };
+        let tracks = self.animation.settle(node.index(), &mut rest);
+        let length = rest.rotation.length();
+        if !(length > 0.0 && length.is_finite()) {
+            return Err(format!("expected a rotation of length 1, found length {length}"));
+        }
+        rest.rotation = rest.rotation.normalize();
+        let scale = DAffine3::from_scale(rest.scale);
+        if let Some(tracks) = tracks {
+            self.animation.add_mover(node.index(), mover, &parent, &rest, tracks);
+            return Ok((Some(node.index()), scale));
+        }
+        let own = DAffine3::from_rotation_translation(rest.rotation, rest.translation);
+        Ok((mover, parent * own * scale))
+    }
+
+    /// Adds the mesh of a node.
+    fn add(&mut self, node: &Node<'_>, mover: Option<usize>, own: DAffine3) -> Result<(), String> {
+        let Some(mesh) = node.mesh() else { return Ok(()) };
+        if node.skin().is_some() {
+            self.warnings.add("a skin is not applied: its mesh stands as it was bound");
+        }
+        if mesh.primitives().any(|primitive| primitive.morph_targets().len() > 0) {
+            self.warnings.add("morph targets are not applied: their meshes stand undeformed");
+        }
+        let number = match self.numbers[mesh.index()] {
+            Some(number) => number,
+            None => {
+                let mut read = AssembledMesh::default();
+                for primitive in mesh.primitives() {
+                    self.add_primitive(&primitive, &mut read).map_err(|cause| {
+                        let (mesh, primitive) = (mesh.index(), primitive.index());
+                        format!("meshes[{mesh}].primitives[{primitive}]: {cause}")
+                    })?;
+                }
+                if let Some(vertex) = read.mesh.vertices.iter().find(|vertex| !vertex.is_finite()) {
+                    let mesh = mesh.index();
+                    return Err(format!(
+                        "meshes[{mesh}]: expected finite coordinates, found {vertex}"
+                    ));
+                }
+                self.assembly.meshes.push(read);
+                self.assembly.meshes.len() - 1
+            }
+        };
+        self.numbers[mesh.index()] = Some(number);
+        if self.assembly.meshes[number].mesh.triangles.is_empty() {
+            return Ok(());
+        }
+        let place = format!("nodes[{}]", node.index());
+        let (motion, factor) = match mover {
+            None => (None, 1.0),
+            Some(mover) => {
+                let (motion, factor) =
+                    self.animation.motion(mover).map_err(|cause| format!("{place}: {cause}"))?;
+                (Some(motion), factor)
+            }
+        };
+        let world_from_mesh = DAffine3::from_scale(DVec3::splat(factor)) * own;
+        if !world_from_mesh.is_finite() {
+            return Err(format!("{place}: expected a finite transform, found another"));
+        }
+        self.assembly.parts.push(Part {
+            mesh: number,
+            name: node.name().map_or(place, str::to_owned),
+            label: mesh.name().map(str::to_owned),
+            world_from_mesh,
+            motion,
+        });
+        Ok(())
+    }
+
+    fn add_primitive(
+        &mut self,
+        primitive: &Primitive<'_>,
+        to: &mut AssembledMesh,
+    ) -> Result<(), String> {
+        let mode = primitive.mode();
+        if matches!(mode, Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip) {
+            self.warnings.add("points and lines are left out, since no beam hits them");
+            return Ok(());
+        }
+        let positions = primitive.get(&gltf::Semantic::Positions);
+        let positions = positions.ok_or("expected the attribute POSITION, found none")?;
+        let TriangleMesh { vertices, triangles } = &mut to.mesh;
+        let (first, before) = (vertices.len(), triangles.len());
+        self.buffers.each(&positions, Dimensions::Vec3, |at| {
+            vertices.push(DVec3::new(at[0], at[1], at[2]));
+        })?;
+        let n = vertices.len() - first;
+        let mut indices = Vec::new();
+        match primitive.indices() {
+            Some(accessor) if !is_index(accessor.data_type()) || accessor.normalized() => {
+                return Err(
+                    "expected indices of whole numbers without sign, found others".to_owned()
+                );
+            }
+            Some(accessor) => {
+                self.buffers.each(&accessor, Dimensions::Scalar, |number| {
+                    indices.push(number[0] as u32);
+                })?;
+            }
+            None => indices.extend(0..n as u32),
+        }
+        if let Some(outside) = indices.iter().find(|index| **index as usize >= n) {
+            return Err(format!("expected indices of {n} vertices, found {outside}"));
+        }
+        let mut face =
+            |corners: [u32; 3]| triangles.push(corners.map(|corner| first as u32 + corner));
+        match mode {
+            // Every other triangle of a strip runs the other way round (glTF 2.0, 3.7.2.1).
+            Mode::TriangleStrip => indices.windows(3).enumerate().for_each(|(i, w)| {
+                face(if i % 2 == 0 { [w[0], w[1], w[2]] } else { [w[0], w[2], w[1]] });
+            }),
+            Mode::TriangleFan => {
+                indices.windows(2).skip(1).for_each(|w| face([indices[0], w[0], w[1]]));
+            }
+            _ => indices.as_chunks::<3>().0.iter().for_each(|corners| face(*corners)),
+        }
+        to.colours.push((primitive.material().index(), triangles.len() - before));
+        Ok(())
+    }
+}
+
+/// The colour of a material, whose factor is linear: its luminance by the weights of ITU-R BT.709.
+fn colour(material: &gltf::Material<'_>) -> BaseColour {
+    let surface = material.pbr_metallic_roughness();
+    let [red, green, blue, _] = surface.base_color_factor().map(f64::from);
+    let place = || format!("materials[{}]", material.index().unwrap_or_default());
+    BaseColour {
+        name: material.name().map_or_else(place, str::to_owned),
+        luminance: 0.2126 * red + 0.7152 * green + 0.0722 * blue,
+        has_image: surface.base_color_texture().is_some(),
+    }
+}
