@@ -40,7 +40,7 @@ mod waiting;
 
 pub use counts::Counts;
 pub use ego_motion::{EgoMotion, Pose};
-pub use object::{Object, SCHEMA_VERSION};
+pub use object::{Object, PlacedBox, SCHEMA_VERSION};
 pub use pipeline::{Arrival, Decoded, LiveError, LiveOptions, Pipeline};
 #[cfg(feature = "mcap")]
 pub use recorder::{RecordError, Recorder};
