@@ -25,6 +25,7 @@
 
 mod counts;
 mod ego_motion;
+mod footprint;
 mod kalman;
 mod object;
 mod object_classifier;
@@ -37,6 +38,7 @@ mod stats;
 mod timeline;
 mod tracker;
 mod waiting;
+mod whole;
 
 pub use counts::Counts;
 pub use ego_motion::{EgoMotion, Pose};

@@ -10,12 +10,13 @@ use glam::DVec3;
 
 use super::counts::Counts;
 use super::ego_motion::{EgoMotion, Pose};
+use super::footprint::Observation;
 use super::object::{Object, PlacedBox, SCHEMA_VERSION};
 use super::object_classifier::{Chosen, ObjectClassifier};
 use super::packet_clock::{PacketClock, Succession};
 use super::sensor::{Decoder, Facts, Flaw};
 use super::stats::{Stage, Stats};
-use super::tracker::{Observation, Tracker};
+use super::tracker::Tracker;
 use super::waiting::{Motion, Tag, Waiting};
 use crate::classifier::Classifier;
 use crate::error::Error;
@@ -289,22 +290,28 @@ impl Pipeline {
             let sensor_m = pose.map_or([0.0; 2], |pose| pose.position_m.truncate().to_array());
             let seen = OrientedBox::around(points);
             let place = placed(&seen, pose);
-            let track = self.tracker.observe(&Observation {
+            let Some(track) = self.tracker.observe(&Observation {
                 time_s: last.time_s,
                 position_m: place.centre_m,
                 size_m: [place.size_m[0], place.size_m[1]],
                 yaw_rad: place.yaw_deg.to_radians(),
                 sensor_m,
                 view,
+                usual_length_m: self.classifiers.usual_size_m(node).map(|[length, _]| length),
+            }) else {
+                continue;
+            };
+            let fused = self.classifiers.fused(&track.log_probabilities, track.energy);
+            let confidence = view.zip(fused.as_ref());
+            let whole_box = confidence.and_then(|(_, fused)| {
+                let whole = seen.completed(usual_size_m(&fused.answer)?, cluster.ground_z_m);
+                let velocity = track.velocity_m_s().filter(|_| pose.is_some());
+                Some(track.fuse(fused.class, &placed(&whole, pose), sensor_m, velocity))
             });
             if track.n_seen < self.options.min_turns {
                 continue;
             }
-            let fused = self.classifiers.fused(&track.log_probabilities, track.energy);
             let latency = last.moment.map(|moment| moment.elapsed());
-            let confidence = view.zip(fused.as_ref());
-            let usual_m = confidence.and_then(|(_, fused)| usual_size_m(&fused.answer));
-            let whole = usual_m.map(|usual_m| seen.completed(usual_m, cluster.ground_z_m));
             self.counts.clusters += 1;
             self.counts.unclassified += u64::from(view.is_none());
             each(&Object {
@@ -327,7 +334,7 @@ impl Pipeline {
                 first_s: first.time_s,
                 last_s: last.time_s,
                 latency_ms: latency.map(|latency| latency.as_secs_f64() * 1e3),
-                whole_box: whole.map(|whole| placed(&whole, pose)),
+                whole_box,
             });
             latency
                 .into_iter()
