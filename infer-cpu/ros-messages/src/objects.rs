@@ -202,7 +202,7 @@ mod tests {
         let object: Object = serde_json::from_str(&line).unwrap();
         let nothing = LINE.replace('}', r#","whole_box":null}"#);
         assert_eq!(serde_json::from_str::<Object>(&nothing).unwrap(), self::object());
-        let BoundingBox3D { center, size } = &detections(&[object.clone()]).detections[0].bbox;
+        let BoundingBox3D { center, size } = &object.detection().bbox;
         assert_eq!(center.position, Point { x: 2.0, y: 3.0, z: 3.5 });
         assert_eq!(*size, Vector3 { x: 5.0, y: 2.5, z: 2.0 });
         // A quarter turn to the right about z.

@@ -306,7 +306,10 @@ impl Pipeline {
             let whole_box = confidence.and_then(|(_, fused)| {
                 let whole = seen.completed(usual_size_m(&fused.answer)?, cluster.ground_z_m);
                 let velocity = track.velocity_m_s().filter(|_| pose.is_some());
-                Some(track.fuse(fused.class, &placed(&whole, pose), sensor_m, velocity))
+                if !track.is_piece {
+                    track.whole.fuse(fused.class, &placed(&whole, pose), sensor_m, velocity);
+                }
+                Some(track.whole.placed())
             });
             if track.n_seen < self.options.min_turns {
                 continue;
