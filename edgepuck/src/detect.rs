@@ -6,7 +6,7 @@ use std::time::Instant;
 use edgepuck_segment::{Hierarchy, Label, Node, OrientedBox, Segmenter, Settings, Sweep};
 use formats::{Scan, atomic};
 use infer_cpu::rule::{MARGIN_OF_WHOLES, Rule};
-use infer_cpu::{Classifier, ClassifierTeam, Options, Precision, Prediction};
+use infer_cpu::{Classifier, ClassifierTeam, Options, Precision, Prediction, usual_size_m};
 use plotters::style::RGBColor;
 use serde_json::{Value, json};
 
@@ -241,10 +241,10 @@ impl Object {
     /// The object in the cluster `number`, of the points `cloud`, on ground of this height.
     fn new(number: u32, answer: &Prediction, cloud: &[[f32; 3]], ground_z_m: Option<f32>) -> Self {
         let (class, place) = (answer.label.to_string(), OrientedBox::around(cloud));
-        let usual = StreetClass::named(&class);
         Self {
             cluster: number,
-            whole: usual.map_or(place, |usual| place.completed(usual.usual_m, ground_z_m)),
+            whole: usual_size_m(&class)
+                .map_or(place, |usual_m| place.completed(usual_m, ground_z_m)),
             class,
             class_number: answer.class,
             confidence: answer.confidence(),

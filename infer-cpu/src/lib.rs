@@ -64,6 +64,7 @@ mod source;
 mod summary;
 mod team;
 mod test_time_augmentation;
+mod usual_size;
 
 /// How a team of threads divides a cloud, for models of its speed.
 #[doc(hidden)]
@@ -103,3 +104,4 @@ pub use precision::Precision;
 pub use prediction::energy;
 pub use prediction::{Prediction, UNKNOWN};
 pub use summary::{LayerShape, NetShape, Summary, inspect};
+pub use usual_size::usual_size_m;

@@ -106,11 +106,12 @@ def compare_objects(detections, markers, objects):
     assert len(found) == len(objects) > 100, (len(found), len(objects))
     for detection, line in zip(found, objects, strict=True):
         box, position = detection.bbox, detection.bbox.center.position
+        whole = line["whole_box"] or line | {"centre_m": line["position_m"]}
         assert (detection.id, detection.header.frame_id) == (str(line["track"]), line["frame"])
-        near([position.x, position.y, position.z], line["position_m"])
-        near([box.size.x, box.size.y, box.size.z], line["size_m"])
+        near([position.x, position.y, position.z], whole["centre_m"])
+        near([box.size.x, box.size.y, box.size.z], whole["size_m"])
         turned = box.center.orientation
-        near([math.degrees(2 * math.atan2(turned.z, turned.w))], [line["yaw_deg"]])
+        near([math.degrees(2 * math.atan2(turned.z, turned.w))], [whole["yaw_deg"]])
         assert abs(stamp_s(detection) - line["last_s"]) < 1e-6
         results = detection.results
         named = [(result.hypothesis.class_id, result.hypothesis.score) for result in results]

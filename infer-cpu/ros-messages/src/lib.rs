@@ -16,7 +16,7 @@ mod messages;
 mod objects;
 
 pub use messages::*;
-pub use objects::{MARKER_LIFETIME_S, Object, detections, markers};
+pub use objects::{MARKER_LIFETIME_S, Object, WholeBox, detections, markers};
 
 use serde::Serialize;
 

@@ -33,6 +33,21 @@ pub struct Object {
     pub yaw_deg: f64,
     /// When its last point was measured, seconds of Unix time.
     pub last_s: f64,
+    /// The box of the whole object, if it is known; messages then have it in place of the box around
+    /// its points.
+    #[serde(default)]
+    pub whole_box: Option<WholeBox>,
+}
+
+/// The box of a whole object, of which a sensor sees a part.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+pub struct WholeBox {
+    /// Its middle, metres.
+    pub centre_m: [f64; 3],
+    /// Length, width and height, metres.
+    pub size_m: [f64; 3],
+    /// The direction of the length, degrees counterclockwise from x.
+    pub yaw_deg: f64,
 }
 
 impl Object {
@@ -40,42 +55,45 @@ impl Object {
         Header { stamp: Time::from_s(self.last_s), frame_id: self.frame.clone() }
     }
 
-    fn pose(&self) -> Pose {
-        let [x, y, z] = self.position_m;
-        Pose { position: Point { x, y, z }, orientation: Quaternion::from_yaw_deg(self.yaw_deg) }
-    }
-
-    fn size(&self) -> Vector3 {
-        let [x, y, z] = self.size_m;
-        Vector3 { x, y, z }
+    fn bbox(&self) -> BoundingBox3D {
+        let ([x, y, z], size_m, yaw_deg) = match &self.whole_box {
+            Some(whole) => (whole.centre_m, whole.size_m, whole.yaw_deg),
+            None => (self.position_m, self.size_m, self.yaw_deg),
+        };
+        let orientation = Quaternion::from_yaw_deg(yaw_deg);
+        let center = Pose { position: Point { x, y, z }, orientation };
+        let [x, y, z] = size_m;
+        BoundingBox3D { center, size: Vector3 { x, y, z } }
     }
 
     fn detection(&self) -> Detection3D {
+        let bbox = self.bbox();
         let hypothesis = |class: &String| ObjectHypothesisWithPose {
             hypothesis: ObjectHypothesis {
                 class_id: class.clone(),
                 score: self.probability.unwrap_or_default(),
             },
-            pose: PoseWithCovariance { pose: self.pose(), ..PoseWithCovariance::default() },
+            pose: PoseWithCovariance { pose: bbox.center.clone(), ..PoseWithCovariance::default() },
         };
         Detection3D {
             header: self.header(),
             results: self.class.iter().map(hypothesis).collect(),
-            bbox: BoundingBox3D { center: self.pose(), size: self.size() },
+            bbox,
             id: self.track.to_string(),
         }
     }
 
     /// A box, and a text above it.
     fn markers(&self) -> [Marker; 2] {
+        let BoundingBox3D { center, size } = self.bbox();
         let cube = Marker {
             header: self.header(),
             ns: "boxes".to_owned(),
             // ROS ids are i32, so track numbers wrap around.
             id: (self.track % i32::MAX as u64) as i32,
             kind: Marker::CUBE,
-            pose: self.pose(),
-            scale: self.size(),
+            pose: center,
+            scale: size,
             color: color(self.class.as_deref()),
             lifetime: Duration { sec: 0, nanosec: (MARKER_LIFETIME_S * 1e9) as u32 },
             ..Marker::default()
@@ -88,7 +106,7 @@ impl Object {
             text: format!("{} {}", self.class.as_deref().unwrap_or("?"), self.track),
             ..cube.clone()
         };
-        text.pose.position.z += self.size_m[2] / 2.0 + LETTER_M;
+        text.pose.position.z += cube.scale.z / 2.0 + LETTER_M;
         [cube, text]
     }
 }
@@ -174,6 +192,24 @@ mod tests {
             assert_near(found, &pose(3.0));
         }
         assert_eq!(nameless.results, []);
+    }
+
+    #[test]
+    fn messages_have_the_whole_box_where_there_is_one() {
+        let whole =
+            r#""whole_box":{"centre_m":[2.0,3.0,3.5],"size_m":[5.0,2.5,2.0],"yaw_deg":-90.0}}"#;
+        let line = LINE.replace('}', &format!(",{whole}"));
+        let object: Object = serde_json::from_str(&line).unwrap();
+        let nothing = LINE.replace('}', r#","whole_box":null}"#);
+        assert_eq!(serde_json::from_str::<Object>(&nothing).unwrap(), self::object());
+        let BoundingBox3D { center, size } = &object.detection().bbox;
+        assert_eq!(center.position, Point { x: 2.0, y: 3.0, z: 3.5 });
+        assert_eq!(*size, Vector3 { x: 5.0, y: 2.5, z: 2.0 });
+        // A quarter turn to the right about z.
+        assert!((center.orientation.z + 0.5f64.sqrt()).abs() < 1e-15, "{center:?}");
+        let [cube, text] = object.markers();
+        assert_eq!((&cube.pose, &cube.scale), (center, size));
+        assert_eq!(text.pose.position, Point { z: 3.5 + 1.0 + 0.4, ..center.position });
     }
 
     #[test]

@@ -25,6 +25,7 @@
 
 mod counts;
 mod ego_motion;
+mod footprint;
 mod kalman;
 mod object;
 mod object_classifier;
@@ -37,10 +38,11 @@ mod stats;
 mod timeline;
 mod tracker;
 mod waiting;
+mod whole;
 
 pub use counts::Counts;
 pub use ego_motion::{EgoMotion, Pose};
-pub use object::{Object, SCHEMA_VERSION};
+pub use object::{Object, PlacedBox, SCHEMA_VERSION};
 pub use pipeline::{Arrival, Decoded, LiveError, LiveOptions, Pipeline};
 #[cfg(feature = "mcap")]
 pub use recorder::{RecordError, Recorder};

@@ -60,6 +60,24 @@ pub struct Object {
     /// `None` if packets do not arrive in real time.
     #[serde(serialize_with = "rounded")]
     pub latency_ms: Option<f64>,
+    /// The box of the whole object, whose visible side is that of this cluster; `None` if the class
+    /// has no usual size, or if this cluster has too few points to be classified.
+    pub whole_box: Option<PlacedBox>,
+}
+
+/// A box with a level base in the frame of an object.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct PlacedBox {
+    /// Its middle, metres.
+    #[serde(serialize_with = "rounded")]
+    pub centre_m: [f64; 3],
+    /// Length, width and height, metres.
+    #[serde(serialize_with = "rounded")]
+    pub size_m: [f64; 3],
+    /// The direction of the length, degrees counterclockwise from x, -90 to 90.
+    #[serde(serialize_with = "rounded")]
+    pub yaw_deg: f64,
 }
 
 /// Numbers that are written in thousandths, such as millimetres: the noise of a sensor is ten times

@@ -11,6 +11,7 @@ use crate::classifier_team::ClassifierTeam;
 use crate::error::Error;
 use crate::prediction::{UNKNOWN, UnknownRule};
 use crate::rule::{MARGIN_OF_WHOLES, Rule};
+use crate::usual_size::usual_size_m;
 
 /// Classifies trees of clusters, chooses the best cut, and names tracks.
 pub struct ObjectClassifier {
@@ -119,6 +120,13 @@ impl ObjectClassifier {
     pub fn view(&self, node: usize) -> Option<(&[f64], f64)> {
         let (range, energy) = self.views[node].as_ref()?;
         Some((&self.log_probabilities[range.clone()], *energy))
+    }
+
+    /// The usual length and width of what a node is recognised as by itself, metres.
+    pub fn usual_size_m(&self, node: usize) -> Option<[f32; 2]> {
+        let (view, _) = self.view(node).filter(|_| self.is_known[node])?;
+        let (class, _) = view.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
+        usual_size_m(&self.classes[class])
     }
 
     /// The class of a track with these mean log-probabilities and this mean energy; `None` without

@@ -10,15 +10,17 @@ use glam::DVec3;
 
 use super::counts::Counts;
 use super::ego_motion::{EgoMotion, Pose};
-use super::object::{Object, SCHEMA_VERSION};
+use super::footprint::Observation;
+use super::object::{Object, PlacedBox, SCHEMA_VERSION};
 use super::object_classifier::{Chosen, ObjectClassifier};
 use super::packet_clock::{PacketClock, Succession};
 use super::sensor::{Decoder, Facts, Flaw};
 use super::stats::{Stage, Stats};
-use super::tracker::{Observation, Tracker};
+use super::tracker::Tracker;
 use super::waiting::{Motion, Tag, Waiting};
 use crate::classifier::Classifier;
 use crate::error::Error;
+use crate::usual_size::usual_size_m;
 
 /// The capacity for returns of each ring: 1.5 times as many as a VLP-32C sends in its slowest turn
 /// with dual returns.
@@ -286,21 +288,33 @@ impl Pipeline {
             let points = &self.waiting.points[cluster.points.clone()];
             let pose = motion.map(|motion| motion.pose(cluster.pose_s));
             let sensor_m = pose.map_or([0.0; 2], |pose| pose.position_m.truncate().to_array());
-            let place = Place::locate(points, pose);
-            let track = self.tracker.observe(&Observation {
+            let seen = OrientedBox::around(points);
+            let place = placed(&seen, pose);
+            let Some(track) = self.tracker.observe(&Observation {
                 time_s: last.time_s,
-                position_m: place.position_m,
+                position_m: place.centre_m,
                 size_m: [place.size_m[0], place.size_m[1]],
                 yaw_rad: place.yaw_deg.to_radians(),
                 sensor_m,
                 view,
+                usual_length_m: self.classifiers.usual_size_m(node).map(|[length, _]| length),
+            }) else {
+                continue;
+            };
+            let fused = self.classifiers.fused(&track.log_probabilities, track.energy);
+            let confidence = view.zip(fused.as_ref());
+            let whole_box = confidence.and_then(|(_, fused)| {
+                let whole = seen.completed(usual_size_m(&fused.answer)?, cluster.ground_z_m);
+                let velocity = track.velocity_m_s().filter(|_| pose.is_some());
+                if !track.is_piece {
+                    track.whole.fuse(fused.class, &placed(&whole, pose), sensor_m, velocity);
+                }
+                Some(track.whole.placed())
             });
             if track.n_seen < self.options.min_turns {
                 continue;
             }
-            let fused = self.classifiers.fused(&track.log_probabilities, track.energy);
             let latency = last.moment.map(|moment| moment.elapsed());
-            let confidence = view.zip(fused.as_ref());
             self.counts.clusters += 1;
             self.counts.unclassified += u64::from(view.is_none());
             each(&Object {
@@ -313,16 +327,17 @@ impl Pipeline {
                     .map(|fused| Arc::clone(&self.classifiers.classes[fused.class])),
                 confidence: confidence.map(|((view, _), fused)| view[fused.class].exp()),
                 probability: fused.as_ref().map(|fused| fused.probability),
-                frame: place.frame,
-                position_m: place.position_m,
+                frame: if pose.is_some() { "world" } else { "sensor" },
+                position_m: place.centre_m,
                 size_m: place.size_m,
                 yaw_deg: place.yaw_deg,
                 velocity_m_s: track.velocity_m_s(),
                 points: points.len(),
-                range_m: place.range_m,
+                range_m: f64::from(seen.centre_m[0].hypot(seen.centre_m[1])),
                 first_s: first.time_s,
                 last_s: last.time_s,
                 latency_ms: latency.map(|latency| latency.as_secs_f64() * 1e3),
+                whole_box,
             });
             latency
                 .into_iter()
@@ -415,34 +430,17 @@ impl Sensor {
     }
 }
 
-struct Place {
-    frame: &'static str,
-    position_m: [f64; 3],
-    size_m: [f64; 3],
-    yaw_deg: f64,
-    range_m: f64,
-}
-
-impl Place {
-    /// The bounding box of points in the frame of the sensor, in the world if the pose is known.
-    fn locate(points: &[[f32; 3]], pose: Option<Pose>) -> Self {
-        let OrientedBox { centre_m, size_m, yaw_rad } = OrientedBox::around(points);
-        let mut place = Self {
-            frame: "sensor",
-            position_m: centre_m.map(f64::from),
-            size_m: size_m.map(f64::from),
-            yaw_deg: f64::from(yaw_rad.to_degrees()),
-            range_m: f64::from(centre_m[0].hypot(centre_m[1])),
-        };
-        if let Some(pose) = pose {
-            let (sin, cos) = f64::from(yaw_rad).sin_cos();
-            let along = pose.world_from_sensor * DVec3::new(cos, sin, 0.0);
-            place.frame = "world";
-            place.position_m = pose.to_world(place.position_m.into()).to_array();
-            place.yaw_deg = (along.y / along.x).atan().to_degrees();
-        }
-        place
-    }
+/// A box of the frame of the sensor, in the world if the pose is known.
+fn placed(seen: &OrientedBox, pose: Option<Pose>) -> PlacedBox {
+    let OrientedBox { centre_m, size_m, yaw_rad } = *seen;
+    let (centre_m, size_m) = (centre_m.map(f64::from), size_m.map(f64::from));
+    let Some(pose) = pose else {
+        return PlacedBox { centre_m, size_m, yaw_deg: f64::from(yaw_rad.to_degrees()) };
+    };
+    let (sin, cos) = f64::from(yaw_rad).sin_cos();
+    let along = pose.world_from_sensor * DVec3::new(cos, sin, 0.0);
+    let yaw_deg = (along.y / along.x).atan().to_degrees();
+    PlacedBox { centre_m: pose.to_world(centre_m.into()).to_array(), size_m, yaw_deg }
 }
 
 #[cfg(test)]

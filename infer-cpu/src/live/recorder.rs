@@ -255,6 +255,11 @@ fn message_object(object: &Object) -> ros::Object {
         size_m: object.size_m,
         yaw_deg: object.yaw_deg,
         last_s: object.last_s,
+        whole_box: object.whole_box.map(|whole| ros::WholeBox {
+            centre_m: whole.centre_m,
+            size_m: whole.size_m,
+            yaw_deg: whole.yaw_deg,
+        }),
     }
 }
 
@@ -303,7 +308,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::live::SCHEMA_VERSION;
+    use crate::live::{PlacedBox, SCHEMA_VERSION};
 
     /// REP 103: no rotation is the quaternion 0, 0, 0, 1. The quaternion 0, 0, 0, 0 is invalid.
     #[test]
@@ -335,6 +340,11 @@ mod tests {
             first_s: 1.7e9,
             last_s: 1.7e9 + 0.25,
             latency_ms: None,
+            whole_box: Some(PlacedBox {
+                centre_m: [1.25, -2.5, 0.25],
+                size_m: [4.5, 1.875, 1.625],
+                yaw_deg: 167.5,
+            }),
         };
         for class in [object.class.clone(), None] {
             object.class = class;

@@ -1,8 +1,8 @@
 //! The tracker, which matches clusters with the objects of earlier turns.
 
-use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
-
+use super::footprint::{Footprint, Observation};
 use super::kalman::Axis;
+use super::whole::Whole;
 
 /// The standard deviation of the velocity of a new object, metres per second: urban traffic, of
 /// which oncoming cars are the fastest; along z, ramps and steps.
@@ -13,14 +13,6 @@ const ACCELERATION_M_S2: [f64; 3] = [3.0, 3.0, 0.5];
 /// box's length, because the visible sides change.
 const OFF_M: f64 = 0.1;
 const OFF_SHARE: f64 = 0.05;
-/// The difference between two measurements of a side: metres, plus a share of the side.
-const SIZE_OFF_M: f64 = 0.2;
-const SIZE_OFF_SHARE: f64 = 0.3;
-/// A side that is measured shorter decays by 1 % per turn, so that a size that merging with a
-/// neighbour inflated does not persist.
-const SHRINKAGE: f64 = 0.99;
-/// The largest hidden part of a side, metres: most of a car's length.
-const MOST_HIDDEN_M: f64 = 4.0;
 /// The gate: a cluster beyond this squared Mahalanobis distance is another object. It excludes one
 /// in a hundred correct matches (chi-squared, three degrees of freedom).
 const GATE: f64 = 11.34;
@@ -31,25 +23,11 @@ const LEAST_TURN_S: f64 = 0.02;
 const MOST_TURN_S: f64 = 0.4;
 /// The most tracks: a further one replaces the track that has waited longest.
 const MOST_TRACKS: usize = 1024;
+/// Persons and two-wheelers, which are shorter, are not pieces of cars, which are longer, metres.
+const SHORT_M: f32 = 2.0;
 /// The least weight of the latest view of a track: views of about two seconds count at ten turns
 /// per second.
 const LEAST_WEIGHT: f64 = 0.05;
-
-/// A cluster for the tracker.
-#[derive(Clone, Copy, Debug)]
-pub struct Observation<'a> {
-    pub time_s: f64,
-    /// The middle of its box, metres, in a fixed frame.
-    pub position_m: [f64; 3],
-    /// Length and width of its box, metres.
-    pub size_m: [f64; 2],
-    /// The direction of the length, radians counterclockwise from x.
-    pub yaw_rad: f64,
-    /// The position of the sensor, metres.
-    pub sensor_m: [f64; 2],
-    /// The log-probability of each class, and the energy, if it was classified.
-    pub view: Option<(&'a [f64], f64)>,
-}
 
 #[derive(Clone, Debug, Default)]
 pub struct Track {
@@ -57,6 +35,9 @@ pub struct Track {
     pub id: u64,
     axes: Option<[Axis; 3]>,
     footprint: Footprint,
+    pub whole: Whole,
+    /// Whether the last cluster was a piece of the object, which tells nothing of the whole.
+    pub is_piece: bool,
     /// The time of the last cluster.
     last_s: f64,
     pub n_seen: u64,
@@ -65,60 +46,6 @@ pub struct Track {
     /// The weighted mean of the energy.
     pub energy: f64,
     n_views: u64,
-}
-
-/// The size of an object seen from above, from all of its clusters.
-#[derive(Clone, Copy, Debug, Default)]
-struct Footprint {
-    /// The direction of the first side, radians counterclockwise from x.
-    yaw_rad: f64,
-    /// Its two sides, metres.
-    sides_m: [f64; 2],
-}
-
-impl Footprint {
-    /// The sides of the measured box, in the order of this footprint's sides, and the direction of
-    /// the first.
-    fn sides_of(&self, seen: &Observation<'_>) -> ([f64; 2], f64) {
-        let [length, width] = seen.size_m;
-        let turned = (seen.yaw_rad - self.yaw_rad + FRAC_PI_4).rem_euclid(PI);
-        match turned < FRAC_PI_2 {
-            true => ([length, width], seen.yaw_rad),
-            false => ([width, length], seen.yaw_rad + FRAC_PI_2),
-        }
-    }
-
-    /// The middle of the whole object, whose hidden parts lie behind the visible ones.
-    fn middle(&self, seen: &Observation<'_>) -> [f64; 3] {
-        let (sides, yaw_rad) = self.sides_of(seen);
-        let mut middle = seen.position_m;
-        let (sin, cos) = yaw_rad.sin_cos();
-        for (i, [x, y]) in [[cos, sin], [-sin, cos]].into_iter().enumerate() {
-            let hidden_m = (self.sides_m[i] - sides[i]).clamp(0.0, MOST_HIDDEN_M);
-            let [dx, dy] = [0, 1].map(|axis| seen.position_m[axis] - seen.sensor_m[axis]);
-            let away_m = (hidden_m / 2.0).copysign(dx * x + dy * y);
-            middle[0] += away_m * x;
-            middle[1] += away_m * y;
-        }
-        middle
-    }
-
-    /// The mismatch of the measured size: the sum of the squared differences of the sides, in units
-    /// of the usual difference between two measurements of one object.
-    fn mismatch(&self, seen: &Observation<'_>) -> f64 {
-        let (sides, _) = self.sides_of(seen);
-        let term = |i: usize| {
-            let larger = sides[i].max(self.sides_m[i]);
-            ((sides[i] - self.sides_m[i]) / (SIZE_OFF_M + SIZE_OFF_SHARE * larger)).powi(2)
-        };
-        term(0) + term(1)
-    }
-
-    fn update(&mut self, seen: &Observation<'_>) {
-        let (sides, yaw_rad) = self.sides_of(seen);
-        let grown = |i: usize| sides[i].max(SHRINKAGE * self.sides_m[i]);
-        *self = Self { yaw_rad, sides_m: [grown(0), grown(1)] };
-    }
 }
 
 /// Follows objects from turn to turn.
@@ -157,14 +84,36 @@ impl Track {
         (distance <= GATE).then_some(distance + logarithm + self.footprint.mismatch(seen))
     }
 
-    fn update(&mut self, seen: &Observation<'_>) {
-        let (sigma, middle) = (off_m(seen), self.footprint.middle(seen));
-        let dt = seen.time_s - self.last_s;
+    /// How far the object moves until `time_s`, metres.
+    fn way_m(&self, time_s: f64) -> [f64; 3] {
+        let dt = time_s - self.last_s;
+        self.axes.map_or([0.0; 3], |axes| axes.map(|axis| dt * axis.velocity))
+    }
+
+    /// Moves the object to `time_s`.
+    fn advance(&mut self, time_s: f64) {
+        self.whole.advance(self.way_m(time_s));
+        let dt = time_s - self.last_s;
         for (i, axis) in self.axes.iter_mut().flatten().enumerate() {
             *axis = axis.after(dt, ACCELERATION_M_S2[i]);
+        }
+    }
+
+    fn update(&mut self, seen: &Observation<'_>) {
+        self.advance(seen.time_s);
+        let (sigma, middle) = (off_m(seen), self.footprint.middle(seen));
+        for (i, axis) in self.axes.iter_mut().flatten().enumerate() {
             axis.update(middle[i], sigma);
         }
         self.note(seen);
+    }
+
+    /// Adds a piece of the object.
+    fn add_piece(&mut self, time_s: f64) {
+        self.advance(time_s);
+        self.last_s = time_s;
+        self.n_seen += 1;
+        self.is_piece = true;
     }
 
     /// Begins a new track in the memory of this one.
@@ -181,6 +130,7 @@ impl Track {
 
     fn note(&mut self, seen: &Observation<'_>) {
         self.footprint.update(seen);
+        self.is_piece = false;
         self.last_s = seen.time_s;
         self.n_seen += 1;
         let Some((log_probabilities, energy)) = seen.view else { return };
@@ -213,22 +163,43 @@ impl Tracker {
         }
     }
 
-    /// Adds `seen` to the track that it matches, or to a new one, and returns the track.
-    pub fn observe(&mut self, seen: &Observation<'_>) -> &Track {
+    /// Adds `seen` to the track that it matches, or to a new one, and returns the track. A piece of
+    /// an object that has been seen more often belongs to that one; `None` if that one already has a
+    /// cluster in this turn.
+    pub fn observe(&mut self, seen: &Observation<'_>) -> Option<&mut Track> {
         let waits = |track: &Track| seen.time_s - track.last_s;
         // A track that already has a cluster in this turn does not take another.
         let due = 0.5 * self.turn_s..=PATIENCE_S;
-        let tracks = self.tracks[..self.n_used].iter().enumerate();
-        let tracks = tracks.filter(|(_, track)| due.contains(&waits(track)));
-        let costs = tracks.filter_map(|(at, track)| Some((track.cost(seen)?, at)));
-        if let Some((_, at)) = costs.min_by(|a, b| a.0.total_cmp(&b.0)) {
-            self.tracks[at].update(seen);
-            return &self.tracks[at];
+        let tracks = || self.tracks[..self.n_used].iter().enumerate();
+        let due_tracks = tracks().filter(|(_, track)| due.contains(&waits(track)));
+        let costs = due_tracks.filter_map(|(at, track)| Some((track.cost(seen)?, at)));
+        let matched = costs.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, at)| at);
+        let n_seen = matched.map_or(0, |at| self.tracks[at].n_seen);
+        let is_short = seen.usual_length_m.is_some_and(|length_m| length_m < SHORT_M);
+        let holds = |track: &Track| {
+            let is_older = track.n_seen > n_seen && waits(track) <= PATIENCE_S;
+            let is_another = is_short && track.whole.placed().size_m[0] > f64::from(SHORT_M);
+            is_older && !is_another && track.whole.holds(seen.position_m, track.way_m(seen.time_s))
+        };
+        let holders = tracks().filter(|(_, track)| track.axes.is_some() && holds(track));
+        let holder = holders.max_by_key(|(_, track)| track.n_seen).map(|(at, _)| at);
+        if let Some(at) = holder {
+            let track = &mut self.tracks[at];
+            if !due.contains(&(seen.time_s - track.last_s)) {
+                return None;
+            }
+            track.add_piece(seen.time_s);
+            return Some(track);
         }
-        let at = self.place_for_new(seen.time_s);
-        self.n_ids += 1;
-        self.tracks[at].begin(self.n_ids, seen);
-        &self.tracks[at]
+        let at = matched.unwrap_or_else(|| self.place_for_new(seen.time_s));
+        match matched {
+            Some(_) => self.tracks[at].update(seen),
+            None => {
+                self.n_ids += 1;
+                self.tracks[at].begin(self.n_ids, seen);
+            }
+        }
+        Some(&mut self.tracks[at])
     }
 
     fn place_for_new(&mut self, time_s: f64) -> usize {
@@ -255,7 +226,10 @@ fn off_m(seen: &Observation<'_>) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::FRAC_PI_2;
+
     use super::*;
+    use crate::live::PlacedBox;
 
     fn seen(time_s: f64, x: f64, y: f64) -> Observation<'static> {
         Observation {
@@ -265,6 +239,7 @@ mod tests {
             yaw_rad: 0.0,
             sensor_m: [0.0; 2],
             view: None,
+            usual_length_m: None,
         }
     }
 
@@ -274,11 +249,31 @@ mod tests {
         let mut ids = [vec![], vec![]];
         for turn in 0..60 {
             let t = f64::from(turn) * 0.1;
-            ids[0].push(tracker.observe(&seen(t, -3.0 + t, 0.0)).id);
-            ids[1].push(tracker.observe(&seen(t + 0.01, 3.0 - t, 0.8)).id);
+            ids[0].push(tracker.observe(&seen(t, -3.0 + t, 0.0)).unwrap().id);
+            ids[1].push(tracker.observe(&seen(t + 0.01, 3.0 - t, 0.8)).unwrap().id);
         }
         assert!(ids[0].iter().all(|&id| id == 1), "{:?}", ids[0]);
         assert!(ids[1].iter().all(|&id| id == 2), "{:?}", ids[1]);
+    }
+
+    /// A car of 4 m, of which only a door is seen in the second turn, at first; a person who leans on it,
+    /// and something beside it.
+    #[test]
+    fn a_piece_of_a_car_is_of_its_track_and_nothing_is_seen_twice_in_a_turn() {
+        let mut tracker = Tracker::new(2);
+        let whole = PlacedBox { centre_m: [10.0, 0.0, 0.0], size_m: [4.0, 1.6, 1.5], yaw_deg: 0.0 };
+        let car = Observation { size_m: [4.0, 1.6], ..seen(0.0, 10.0, 0.0) };
+        let track = tracker.observe(&car).unwrap();
+        track.whole.fuse(0, &whole, [0.0; 2], None);
+        let door = Observation { size_m: [0.9, 0.1], ..seen(0.1, 11.9, -0.7) };
+        let track = tracker.observe(&door).unwrap();
+        assert!(track.id == 1 && track.is_piece && track.whole.placed() == whole);
+        assert!(tracker.observe(&Observation { time_s: 0.1, ..car }).is_none());
+        let person = Observation { usual_length_m: Some(0.8), ..seen(0.1, 11.0, 0.7) };
+        assert_eq!(tracker.observe(&person).unwrap().id, 2);
+        assert_eq!(tracker.observe(&seen(0.1, 10.0, -1.5)).unwrap().id, 3);
+        let track = tracker.observe(&Observation { time_s: 0.2, ..car }).unwrap();
+        assert!((track.id, track.n_seen) == (1, 3) && !track.is_piece);
     }
 
     #[test]
@@ -288,10 +283,10 @@ mod tests {
         (0..20).for_each(|turn| {
             tracker.observe(&at(f64::from(turn) * 0.1));
         });
-        assert_eq!(tracker.observe(&at(2.9)).id, 1);
-        let velocity = tracker.observe(&at(3.0)).velocity_m_s().unwrap();
+        assert_eq!(tracker.observe(&at(2.9)).unwrap().id, 1);
+        let velocity = tracker.observe(&at(3.0)).unwrap().velocity_m_s().unwrap();
         assert!((velocity[0] - 12.0).abs() < 0.1 && velocity[1].abs() < 0.1, "{velocity:?}");
-        assert_eq!(tracker.observe(&at(5.0)).id, 2);
+        assert_eq!(tracker.observe(&at(5.0)).unwrap().id, 2);
     }
 
     /// After 0.1 s the variance of the innovation is twice that of the middle, s = 0.1 m + 0.05 of the
@@ -307,10 +302,10 @@ mod tests {
             for (share, id) in [(0.995, 1), (1.005, 2)] {
                 let mut tracker = Tracker::new(2);
                 let mut next = Observation { size_m, ..seen(0.0, 20.0, 0.0) };
-                assert_eq!(tracker.observe(&next).velocity_m_s(), None);
+                assert_eq!(tracker.observe(&next).unwrap().velocity_m_s(), None);
                 next.time_s = 0.1;
                 next.position_m[axis] += share * (11.345 * variance).sqrt();
-                assert_eq!(tracker.observe(&next).id, id, "{axis} {share}");
+                assert_eq!(tracker.observe(&next).unwrap().id, id, "{axis} {share}");
             }
         }
     }
@@ -322,7 +317,7 @@ mod tests {
         let means = views.iter().enumerate().map(|(turn, view)| {
             let time_s = turn as f64 * 0.1;
             let seen = Observation { view: Some((view, turn as f64)), ..seen(time_s, 1.0, 0.0) };
-            let track = tracker.observe(&seen);
+            let track = tracker.observe(&seen).unwrap();
             (track.log_probabilities.clone(), track.energy)
         });
         let means: Vec<_> = means.collect();
@@ -343,7 +338,7 @@ mod tests {
         for turn in 0..24 {
             let ([x, y], size_m, yaw_rad) = views[turn / 6];
             let seen = Observation { size_m, yaw_rad, ..seen(turn as f64 * 0.1, x, y) };
-            let track = tracker.observe(&seen);
+            let track = tracker.observe(&seen).unwrap();
             assert_eq!(track.id, 1, "turn {turn}");
             let [vx, vy, _] = track.velocity_m_s().unwrap_or_default();
             assert!(vx.hypot(vy) < 0.4, "turn {turn}: {vx} {vy}");
@@ -356,7 +351,7 @@ mod tests {
             let mut tracker = Tracker::new(2);
             tracker.set_turn(turn_s);
             tracker.observe(&seen(0.0, 5.0, 0.0));
-            assert_eq!(tracker.observe(&seen(0.04, 5.1, 0.0)).id, id, "{turn_s}");
+            assert_eq!(tracker.observe(&seen(0.04, 5.1, 0.0)).unwrap().id, id, "{turn_s}");
         }
     }
 
@@ -367,7 +362,7 @@ mod tests {
             let views = [view.unwrap_or_default()];
             let view = view.map(|energy| (&views[..], energy));
             let seen = Observation { view, ..seen(f64::from(turn) * 0.1, 1.0, 0.0) };
-            let track = tracker.observe(&seen);
+            let track = tracker.observe(&seen).unwrap();
             (track.log_probabilities.clone(), track.energy)
         };
         (0..100).for_each(|turn| {
@@ -400,7 +395,7 @@ mod tests {
         let mut velocity = None;
         for turn in 0..60 {
             let t = f64::from(turn) * turn_s;
-            let track = tracker.observe(&seen(t, 20.0 + acceleration * t * t / 2.0, 0.0));
+            let track = tracker.observe(&seen(t, 20.0 + acceleration * t * t / 2.0, 0.0)).unwrap();
             assert_eq!(track.id, 1, "turn {turn}");
             velocity = track.velocity_m_s();
         }
@@ -414,7 +409,7 @@ mod tests {
         for turn in 0..=50 {
             let size_m = if turn == 0 { [2.0, 1.0] } else { [1.0, 1.0] };
             let seen = Observation { size_m, ..seen(f64::from(turn) * 0.1, 9.0, 0.0) };
-            assert_eq!(tracker.observe(&seen).id, 1, "turn {turn}");
+            assert_eq!(tracker.observe(&seen).unwrap().id, 1, "turn {turn}");
         }
         let [side_m, _] = tracker.tracks[0].footprint.sides_m;
         assert!((side_m - 2.0 * 0.99f64.powi(50)).abs() < 1e-12, "{side_m}");
@@ -426,7 +421,8 @@ mod tests {
             let mut tracker = Tracker::new(2);
             tracker.observe(&Observation { size_m: [0.6, 0.6], ..seen(0.0, 20.0, 0.0) });
             tracker.observe(&Observation { size_m: [4.2, 1.8], ..seen(0.0, 21.0, 0.0) });
-            let found = tracker.observe(&Observation { size_m, ..seen(0.1, 20.5, 0.0) }).id;
+            let found =
+                tracker.observe(&Observation { size_m, ..seen(0.1, 20.5, 0.0) }).unwrap().id;
             assert_eq!(found, id, "{size_m:?}");
         }
     }
@@ -441,6 +437,6 @@ mod tests {
         tracker.observe(&seen(100.0, 0.0, 0.0));
         assert_eq!(tracker.n_used, MOST_TRACKS);
         tracker.forget();
-        assert_eq!(tracker.observe(&seen(100.1, 0.0, 0.0)).id, 5002);
+        assert_eq!(tracker.observe(&seen(100.1, 0.0, 0.0)).unwrap().id, 5002);
     }
 }

@@ -16,7 +16,7 @@ use crate::tiny_model;
 pub const LIVE: &str = "live --model m.safetensors --threads 1 --min-turns 1";
 
 /// The order of keys is part of the format.
-const KEYS: [&str; 17] = [
+const KEYS: [&str; 18] = [
     "version",
     "turn",
     "track",
@@ -34,6 +34,7 @@ const KEYS: [&str; 17] = [
     "first_s",
     "last_s",
     "latency_ms",
+    "whole_box",
 ];
 
 /// A folder with a model of clusters.

@@ -10,7 +10,7 @@ use formats::velodyne;
 use glam::{DQuat, DVec3, Vec3};
 use infer_cpu::live::{Arrival, EgoMotion, LiveOptions, Object, Pipeline, Pose, Recorder};
 use infer_cpu::rule::{MARGIN_OF_WHOLES, Rule};
-use infer_cpu::{Classifier, Options, Prediction};
+use infer_cpu::{Classifier, Options, Prediction, usual_size_m};
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
@@ -128,6 +128,12 @@ fn clusters(
     all
 }
 
+/// The whole box of a cluster of this class, as `detect` has it.
+fn whole(found: &Found, class: &str) -> Option<OrientedBox> {
+    let seen = OrientedBox::around(&found.points);
+    usual_size_m(class).map(|usual_m| seen.completed(usual_m, found.ground_z_m))
+}
+
 fn classifier(model: &Path) -> Classifier {
     Classifier::load(model, &Options::default()).unwrap()
 }
@@ -216,6 +222,7 @@ fn an_answer_is_what_the_segmentation_and_the_classifier_say_of_its_cluster() {
     let classes = classifier.classes().to_vec();
     let unknown_classes = classifier.card().unknown_classes.clone();
     let mut tracks: BTreeMap<u64, Mean> = BTreeMap::new();
+    let mut seen = BTreeSet::new();
     let mut answered = BTreeMap::<String, usize>::new();
     for (object, found) in objects.iter().zip(&found) {
         let OrientedBox { centre_m, size_m, yaw_rad } = OrientedBox::around(&found.points);
@@ -229,7 +236,7 @@ fn an_answer_is_what_the_segmentation_and_the_classifier_say_of_its_cluster() {
         assert_eq!([object.first_s, object.last_s], found.span_s());
         assert_eq!(object.latency_ms, None);
         if found.points.len() < 20 {
-            assert_eq!(object.confidence, None);
+            assert_eq!((object.confidence, object.whole_box), (None, None));
             continue;
         }
         let view = classifier.classify_on_ground(&found.points, found.ground_z_m).unwrap();
@@ -244,6 +251,15 @@ fn an_answer_is_what_the_segmentation_and_the_classifier_say_of_its_cluster() {
         let is_unknown = mean.energy > most || unknown_classes.contains(&resembles.to_string());
         let answer = if is_unknown { "unknown" } else { resembles };
         assert_eq!(object.class.as_deref(), Some(answer));
+        let whole = whole(found, answer);
+        assert_eq!(object.whole_box.is_some(), whole.is_some());
+        // Later boxes of a track are means.
+        if let (Some(whole), true) = (whole, seen.insert(object.track)) {
+            let told = object.whole_box.unwrap();
+            assert_eq!(told.centre_m, whole.centre_m.map(f64::from));
+            assert_eq!(told.size_m, whole.size_m.map(f64::from));
+            assert!((told.yaw_deg - f64::from(whole.yaw_rad.to_degrees())).abs() < 1e-4);
+        }
         *answered.entry(answer.to_owned()).or_default() += 1;
     }
     assert!(answered.contains_key("unknown") && answered.len() > 1, "{answered:?}");
@@ -298,24 +314,39 @@ fn points_of_a_moving_sensor_are_those_of_its_last_moment_and_answers_are_in_the
     let found = clusters(&mut classifier(&street_model()), &sent, &decoded, moved);
     assert_eq!(objects.len(), found.len());
     assert!(objects.len() > 20);
+    // Later boxes of a track are means.
+    let mut tracks = BTreeSet::new();
     for (object, found) in objects.iter().zip(&found) {
         let last_s = found.pose_s - START_S;
         let last = driven(last_s);
-        let OrientedBox { centre_m, size_m, yaw_rad } = OrientedBox::around(&found.points);
-        let centre_m = Vec3::from(centre_m).as_dvec3();
-        let at_m = last.world_from_sensor * centre_m + last.position_m;
-        // f32 holds these points within 2 micrometres, and the times within 0.24 us of 30 m/s.
-        let off_m = DVec3::from_array(object.position_m).distance(at_m);
-        assert!(object.frame == "world" && off_m < 1e-4, "{object:?}: {at_m}");
-        assert!((object.range_m - centre_m.truncate().length()).abs() < 1e-4);
-        let size_off = DVec3::from_array(object.size_m) - Vec3::from(size_m).as_dvec3();
-        assert!(size_off.abs().max_element() < 1e-4, "{object:?}: {size_m:?}");
-        // A direction of a box is one modulo half a turn.
-        let turned_deg =
-            f64::from(yaw_rad).to_degrees() + (1.9 + 0.6 * last_s).to_degrees() - object.yaw_deg;
-        let off_deg = (turned_deg + 90.0).rem_euclid(180.0) - 90.0;
-        assert!(off_deg.abs() < 0.05 && object.yaw_deg.abs() <= 90.0, "{object:?}: {off_deg}");
+        let seen = OrientedBox::around(&found.points);
+        let range_m = Vec3::from(seen.centre_m).as_dvec3().truncate().length();
+        assert!((object.range_m - range_m).abs() < 1e-4);
+        let whole = object.class.as_deref().and_then(|class| whole(found, class));
+        let whole = whole.filter(|_| object.confidence.is_some());
+        assert_eq!(object.whole_box.is_some(), whole.is_some());
+        let whole = whole.filter(|_| tracks.insert(object.track));
+        let told = object.whole_box.map(|told| (told.centre_m, told.size_m, told.yaw_deg));
+        let told_seen = (object.position_m, object.size_m, object.yaw_deg);
+        let pairs = [Some((seen, told_seen)), whole.zip(told)].into_iter().flatten();
+        for (found, (told_m, told_size_m, told_deg)) in pairs {
+            let OrientedBox { centre_m, size_m, yaw_rad } = found;
+            let centre_m = Vec3::from(centre_m).as_dvec3();
+            let at_m = last.world_from_sensor * centre_m + last.position_m;
+            // f32 holds these points within 2 micrometres, and the times within 0.24 us of 30 m/s.
+            let off_m = DVec3::from_array(told_m).distance(at_m);
+            assert!(object.frame == "world" && off_m < 1e-4, "{object:?}: {at_m}");
+            let size_off = DVec3::from_array(told_size_m) - Vec3::from(size_m).as_dvec3();
+            assert!(size_off.abs().max_element() < 1e-4, "{object:?}: {size_m:?}");
+            // A direction of a box is one modulo half a turn.
+            let turned_deg =
+                f64::from(yaw_rad).to_degrees() + (1.9 + 0.6 * last_s).to_degrees() - told_deg;
+            let off_deg = (turned_deg + 90.0).rem_euclid(180.0) - 90.0;
+            assert!(off_deg.abs() < 0.05, "{object:?}: {off_deg}");
+        }
+        assert!(object.yaw_deg.abs() <= 90.0, "{object:?}");
     }
+    assert!(tracks.len() >= 3, "{tracks:?}");
     // So that the first and the last pose of a cluster differ.
     let swept_s = found.iter().map(|found| found.pose_s - found.span_s()[0]).fold(0.0, f64::max);
     assert!(swept_s * 30.0 > 0.2, "{swept_s}");
@@ -530,6 +561,11 @@ fn message_of(object: &Object) -> ros::Object {
         size_m: object.size_m,
         yaw_deg: object.yaw_deg,
         last_s: object.last_s,
+        whole_box: object.whole_box.map(|whole| ros::WholeBox {
+            centre_m: whole.centre_m,
+            size_m: whole.size_m,
+            yaw_deg: whole.yaw_deg,
+        }),
     }
 }
 

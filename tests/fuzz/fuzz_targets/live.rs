@@ -61,8 +61,9 @@ fn packet(command: &[u8; COMMAND]) -> Vec<u8> {
 }
 
 fn check(object: &Object) {
-    let lengths = [object.position_m, object.size_m];
-    assert!(lengths.iter().flatten().all(|x| x.is_finite()), "{object:?}");
+    let whole = object.whole_box.map(|whole| [whole.centre_m, whole.size_m]);
+    let lengths = whole.into_iter().flatten().chain([object.position_m, object.size_m]);
+    assert!(lengths.flatten().all(|x| x.is_finite()), "{object:?}");
     assert!(object.velocity_m_s.iter().flatten().all(|x| x.is_finite()), "{object:?}");
     assert!(object.yaw_deg.is_finite() && object.first_s <= object.last_s, "{object:?}");
 }

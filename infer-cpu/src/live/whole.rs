@@ -1,0 +1,169 @@
+//! The box of a whole object, from all of its clusters.
+
+use std::f64::consts::{FRAC_1_SQRT_2, PI};
+
+use super::object::PlacedBox;
+
+/// The least weights of the latest box in the mean size and in the mean direction: objects keep
+/// their sizes, but they and the sensor turn.
+const LEAST_SIZE_WEIGHT: f64 = 0.05;
+const LEAST_TURN_WEIGHT: f64 = 0.3;
+/// The least weight of a longer box: most views show only a part of the length.
+const LEAST_LENGTH_WEIGHT: f64 = 0.5;
+/// What moves faster than this, metres per second, moves ahead.
+const FAST_M_S: f64 = 2.0;
+/// How far outside of the box the middle of a piece of the object may be: metres, plus a share of the
+/// side. This is the error of the box.
+const MARGIN_M: f64 = 0.1;
+const MARGIN_SHARE: f64 = 0.1;
+
+/// The box of a whole object: weighted means of the boxes of its clusters.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Whole {
+    /// The class for which it holds.
+    class: usize,
+    n_seen: u64,
+    centre_m: [f64; 3],
+    size_m: [f64; 3],
+    /// The mean cosine and sine of twice the direction: boxes do not tell front from rear.
+    twice: [f64; 2],
+    /// The direction of the front if the object has moved, radians counterclockwise from x.
+    yaw_rad: f64,
+}
+
+impl Whole {
+    /// Adds the box of a cluster, which begins at the sensor's side where the points begin. The
+    /// `velocity_m_s` tells the front, if it is known in a fixed frame.
+    pub fn fuse(
+        &mut self,
+        class: usize,
+        seen: &PlacedBox,
+        sensor_m: [f64; 2],
+        velocity_m_s: Option<[f64; 3]>,
+    ) {
+        let n_before = if class == self.class { self.n_seen } else { 0 };
+        (self.class, self.n_seen) = (class, n_before + 1);
+        let weight = |least: f64| (1.0 / self.n_seen as f64).max(least);
+        let [size_weight, turn_weight] = [LEAST_SIZE_WEIGHT, LEAST_TURN_WEIGHT].map(weight);
+        let seen_rad = seen.yaw_deg.to_radians();
+        let (sin, cos) = (2.0 * seen_rad).sin_cos();
+        for (mean, new) in self.twice.iter_mut().zip([cos, sin]) {
+            *mean += turn_weight * (new - *mean);
+        }
+        let axis_rad = 0.5 * self.twice[1].atan2(self.twice[0]);
+        let fast = velocity_m_s.filter(|[x, y, _]| x.hypot(*y) > FAST_M_S);
+        let ahead_rad = fast.map_or(self.yaw_rad, |[x, y, _]| y.atan2(x));
+        let is_rear = (axis_rad - ahead_rad).cos() < 0.0;
+        self.yaw_rad = if is_rear { axis_rad - PI.copysign(axis_rad) } else { axis_rad };
+        let [length_m, width_m, height_m] = seen.size_m;
+        let size_m = match (seen_rad - self.yaw_rad).sin().abs() < FRAC_1_SQRT_2 {
+            true => [length_m, width_m, height_m],
+            false => [width_m, length_m, height_m],
+        };
+        let least = if size_m[0] > self.size_m[0] { LEAST_LENGTH_WEIGHT } else { 0.0 };
+        let weights = [size_weight.max(least), size_weight, size_weight];
+        for ((mean, new), weight) in self.size_m.iter_mut().zip(size_m).zip(weights) {
+            *mean += weight * (new - *mean);
+        }
+        // The near sides stay where they were seen.
+        self.centre_m = seen.centre_m;
+        let (sin, cos) = self.yaw_rad.sin_cos();
+        let [dx, dy] = [0, 1].map(|axis| seen.centre_m[axis] - sensor_m[axis]);
+        for (side, [x, y]) in [[cos, sin], [-sin, cos]].into_iter().enumerate() {
+            let away_m = 0.5 * (self.size_m[side] - size_m[side]) * (dx * x + dy * y).signum();
+            self.centre_m[0] += away_m * x;
+            self.centre_m[1] += away_m * y;
+        }
+    }
+
+    /// Moves the box.
+    pub fn advance(&mut self, by_m: [f64; 3]) {
+        for (centre, by) in self.centre_m.iter_mut().zip(by_m) {
+            *centre += by;
+        }
+    }
+
+    /// Whether a piece of the object may be at `position_m`, after the object has moved by `by_m`.
+    pub fn holds(&self, position_m: [f64; 3], by_m: [f64; 3]) -> bool {
+        let [dx, dy, dz] = [0, 1, 2].map(|i| position_m[i] - self.centre_m[i] - by_m[i]);
+        let (sin, cos) = self.yaw_rad.sin_cos();
+        let off_m = [cos * dx + sin * dy, cos * dy - sin * dx, dz];
+        let is_near = |(off, size): (f64, f64)| off.abs() <= MARGIN_M + (0.5 + MARGIN_SHARE) * size;
+        self.n_seen > 0 && off_m.into_iter().zip(self.size_m).all(is_near)
+    }
+
+    pub fn placed(&self) -> PlacedBox {
+        let Self { centre_m, size_m, yaw_rad, .. } = *self;
+        PlacedBox { centre_m, size_m, yaw_deg: yaw_rad.to_degrees() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn seen(x: f64, size_m: [f64; 2], yaw_deg: f64) -> PlacedBox {
+        PlacedBox { centre_m: [x, 0.0, 0.0], size_m: [size_m[0], size_m[1], 1.5], yaw_deg }
+    }
+
+    fn fused(boxes: &[PlacedBox]) -> PlacedBox {
+        let mut whole = Whole::default();
+        boxes.iter().for_each(|seen| whole.fuse(1, seen, [0.0; 2], None));
+        whole.placed()
+    }
+
+    fn assert_near(found: f64, expected: f64) {
+        assert!((found - expected).abs() < 1e-9, "{found} for {expected}");
+    }
+
+    /// The sides at x = 8 are near. Of lengths, 4.0 and 4.4 count a half each, 3.9 a third, and 4.5 a
+    /// half; widths count the same.
+    #[test]
+    fn the_near_side_stays_and_longer_boxes_count_more() {
+        let lengths_m = [4.0, 4.4, 3.9, 4.5];
+        let boxes = lengths_m.map(|length| seen(8.0 + length / 2.0, [length, length - 2.4], 0.0));
+        let PlacedBox { centre_m, size_m, .. } = fused(&boxes);
+        assert_near(size_m[0], 4.3);
+        assert_near(size_m[1], 1.8);
+        assert_near(centre_m[0], 8.0 + 4.3 / 2.0);
+        // Another class begins anew.
+        let mut whole = Whole::default();
+        whole.fuse(1, &boxes[0], [0.0; 2], None);
+        whole.fuse(2, &seen(9.0, [7.0, 2.5], 0.0), [0.0; 2], None);
+        assert_eq!(whole.placed().size_m, [7.0, 2.5, 1.5]);
+    }
+
+    #[test]
+    fn directions_are_means_modulo_half_a_turn_and_an_odd_quarter_turn_changes_nothing() {
+        let directed = |yaw_deg| seen(8.0, [4.0, 1.6], yaw_deg);
+        let upright = fused(&[directed(88.0), directed(-88.0)]);
+        assert_near(upright.yaw_deg.abs(), 90.0);
+        let mut boxes = [directed(10.0); 6];
+        boxes[5] = PlacedBox { size_m: [1.6, 4.0, 1.5], ..directed(-80.0) };
+        let PlacedBox { size_m, yaw_deg, .. } = fused(&boxes);
+        assert_near(yaw_deg, 10.0);
+        assert_near(size_m[0], 4.0);
+    }
+
+    #[test]
+    fn what_has_moved_shows_its_front_also_when_it_stands() {
+        let mut whole = Whole::default();
+        for (velocity_m_s, yaw_deg) in
+            [(None, 5.0), (Some([-3.0, 0.0, 0.0]), -175.0), (Some([1.0, 0.0, 0.0]), -175.0)]
+        {
+            whole.fuse(1, &seen(8.0, [4.0, 1.6], 5.0), [0.0; 2], velocity_m_s);
+            assert_near(whole.placed().yaw_deg, yaw_deg);
+        }
+    }
+
+    /// A car of 4 by 1.6 by 1.5 m, which has moved by 1 m along y: 0.1 m and a tenth of a side outside.
+    #[test]
+    fn pieces_are_within_the_box_and_its_error() {
+        let mut whole = Whole::default();
+        assert!(!whole.holds([0.0; 3], [0.0; 3]));
+        whole.fuse(1, &seen(8.0, [4.0, 1.6], 90.0), [0.0; 2], None);
+        let holds = |x, y, z| whole.holds([8.0 + x, y, z], [0.0, 1.0, 0.0]);
+        assert!(holds(1.05, 3.49, 0.99) && holds(-1.05, -1.49, -0.99));
+        assert!(!holds(1.07, 1.0, 0.0) && !holds(0.0, 3.51, 0.0) && !holds(0.0, 1.0, 1.01));
+    }
+}
