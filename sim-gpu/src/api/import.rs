@@ -108,13 +108,16 @@ fn upright_from_file(up: Up) -> DAffine3 {
     DAffine3::from_cols(x, y, z, DVec3::ZERO)
 }
 
+/// A reflectivity, or the materials of faces.
+type Look = (f64, Option<Arc<Materials>>);
+
 /// The reflectivities of `meshes` by their base colours, or of their faces if those differ; faces without
 /// a material have 1.
 fn looks(
     meshes: &[AssembledMesh],
     colours: &[BaseColour],
     warnings: &mut Vec<String>,
-) -> Result<Vec<(f64, Option<Arc<Materials>>)>, InvalidValue> {
+) -> Result<Vec<Look>, InvalidValue> {
     for BaseColour { name, luminance, has_image } in colours {
         within(&format!("material {name:?}: luminance"), *luminance, 0.0..=1.0)?;
         warnings.extend(
