@@ -61,17 +61,10 @@ impl Scene {
         let upright_from_file = upright_from_file(place.up.unwrap_or(format.default_up()));
         let Assembly { meshes, parts, colours, mut warnings } =
             format.load(path, import, place.world_from_upright * upright_from_file)?;
-        let mut images = colours.iter().filter(|colour| import.base_colours && colour.has_image);
-        warnings.extend(images.next().map(|colour| {
-            format!("material {:?}: its image is left out of base colours", colour.name)
-        }));
-        let of_material = |colour: &BaseColour| {
-            let key = format!("material {:?}: luminance", colour.name);
-            within(&key, colour.luminance, 0.0..=1.0).map(|()| colour.luminance)
+        let looks = match import.base_colours {
+            true => looks(&meshes, &colours, &mut warnings)?,
+            false => vec![(1.0, None); meshes.len()],
         };
-        let colours = if import.base_colours { colours } else { vec![] };
-        let reflectivities = colours.iter().map(of_material).collect::<Result<Vec<_>, _>>()?;
-        let looks: Vec<_> = meshes.iter().map(|mesh| look(mesh, &reflectivities)).collect();
         let mut shared = vec![None::<Mesh>; meshes.len()];
         let mut names = Names::of(self);
         let mut ids = Vec::new();
@@ -115,18 +108,32 @@ fn upright_from_file(up: Up) -> DAffine3 {
     DAffine3::from_cols(x, y, z, DVec3::ZERO)
 }
 
-/// The reflectivity of `mesh`, or those of its faces if they differ; faces without a material have 1.
-fn look(mesh: &AssembledMesh, reflectivities: &[f64]) -> (f64, Option<Arc<Materials>>) {
-    let of =
-        |number: Option<usize>| number.and_then(|i| reflectivities.get(i)).copied().unwrap_or(1.0);
-    let runs: Vec<_> = mesh.colours.iter().map(|(number, n)| (of(*number), *n)).collect();
-    match &runs[..] {
-        [] => (1.0, None),
-        [(first, _), others @ ..] if others.iter().all(|(other, _)| other == first) => {
-            (*first, None)
-        }
-        runs => (1.0, Some(Arc::new(Materials::of_runs(runs)))),
+/// A reflectivity, or the materials of faces.
+type Look = (f64, Option<Arc<Materials>>);
+
+/// The reflectivities of `meshes` by their base colours, or of their faces if those differ; faces without
+/// a material have 1.
+fn looks(
+    meshes: &[AssembledMesh],
+    colours: &[BaseColour],
+    warnings: &mut Vec<String>,
+) -> Result<Vec<Look>, InvalidValue> {
+    for BaseColour { name, luminance, has_image } in colours {
+        within(&format!("material {name:?}: luminance"), *luminance, 0.0..=1.0)?;
+        warnings.extend(
+            has_image.then(|| format!("material {name:?}: its image is left out of base colours")),
+        );
     }
+    let look = |mesh: &AssembledMesh| {
+        let of = |number: &Option<usize>| number.map_or(1.0, |number| colours[number].luminance);
+        let runs: Vec<_> = mesh.colours.iter().map(|(number, n)| (of(number), *n)).collect();
+        match &runs[..] {
+            [] => (1.0, None),
+            [(first, _), others @ ..] if others.iter().all(|it| it.0 == *first) => (*first, None),
+            runs => (1.0, Some(Arc::new(Materials::of_runs(runs)))),
+        }
+    };
+    Ok(meshes.iter().map(look).collect())
 }
 
 /// The names of a scene's instances, which key their random numbers.
