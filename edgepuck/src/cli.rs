@@ -25,7 +25,8 @@ enum Command {
     GenDataset(Box<gen_dataset::Args>),
     /// Scan street scenes and segment them into labelled clusters (default: built-in objects)
     GenScenes(gen_scenes::Args),
-    /// Simulate a drive through a street: a capture of VLP-32C packets, with ground truth
+    /// Simulate a drive through a street: a capture of VLP-32C packets with ground truth, or labelled
+    /// sweeps of any sensor whose head turns
     GenDrive(gen_drive::Args),
     /// Write the procedural shapes that gen-dataset uses by default as OFF files
     GenShapes(gen_shapes::Args),
@@ -50,7 +51,7 @@ enum Command {
     Calibrate(calibrate::CalibrateArgs),
     /// List the adapters (GPUs and CPU) that can cast rays
     Adapters,
-    /// Merge the shards of a dataset into one dataset
+    /// Merge the shards of a dataset, or of a set of scenes, into one
     MergeDataset(merge_dataset::Args),
     /// Write a card (README.md) and Croissant metadata for publishing a finished dataset
     Card(card::CardArgs),

@@ -6,7 +6,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::{Context, ensure};
+use anyhow::{Context, anyhow, ensure};
 use clap::builder::ArgPredicate;
 use edgepuck_scenes::{Drive, Packet, Sighting, Sightings, Stage};
 use formats::atomic::{Unfinished, UnfinishedFolder};
@@ -99,7 +99,9 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let n_points = match args.layout {
         Some(_) => write_sequence(&stage, &mut drive, args)?,
         None => {
-            let (revolution, returns) = drive.in_packets().with_context(what)?;
+            let (revolution, returns) = drive.in_packets().map_err(|cause| {
+                anyhow!("{}: {cause}; --layout semantickitti writes none", what())
+            })?;
             let capture = Capture::create(&args.out, revolution.rpm, returns)?;
             write(&mut drive, args.seconds, capture, &args.out)?
         }

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 #[derive(clap::Args)]
 pub struct Args {
-    /// Folders of all the shards
+    /// Folders of all the shards, of gen-dataset or of gen-scenes
     #[arg(required = true, value_name = "SHARD")]
     shards: Vec<PathBuf>,
 

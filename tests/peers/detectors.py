@@ -1,4 +1,4 @@
-"""pykitti on our sequences, and nuscenes-devkit on the boxes by which the laboratory's precision is tested.
+"""pykitti on our sequences, and nuscenes-devkit on the boxes that test the laboratory's precision.
 
 pykitti reads a drive that `gen-drive --layout semantickitti` wrote. Its points on objects that stand
 still must coincide over all sweeps once its poses have moved them into the first camera's frame, but

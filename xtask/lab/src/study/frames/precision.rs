@@ -112,7 +112,10 @@ mod tests {
             let of = OfClass {
                 class: "car",
                 found: found.into_iter().map(|(frame, x, y, s)| place(frame, x, y, s)).collect(),
-                labelled: labelled.into_iter().map(|(frame, x, y)| place(frame, x, y, 0.0)).collect(),
+                labelled: labelled
+                    .into_iter()
+                    .map(|(frame, x, y)| place(frame, x, y, 0.0))
+                    .collect(),
             };
             assert_eq!(precision.len(), DISTANCES_M.len());
             for ((within_m, expected), ours_m) in precision.into_iter().zip(DISTANCES_M) {
