@@ -2,9 +2,9 @@
 
 The tracker of `live` takes each cluster as soon as it is complete, to the track that expects it
 most. A tracker of the same Kalman filters and footprints that waits for the turn to end, and then
-assigns all of its clusters at once by SciPy's `linear_sum_assignment`, must not be better by more
-than a point of HOTA on the mean of three drives: on one, either is better by up to two. Both get the
-same clusters; the truth is the drive's. Run by
+assigns all of its clusters at once by SciPy's `linear_sum_assignment`, but does not know pieces of
+objects by their whole boxes, must be worse by five points of HOTA on the mean of three drives: it is by
+ten. Both get the same clusters, those that `live` reports; the truth is the drive's. Run by
 `cargo xtask test`; see xtask/src/test/peers.rs.
 """
 
@@ -43,7 +43,7 @@ def main():
     ours, theirs = zip(*map(drive, SEEDS))
     # Half of a random tracker's objects would be lost at once.
     assert min(ours) > 50, ours
-    assert numpy.mean(ours) > numpy.mean(theirs) - 1, (ours, theirs)
+    assert numpy.mean(ours) > numpy.mean(theirs) + 5, (ours, theirs)
 
 
 def drive(seed):
@@ -105,8 +105,8 @@ def outside(cluster, one):
 
 
 def score(turns, tracks):
-    """HOTA, its detection and association parts, and identity switches."""
-    objects, ids = {}, {}
+    """HOTA, its detection and association parts, identity switches, and the tracks of an object."""
+    objects, ids, pairs = {}, {}, set()
     number = lambda known, one: known.setdefault(one, len(known))
     data = {"gt_ids": [], "tracker_ids": [], "similarity_scores": []}
     for here, clusters, similar in turns:
@@ -114,6 +114,8 @@ def score(turns, tracks):
         data["tracker_ids"].append(
             numpy.array([number(ids, tracks[id(one)]) for one in clusters], int))
         data["similarity_scores"].append(similar)
+        pairs.update((here[column.argmax()], tracks[id(one)])
+                     for column, one in zip(similar.T, clusters))
     data.update(num_timesteps=len(turns), num_gt_ids=len(objects), num_tracker_ids=len(ids),
                 num_gt_dets=sum(map(len, data["gt_ids"])),
                 num_tracker_dets=sum(map(len, data["tracker_ids"])))
@@ -121,7 +123,8 @@ def score(turns, tracks):
     clear = trackeval.metrics.CLEAR({"PRINT_CONFIG": False}).eval_sequence(data)
     scores = {name: round(100 * float(numpy.mean(hota[name])), 1)
               for name in ("HOTA", "DetA", "AssA")}
-    return scores | {"switches": int(clear["IDSW"]), "of": int(clear["CLR_TP"])}
+    return scores | {"switches": int(clear["IDSW"]), "of": int(clear["CLR_TP"]),
+                     "tracks": round(len(pairs) / len({one for one, _ in pairs}), 1)}
 
 
 class Track:

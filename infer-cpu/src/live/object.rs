@@ -60,8 +60,9 @@ pub struct Object {
     /// `None` if packets do not arrive in real time.
     #[serde(serialize_with = "rounded")]
     pub latency_ms: Option<f64>,
-    /// The box of the whole object, whose visible side is that of this cluster; `None` if the class
-    /// has no usual size, or if this cluster has too few points to be classified.
+    /// The box of the whole object: its near side is that of this cluster, and its size and direction
+    /// are from all clusters of the track. `None` if the class has no usual size, or if this cluster
+    /// has too few points to be classified.
     pub whole_box: Option<PlacedBox>,
 }
 
@@ -75,7 +76,8 @@ pub struct PlacedBox {
     /// Length, width and height, metres.
     #[serde(serialize_with = "rounded")]
     pub size_m: [f64; 3],
-    /// The direction of the length, degrees counterclockwise from x, -90 to 90.
+    /// The direction of the length, degrees counterclockwise from x, -180 to 180; that of the front once
+    /// the object has moved, if the motion of the sensor is known.
     #[serde(serialize_with = "rounded")]
     pub yaw_deg: f64,
 }

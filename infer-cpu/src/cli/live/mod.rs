@@ -56,8 +56,9 @@ its frame), points, range_m, first_s and last_s (Unix time of the first and the 
 sensor's stamps give the intervals, and the clock of this machine or of the capture gives the
 start), latency_ms (from the arrival of the packet with the last point to this line; null
 without --udp or --realtime), whole_box (the box of the whole object, of which the points show a
-part: its middle centre_m, its size_m, at least the usual one of its class, and its yaw_deg; null
-where the class has no usual size or the cluster has fewer than --min-points).
+part, from all clusters of the track: its middle centre_m, its size_m, at least the usual one of its
+class, and its yaw_deg, -180 to 180, which is that of the front once the object has moved in the
+world; null where the class has no usual size or the cluster has fewer than --min-points).
 
 SIGTERM and Ctrl-C end the program after the last objects, with exit status 0. As a service of
 systemd (Type=notify), it reports when it receives packets, and serves the watchdog.")]
