@@ -57,8 +57,11 @@ def heightfield(
     if sides.shape not in [(), (2,)]:
         raise _edgepuck.Error(f"cell: expected one number or two, found {cell!r}")
     dx, dy = (_positive("cell", side) for side in np.broadcast_to(sides, 2))
+    corner = np.asarray(origin, dtype=np.float64)
+    if corner.shape != (3,) or not np.isfinite(corner).all():
+        raise _edgepuck.Error(f"origin: expected three finite metres, found {origin!r}")
     rows, columns = np.indices(z.shape)
-    vertices = np.stack([columns * dx, rows * dy, z], axis=-1).reshape(-1, 3) + origin
+    vertices = np.stack([columns * dx, rows * dy, z], axis=-1).reshape(-1, 3) + corner
     at = (rows * z.shape[1] + columns).astype(np.int64)
     low, right, up, far = at[:-1, :-1], at[:-1, 1:], at[1:, :-1], at[1:, 1:]
     faces = np.stack([low, right, far, low, far, up], axis=-1).reshape(-1, 2, 3)

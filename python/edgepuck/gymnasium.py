@@ -22,8 +22,9 @@ class LidarObservation(gymnasium.ObservationWrapper[Any, Any, Any]):
     """Adds the ranges of a LiDAR to the observations, as `Box(0, max_range, [n_beams], float32)`.
 
     An observation that is a dict gets one more key; any other becomes its key `state`. A beam without a
-    return, or with one beyond `max_range`, has the range `max_range`. `reset(seed=...)` seeds the noise
-    too: the same seed and actions give the same ranges.
+    return, or with one beyond `max_range`, has the range `max_range`. Ranges are those of the positions
+    `qpos` that the environment has after its step. `reset(seed=...)` seeds the noise too: the same seed
+    and actions give the same ranges. Without a seed, the environment's random numbers give one.
 
     Args:
         env: An environment whose `unwrapped.data` is MuJoCo's, such as a `MujocoEnv`.
@@ -66,7 +67,8 @@ class LidarObservation(gymnasium.ObservationWrapper[Any, Any, Any]):
         spaces[key] = gymnasium.spaces.Box(0.0, max_range, (n_beams,), np.float32)
         self.observation_space = gymnasium.spaces.Dict(spaces)
         self.lidar, self._key, self._max_range = lidar, key, np.float32(max_range)
-        self._seed, self._n_casts = lidar.seed, 0
+        self._seed: int | None = None
+        self._n_casts = 0
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -76,8 +78,12 @@ class LidarObservation(gymnasium.ObservationWrapper[Any, Any, Any]):
         return super().reset(seed=seed, options=options)
 
     def observation(self, observation: Any) -> dict[str, Any]:
-        data: Any = self.env.unwrapped
+        unwrapped: Any = self.env.unwrapped
+        if self._seed is None:
+            self._seed = int(unwrapped.np_random.integers(2**32))
         self._n_casts += 1
         seed = _edgepuck.seed_of_epoch(self._seed, self._n_casts)
-        ranges = np.minimum(self.lidar.ranges(data.data, seed=seed), self._max_range)
+        # A step leaves the poses before it in the data.
+        ranges = self.lidar.ranges(self.lidar.settled(unwrapped.data), seed=seed)
+        ranges = np.minimum(ranges, self._max_range)
         return {**(observation if self._is_dict else {"state": observation}), self._key: ranges}

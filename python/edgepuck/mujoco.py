@@ -22,7 +22,7 @@ try:
 except ImportError as cause:
     raise ImportError("edgepuck.mujoco needs MuJoCo: pip install 'edgepuck[mujoco]'") from cause
 
-# Half the side of a plane that MuJoCo takes for infinite, metres: beyond the range of any sensor.
+# Half the side of a plane that MuJoCo takes for infinite, metres.
 _FAR_M = 1000.0
 
 _Arrays = tuple[NDArray[np.float64], NDArray[np.int64]]
@@ -165,6 +165,16 @@ class Lidar:
         """
         ranges = self.cast(data, seed=seed).ranges
         return ranges[0] if isinstance(data, mujoco.MjData) else ranges
+
+    def settled(self, data: mujoco.MjData) -> mujoco.MjData:
+        """A state of the LiDAR's own, with the poses of the positions `qpos` of `data`.
+
+        `mj_step` leaves the poses of the step before. The next call changes this state.
+        """
+        self._own.qpos[:] = data.qpos
+        self._own.mocap_pos[:], self._own.mocap_quat[:] = data.mocap_pos, data.mocap_quat
+        mujoco.mj_kinematics(self._model, self._own)
+        return self._own
 
     def _place(self, data: mujoco.MjData) -> NDArray[np.float64]:
         """Move the instances to where `data` has them. Return the pose of the sensor."""

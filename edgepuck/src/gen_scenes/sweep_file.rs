@@ -139,7 +139,7 @@ pub fn semantic_class(kind: &str, moves: bool) -> u16 {
     moving.map_or(class, |(_, moving)| *moving)
 }
 
-/// The kind by which [`CODES`] has the objects of an entry of a recipe.
+/// The kind by which `CODES` has the objects of an entry of a recipe.
 pub fn kind(entry: &Objects) -> &str {
     entry.built_in().map_or(&*entry.class, |_| &entry.kind)
 }

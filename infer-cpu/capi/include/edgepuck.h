@@ -40,7 +40,7 @@ typedef enum EdgepuckStatus {
    */
   EDGEPUCK_STATUS_OK = 0,
   /**
-   * A pointer is null, or not aligned for its type.
+   * A pointer is null, or an array is not aligned for its type.
    */
   EDGEPUCK_STATUS_BAD_POINTER = 1,
   /**

@@ -16,7 +16,7 @@ pub(crate) type Failure = edgepuck_ffi::Failure<EdgepuckStatus>;
 pub enum EdgepuckStatus {
     /// The call succeeded.
     Ok = 0,
-    /// A pointer is null, or not aligned for its type.
+    /// A pointer is null, or an array is not aligned for its type.
     BadPointer = 1,
     /// An option has an invalid value, or one that the model does not support.
     BadOption = 2,

@@ -58,7 +58,7 @@ typedef enum EdgepuckSimStatus {
    */
   EDGEPUCK_SIM_STATUS_OK = 0,
   /**
-   * A pointer is null, or not aligned for its type, or to more than the memory can hold.
+   * A pointer is null, or an array is not aligned for its type or is more than the memory can hold.
    */
   EDGEPUCK_SIM_STATUS_BAD_POINTER = 1,
   /**
@@ -247,7 +247,8 @@ typedef struct EdgepuckRanges {
    */
   size_t capacity;
   /**
-   * Metres; infinite where no return comes back. Of several returns of a beam it is the first.
+   * Metres; infinite where no return comes back. Of dual returns it is the strongest, or the second
+   * strongest if that is the last.
    */
   float *range_m;
   /**

@@ -14,7 +14,7 @@ pub(crate) type Failure = edgepuck_ffi::Failure<EdgepuckSimStatus>;
 pub enum EdgepuckSimStatus {
     /// The call succeeded.
     Ok = 0,
-    /// A pointer is null, or not aligned for its type, or to more than the memory can hold.
+    /// A pointer is null, or an array is not aligned for its type or is more than the memory can hold.
     BadPointer = 1,
     /// A mesh cannot be read, has no triangle, a coordinate that is not finite, or an index without
     /// a vertex.

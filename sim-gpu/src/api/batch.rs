@@ -33,11 +33,13 @@ pub struct Moves<'a> {
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Batch {
-    /// Metres; infinite where no return comes back. Of several returns, that with the number 1.
+    /// Metres; infinite where no return comes back. Of dual returns, the strongest, or the second
+    /// strongest if that is the last.
     pub range_m: Vec<f32>,
     /// The number of the instance; [`NO_OBJECT`] where no return comes back, or one from the air.
     pub object: Vec<u32>,
-    /// The range of the second return, metres, if the effects ask for dual returns; else empty.
+    /// The range of the last return, metres, if the effects ask for dual returns, and infinite where it
+    /// is the only one; else empty.
     pub second_range_m: Vec<f32>,
     /// The intensity of the first return, 0 without one, if it was asked for; else empty.
     pub intensity: Vec<f32>,
@@ -113,7 +115,7 @@ impl<'a> BatchBuilder<'a> {
     ///
     /// # Errors
     /// As [`ScanBuilder::run`]; a pose in `moves` that is none; another number of poses in `moves` than
-    /// poses times instances; an instance of another scene; another attribute than intensity and power;
+    /// poses times instances; an instance that the scene does not have; another attribute than intensity and power;
     /// more ranges than the memory holds.
     pub fn run(self) -> Result<Batch, Error> {
         self.check()?;
@@ -144,7 +146,8 @@ impl<'a> BatchBuilder<'a> {
                 Ok(cast_returns(caster.effects(), &placed, &request, |found| row.add(&found))?)
             });
         }
-        let n_rows = (RAYS_AT_ONCE / rays.len().max(1)).max(1);
+        let n_jobs = self.scan.scene.instances().len();
+        let n_rows = (RAYS_AT_ONCE / (rays.len() * n_jobs).max(1)).max(1);
         let mut before: Option<(&mut [Row<'_, 'a>], Vec<CastJob>, Casting)> = None;
         for rows in rows.chunks_mut(n_rows) {
             let aimed = rows
@@ -183,9 +186,12 @@ impl<'a> BatchBuilder<'a> {
     fn placed(&self, row: &Row<'_, 'a>) -> Vec<PlacedTarget<'a>> {
         let Moves { instances, poses } = self.moves;
         let of_row = &poses[row.number * instances.len()..][..instances.len()];
+        let mut moved = vec![None; self.scan.scene.instances().len()];
         // The last of an instance that is named twice.
-        let moved = |number| instances.iter().rposition(|id| id.number() == number);
-        row.scan.placed(|number| moved(number).map(|at| of_row[at]))
+        for (id, pose) in instances.iter().zip(of_row) {
+            moved[id.number() as usize] = Some(*pose);
+        }
+        row.scan.placed(|number| moved[number as usize])
     }
 
     fn check(&self) -> Result<(), InvalidValue> {
@@ -250,10 +256,8 @@ struct Row<'r, 'a> {
 impl Row<'_, '_> {
     fn add(&mut self, found: &BeamReturn) {
         let beam = found.beam as usize;
-        if self.range_m[beam] < f32::INFINITY {
-            if let Some(second_range_m) = self.second_range_m.get_mut(beam) {
-                *second_range_m = found.range_m;
-            }
+        if found.is_second {
+            self.second_range_m[beam] = found.range_m;
             return;
         }
         (self.range_m[beam], self.object[beam]) = (found.range_m, found.object);
@@ -399,12 +403,14 @@ mod tests {
             let [range_m, intensity, power] =
                 [&points.range_m, &points.intensity, &points.power].map(|column| column.as_ref());
             let mut expected = vec![(f32::INFINITY, f32::INFINITY, 0.0, 0.0); n];
-            for (i, &beam) in points.beam.as_ref().unwrap().iter().enumerate() {
+            let beams = points.beam.as_ref().unwrap();
+            for (i, &beam) in beams.iter().enumerate() {
                 let (range_m, here) = (range_m.unwrap()[i], &mut expected[beam as usize]);
-                if here.0 == f32::INFINITY {
-                    *here = (range_m, here.1, intensity.unwrap()[i], power.unwrap()[i]);
-                } else {
+                // Of two returns, which are next to each other, the last is the farther one.
+                if i > 0 && beams[i - 1] == beam {
                     (here.1, n_seconds) = (range_m, n_seconds + 1);
+                } else {
+                    *here = (range_m, here.1, intensity.unwrap()[i], power.unwrap()[i]);
                 }
             }
             for (beam, expected) in (row * n..).zip(expected) {

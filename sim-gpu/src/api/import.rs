@@ -33,7 +33,8 @@ impl Scene {
     ///
     /// Poses and animations are those of the file, turned z up: trajectories are within 0.1 mm and
     /// 0.0001 radians of them, and exact where only one node above a mesh moves, in lines or steps. A node
-    /// that mirrors or shears its mesh has a mesh of its own.
+    /// that mirrors or shears its mesh has a mesh of its own, turned as the file has it: its pose is its
+    /// place.
     ///
     /// # Errors
     /// The file cannot be read: with the node, accessor, link or joint; `import` does not fit it.
@@ -80,9 +81,10 @@ impl Scene {
                     (mesh, pose, scale)
                 }
                 (None, _) => {
-                    let mesh = upright(&part.world_from_mesh)?;
+                    let turned = DAffine3::from_mat3(part.world_from_mesh.matrix3);
+                    let mesh = upright(&turned)?;
                     let mesh = mesh.with_warnings(path, &std::mem::take(&mut warnings));
-                    (mesh, Pose::IDENTITY, DVec3::ONE)
+                    (mesh, Pose::at(of_upright.translation.to_array()), DVec3::ONE)
                 }
             };
             let id = self.add(mesh, pose);
@@ -187,7 +189,7 @@ mod tests {
     }
 
     const NODES: &str = r#"{"name": "a", "mesh": 0, "translation": [1, 2, 3], "scale": [1, 2, 3]},
-        {"name": "a", "mesh": 0}, {"mesh": 1, "scale": [-1, 1, 1]}"#;
+        {"name": "a", "mesh": 0}, {"mesh": 1, "scale": [-1, 1, 1], "translation": [0, 5, 0]}"#;
 
     #[test]
     fn nodes_become_instances_with_z_up() {
@@ -205,6 +207,7 @@ mod tests {
         assert_eq!(a.mesh.vertices()[2], DVec3::Z);
         assert!(std::ptr::eq(a.mesh.vertices(), b.mesh.vertices()));
         assert_eq!(c.mesh.vertices()[1], DVec3::new(-1.0, 0.0, 0.0));
+        assert_eq!(c.pose, Pose::at([0.0, 0.0, 5.0]));
         assert_eq!((a.reflectivity, a.materials.is_none()), (1.0, true));
 
         let mut scene = Scene::new();

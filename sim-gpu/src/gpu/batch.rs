@@ -77,6 +77,10 @@ impl BatchLimits {
     /// Whether `target` alone fits.
     #[must_use]
     pub fn holds(&self, target: &Target) -> bool {
+        // Without a tree for a GPU that would be too large.
+        if target.surface.len() * size_of::<LeafTriangle>() > self.binding_bytes {
+            return false;
+        }
         let TwoWide { nodes, triangles } = target.bvh.two_wide();
         size_of_val(&nodes[..]) <= self.binding_bytes
             && size_of_val(&triangles[..]) <= self.binding_bytes

@@ -18,9 +18,11 @@ pub struct BeamReturn {
     pub object: u32,
     /// Metres.
     pub range_m: f32,
+    /// Whether it is the second of the two that the return mode asks for.
+    pub is_second: bool,
     /// 0 unless the request asks for it.
     pub intensity: f32,
-    /// 0 unless the request asks for it.
+    /// 0 unless the request or an effect asks for it.
     pub power: f32,
 }
 
@@ -40,6 +42,7 @@ pub fn each_return(
             beam: request.pattern.beam_of(receiver.ray_of(r.source)),
             object: object(&receiver, r),
             range_m: range_m(&receiver, r),
+            is_second: r.is_second,
             intensity: if asks_for_intensity { intensity(&receiver, r) } else { 0.0 },
             power: r.power,
         });

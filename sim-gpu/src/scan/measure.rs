@@ -27,6 +27,8 @@ pub(super) struct Return {
     pub reflectivity: u8,
     /// As [`Scan::return_number`](formats::Scan::return_number).
     pub number: u8,
+    /// Whether it is the second of the two that the return mode asks for.
+    pub is_second: bool,
 }
 
 /// Measures the returns of a scan from `nearest`, the nearest hit of each ray that hit anything,
@@ -60,7 +62,7 @@ impl<Each: FnMut(Return)> Measurer<'_, Each> {
     #[inline]
     fn measure_hit(&mut self, id: HitId) {
         match self.receiver.echo_of_hit(id, &mut self.normals) {
-            Ok(echo) => self.measure_echo(&echo, 0),
+            Ok(echo) => self.measure_echo(&echo, 0, false),
             Err(NoEcho::NotLit) => {}
             Err(NoEcho::OutOfRange) => self.tally.out_of_range += 1,
             Err(NoEcho::Glass) => self.tally.dropped += 1,
@@ -111,9 +113,11 @@ impl<Each: FnMut(Return)> Measurer<'_, Each> {
         }
         let mode = receiver.effects.returns.unwrap_or_default();
         let (first, second) = select_returns(&self.echoes, mode);
-        for place in [Some(first), second].into_iter().flatten() {
-            let echo = self.echoes[place];
-            self.measure_echo(&echo, place);
+        let echo = self.echoes[first];
+        self.measure_echo(&echo, first, false);
+        if let Some(second) = second {
+            let echo = self.echoes[second];
+            self.measure_echo(&echo, second, true);
         }
     }
 
@@ -136,7 +140,7 @@ impl<Each: FnMut(Return)> Measurer<'_, Each> {
 
     /// Measures a detected echo, number `place` of its beam, with the errors of the sensor.
     #[inline]
-    fn measure_echo(&mut self, echo: &Echo, place: usize) {
+    fn measure_echo(&mut self, echo: &Echo, place: usize, is_second: bool) {
         let Echo { signal, source, .. } = *echo;
         let receiver = self.receiver;
         let effects = &receiver.effects;
@@ -178,6 +182,7 @@ impl<Each: FnMut(Return)> Measurer<'_, Each> {
             reflectivity: power::calibrated(signal.brightness, signal.retroreflection),
             // At most 37: one for each ray of the widest beam.
             number: place as u8 + 1,
+            is_second,
         });
     }
 }

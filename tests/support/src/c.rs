@@ -52,7 +52,15 @@ impl Package {
     #[must_use]
     pub fn static_link(&self) -> Vec<String> {
         let archive = library_folder().join(format!("lib{}.a", self.library));
-        [archive.to_str().unwrap(), "-lpthread", "-ldl", "-lm"].map(str::to_owned).to_vec()
+        let mut link =
+            [archive.to_str().unwrap(), "-lpthread", "-ldl", "-lm"].map(str::to_owned).to_vec();
+        // What features of the workspace bring: the simplification of meshes is in C++.
+        let library = "libstdc++.so";
+        let found = Command::new("cc").arg(format!("-print-file-name={library}")).output();
+        if found.is_ok_and(|found| found.stdout.trim_ascii() != library.as_bytes()) {
+            link.push("-lstdc++".to_owned());
+        }
+        link
     }
 
     /// What links a program with the shared library.

@@ -267,8 +267,8 @@ impl Sampled<'_> {
                 let (_, exact) = self.at(start_s + share * (end_s - start_s));
                 let found = from.towards(&to, share);
                 let scale = exact.position_m.abs().max_element();
-                found.position_m.distance(exact.position_m) <= BOUND_M.max(1e-6 * scale)
-                    && turn(found.rotation, exact.rotation) <= BOUND_RAD
+                found.position_m.distance(exact.position_m) <= 0.9 * BOUND_M.max(1e-6 * scale)
+                    && turn(found.rotation, exact.rotation) <= 0.9 * BOUND_RAD
             });
             if is_near || middle_s <= start_s || middle_s >= end_s {
                 self.poses.extend(ends.pop().filter(|_| end_s > start_s));

@@ -25,7 +25,9 @@ use buffers::{Buffers, MOST_ELEMENTS, is_index};
 
 /// Extensions that change where triangles are, and are not read.
 const COMPRESSIONS: [&str; 3] =
-    ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "EXT_mesh_gpu_instancing"];
+    ["KHR_draco_mesh_compression", "EXT_meshopt_compression", INSTANCING];
+/// Without it, the file has one of many instances.
+const INSTANCING: &str = "EXT_mesh_gpu_instancing";
 
 /// All nodes at rest as one mesh. Buffers in other files are in `folder`.
 pub(super) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Parsed, ParseError> {
@@ -104,6 +106,8 @@ fn opened(bytes: &[u8]) -> Result<Gltf, String> {
         .map_err(|error| format!("expected glTF 2.0: {error}"))?;
     let mut json = document.into_json();
     let compression = json.extensions_required.iter().find(|name| COMPRESSIONS.contains(&&***name));
+    let compression =
+        compression.or_else(|| json.extensions_used.iter().find(|name| **name == INSTANCING));
     if let Some(extension) = compression {
         return Err(format!("expected a file without {extension}: export it without"));
     }

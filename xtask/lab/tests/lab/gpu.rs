@@ -16,15 +16,19 @@ fn a_small_run_compares_every_shader_and_measures_everything() {
     let report: Value = serde_json::from_str(&written).unwrap();
     let parts = report["parts"].as_array().unwrap();
     let names: Vec<&str> = parts.iter().map(|part| part["name"].as_str().unwrap()).collect();
-    assert_eq!(names, ["scans", "rays at vertices and edges", "effects", "speed", "datasets"]);
+    assert_eq!(
+        names,
+        ["scans", "rays at vertices and edges", "effects", "speed", "batches", "datasets"]
+    );
     assert!(parts.iter().all(|part| part["figures"] != Value::Null), "{written}");
     let checks = report["checks"].as_array().unwrap();
     assert!(checks.iter().all(|check| check["passed"] == true), "{checks:?}");
-    // Scans, rays at edges and four effects, of each adapter; rays at edges, of the CPU.
+    // Scans, rays at edges, four effects and batches, of each adapter; rays at edges and batches, of the
+    // CPU.
     let mut adapters: Vec<String> = list_adapters().into_iter().map(|a| a.name).collect();
     adapters.sort_unstable();
     adapters.dedup();
-    assert_eq!(checks.len(), 6 * adapters.len() + 1, "{checks:?}");
+    assert_eq!(checks.len(), 7 * adapters.len() + 2, "{checks:?}");
     let rays = &parts[1]["figures"];
     for caster in rays.as_array().unwrap() {
         // 162 vertices and 480 edges, from 20 places.
