@@ -61,8 +61,7 @@ pub struct Object {
     #[serde(serialize_with = "rounded")]
     pub latency_ms: Option<f64>,
     /// The box of the whole object: its near side is that of this cluster, and its size and direction
-    /// are from all clusters of the track. `None` if the class has no usual size, or if this cluster
-    /// has too few points to be classified.
+    /// are from all clusters of the track. `None` if the class has no usual size.
     pub whole_box: Option<PlacedBox>,
 }
 

@@ -18,6 +18,7 @@ use super::sensor::{Decoder, Facts, Flaw};
 use super::stats::{Stage, Stats};
 use super::tracker::Tracker;
 use super::waiting::{Motion, Tag, Waiting};
+use super::whole::Whole;
 use crate::classifier::Classifier;
 use crate::error::Error;
 use crate::usual_size::usual_size_m;
@@ -303,14 +304,18 @@ impl Pipeline {
             };
             let fused = self.classifiers.fused(&track.log_probabilities, track.energy);
             let confidence = view.zip(fused.as_ref());
-            let whole_box = confidence.and_then(|(_, fused)| {
-                let whole = seen.completed(usual_size_m(&fused.answer)?, cluster.ground_z_m);
-                let velocity = track.velocity_m_s().filter(|_| pose.is_some());
-                if !track.is_piece {
-                    track.whole.fuse(fused.class, &placed(&whole, pose), sensor_m, velocity);
+            let usual_m =
+                fused.as_ref().and_then(|fused| Some((fused.class, usual_size_m(&fused.answer)?)));
+            match usual_m {
+                Some((class, usual_m)) if view.is_some() && !track.is_piece => {
+                    let whole = placed(&seen.completed(usual_m, cluster.ground_z_m), pose);
+                    let velocity = track.settled_velocity_m_s().filter(|_| pose.is_some());
+                    track.whole.fuse(class, &whole, sensor_m, velocity);
                 }
-                Some(track.whole.placed())
-            });
+                Some(_) => {}
+                None => track.whole = Whole::default(),
+            }
+            let whole_box = track.whole.is_known().then(|| track.whole.placed());
             if track.n_seen < self.options.min_turns {
                 continue;
             }

@@ -25,6 +25,8 @@ const MOST_TURN_S: f64 = 0.4;
 const MOST_TRACKS: usize = 1024;
 /// Persons and two-wheelers, which are shorter, are not pieces of cars, which are longer, metres.
 const SHORT_M: f32 = 2.0;
+/// A track with so many clusters that are no pieces has its velocity, and keeps its clusters.
+const SETTLED: u64 = 5;
 /// The least weight of the latest view of a track: views of about two seconds count at ten turns
 /// per second.
 const LEAST_WEIGHT: f64 = 0.05;
@@ -38,9 +40,12 @@ pub struct Track {
     pub whole: Whole,
     /// Whether the last cluster was a piece of the object, which tells nothing of the whole.
     pub is_piece: bool,
-    /// The time of the last cluster.
+    /// The time of the last cluster, and of the last that was no piece.
     last_s: f64,
+    last_whole_s: f64,
     pub n_seen: u64,
+    /// How many of its clusters were no pieces.
+    n_whole: u64,
     /// Weighted means of the log-probabilities over all views; empty without a view.
     pub log_probabilities: Vec<f64>,
     /// The weighted mean of the energy.
@@ -63,10 +68,10 @@ pub struct Tracker {
 }
 
 impl Track {
-    /// The velocity, metres per second; `None` after only one cluster.
+    /// The velocity, metres per second; `None` after only one cluster that was no piece.
     #[must_use]
     pub fn velocity_m_s(&self) -> Option<[f64; 3]> {
-        self.axes.filter(|_| self.n_seen > 1).map(|axes| axes.map(|axis| axis.velocity))
+        self.axes.filter(|_| self.n_whole > 1).map(|axes| axes.map(|axis| axis.velocity))
     }
 
     /// The cost of matching `seen` (a negative log-likelihood): the squared Mahalanobis distance
@@ -82,6 +87,12 @@ impl Track {
             logarithm += variance.ln();
         }
         (distance <= GATE).then_some(distance + logarithm + self.footprint.mismatch(seen))
+    }
+
+    /// The velocity, once it does not show the noise of the first boxes.
+    #[must_use]
+    pub fn settled_velocity_m_s(&self) -> Option<[f64; 3]> {
+        self.velocity_m_s().filter(|_| self.n_whole >= SETTLED)
     }
 
     /// How far the object moves until `time_s`, metres.
@@ -131,8 +142,9 @@ impl Track {
     fn note(&mut self, seen: &Observation<'_>) {
         self.footprint.update(seen);
         self.is_piece = false;
-        self.last_s = seen.time_s;
+        (self.last_s, self.last_whole_s) = (seen.time_s, seen.time_s);
         self.n_seen += 1;
+        self.n_whole += 1;
         let Some((log_probabilities, energy)) = seen.view else { return };
         self.n_views += 1;
         self.log_probabilities.resize(log_probabilities.len(), 0.0);
@@ -165,7 +177,7 @@ impl Tracker {
 
     /// Adds `seen` to the track that it matches, or to a new one, and returns the track. A piece of
     /// an object that has been seen more often belongs to that one; `None` if that one already has a
-    /// cluster in this turn.
+    /// cluster in this turn. A track that has been seen for some turns keeps its clusters.
     pub fn observe(&mut self, seen: &Observation<'_>) -> Option<&mut Track> {
         let waits = |track: &Track| seen.time_s - track.last_s;
         // A track that already has a cluster in this turn does not take another.
@@ -174,22 +186,18 @@ impl Tracker {
         let due_tracks = tracks().filter(|(_, track)| due.contains(&waits(track)));
         let costs = due_tracks.filter_map(|(at, track)| Some((track.cost(seen)?, at)));
         let matched = costs.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, at)| at);
-        let n_seen = matched.map_or(0, |at| self.tracks[at].n_seen);
-        let is_short = seen.usual_length_m.is_some_and(|length_m| length_m < SHORT_M);
-        let holds = |track: &Track| {
-            let is_older = track.n_seen > n_seen && waits(track) <= PATIENCE_S;
-            let is_another = is_short && track.whole.placed().size_m[0] > f64::from(SHORT_M);
-            is_older && !is_another && track.whole.holds(seen.position_m, track.way_m(seen.time_s))
-        };
-        let holders = tracks().filter(|(_, track)| track.axes.is_some() && holds(track));
-        let holder = holders.max_by_key(|(_, track)| track.n_seen).map(|(at, _)| at);
-        if let Some(at) = holder {
+        if let Some(at) = self.holder(seen, matched) {
             let track = &mut self.tracks[at];
-            if !due.contains(&(seen.time_s - track.last_s)) {
-                return None;
+            if due.contains(&(seen.time_s - track.last_s)) {
+                track.add_piece(seen.time_s);
+                return Some(track);
             }
-            track.add_piece(seen.time_s);
-            return Some(track);
+            // A piece came before the object itself, which is seen now.
+            if track.is_piece && track.cost(seen).is_some() {
+                track.n_seen -= 1;
+                track.update(seen);
+            }
+            return None;
         }
         let at = matched.unwrap_or_else(|| self.place_for_new(seen.time_s));
         match matched {
@@ -200,6 +208,24 @@ impl Tracker {
             }
         }
         Some(&mut self.tracks[at])
+    }
+
+    /// The track of the object that `seen` is a piece of; `matched` is the track that it matches.
+    fn holder(&self, seen: &Observation<'_>, matched: Option<usize>) -> Option<usize> {
+        let n_seen = matched.map_or(0, |at| self.tracks[at].n_seen);
+        if matched.is_some_and(|at| self.tracks[at].n_whole >= SETTLED) {
+            return None;
+        }
+        let is_short = seen.usual_length_m.is_some_and(|length_m| length_m < SHORT_M);
+        let holds = |track: &Track| {
+            let is_older = track.n_seen > n_seen && seen.time_s - track.last_whole_s <= PATIENCE_S;
+            let is_another = is_short && track.whole.placed().size_m[0] > f64::from(SHORT_M);
+            let is_known = track.axes.is_some() && is_older && !is_another;
+            is_known && track.whole.holds(seen.position_m, seen.size_m[0], track.way_m(seen.time_s))
+        };
+        let holders =
+            self.tracks[..self.n_used].iter().enumerate().filter(|(_, track)| holds(track));
+        holders.max_by_key(|(_, track)| track.n_seen).map(|(at, _)| at)
     }
 
     fn place_for_new(&mut self, time_s: f64) -> usize {
@@ -268,10 +294,13 @@ mod tests {
         let door = Observation { size_m: [0.9, 0.1], ..seen(0.1, 11.9, -0.7) };
         let track = tracker.observe(&door).unwrap();
         assert!(track.id == 1 && track.is_piece && track.whole.placed() == whole);
+        assert_eq!(track.velocity_m_s(), None);
         assert!(tracker.observe(&Observation { time_s: 0.1, ..car }).is_none());
         let person = Observation { usual_length_m: Some(0.8), ..seen(0.1, 11.0, 0.7) };
         assert_eq!(tracker.observe(&person).unwrap().id, 2);
         assert_eq!(tracker.observe(&seen(0.1, 10.0, -1.5)).unwrap().id, 3);
+        let longer = Observation { size_m: [6.0, 1.0], ..seen(0.1, 10.0, 0.5) };
+        assert_eq!(tracker.observe(&longer).unwrap().id, 4);
         let track = tracker.observe(&Observation { time_s: 0.2, ..car }).unwrap();
         assert!((track.id, track.n_seen) == (1, 3) && !track.is_piece);
     }

@@ -8,6 +8,9 @@ use super::object::PlacedBox;
 /// their sizes, but they and the sensor turn.
 const LEAST_SIZE_WEIGHT: f64 = 0.05;
 const LEAST_TURN_WEIGHT: f64 = 0.3;
+/// The most weight of a direction after the first: that of a box that takes the width for the length,
+/// and is turned by a quarter, then changes nothing.
+const MOST_TURN_WEIGHT: f64 = 0.4;
 /// The least weight of a longer box: most views show only a part of the length.
 const LEAST_LENGTH_WEIGHT: f64 = 0.5;
 /// What moves faster than this, metres per second, moves ahead.
@@ -45,6 +48,7 @@ impl Whole {
         (self.class, self.n_seen) = (class, n_before + 1);
         let weight = |least: f64| (1.0 / self.n_seen as f64).max(least);
         let [size_weight, turn_weight] = [LEAST_SIZE_WEIGHT, LEAST_TURN_WEIGHT].map(weight);
+        let turn_weight = if n_before > 0 { turn_weight.min(MOST_TURN_WEIGHT) } else { 1.0 };
         let seen_rad = seen.yaw_deg.to_radians();
         let (sin, cos) = (2.0 * seen_rad).sin_cos();
         for (mean, new) in self.twice.iter_mut().zip([cos, sin]) {
@@ -83,13 +87,19 @@ impl Whole {
         }
     }
 
-    /// Whether a piece of the object may be at `position_m`, after the object has moved by `by_m`.
-    pub fn holds(&self, position_m: [f64; 3], by_m: [f64; 3]) -> bool {
+    /// Whether a piece of the object of this length may be at `position_m`, after the object has moved
+    /// by `by_m`.
+    pub fn holds(&self, position_m: [f64; 3], length_m: f64, by_m: [f64; 3]) -> bool {
         let [dx, dy, dz] = [0, 1, 2].map(|i| position_m[i] - self.centre_m[i] - by_m[i]);
         let (sin, cos) = self.yaw_rad.sin_cos();
         let off_m = [cos * dx + sin * dy, cos * dy - sin * dx, dz];
         let is_near = |(off, size): (f64, f64)| off.abs() <= MARGIN_M + (0.5 + MARGIN_SHARE) * size;
-        self.n_seen > 0 && off_m.into_iter().zip(self.size_m).all(is_near)
+        let fits = length_m <= 2.0 * MARGIN_M + (1.0 + 2.0 * MARGIN_SHARE) * self.size_m[0];
+        self.is_known() && fits && off_m.into_iter().zip(self.size_m).all(is_near)
+    }
+
+    pub fn is_known(&self) -> bool {
+        self.n_seen > 0
     }
 
     pub fn placed(&self) -> PlacedBox {
@@ -136,8 +146,11 @@ mod tests {
     #[test]
     fn directions_are_means_modulo_half_a_turn_and_an_odd_quarter_turn_changes_nothing() {
         let directed = |yaw_deg| seen(8.0, [4.0, 1.6], yaw_deg);
+        // Of the doubled angles, 176 and 184 degrees, with the weights 0.6 and 0.4.
+        let (cos, sin) = (4.0f64.to_radians().cos(), 0.2 * 4.0f64.to_radians().sin());
         let upright = fused(&[directed(88.0), directed(-88.0)]);
-        assert_near(upright.yaw_deg.abs(), 90.0);
+        assert_near(upright.yaw_deg.abs(), 90.0 - 0.5 * sin.atan2(cos).to_degrees());
+        assert_near(fused(&[directed(10.0), directed(-80.0)]).yaw_deg, 10.0);
         let mut boxes = [directed(10.0); 6];
         boxes[5] = PlacedBox { size_m: [1.6, 4.0, 1.5], ..directed(-80.0) };
         let PlacedBox { size_m, yaw_deg, .. } = fused(&boxes);
@@ -160,10 +173,13 @@ mod tests {
     #[test]
     fn pieces_are_within_the_box_and_its_error() {
         let mut whole = Whole::default();
-        assert!(!whole.holds([0.0; 3], [0.0; 3]));
+        assert!(!whole.holds([0.0; 3], 0.0, [0.0; 3]));
         whole.fuse(1, &seen(8.0, [4.0, 1.6], 90.0), [0.0; 2], None);
-        let holds = |x, y, z| whole.holds([8.0 + x, y, z], [0.0, 1.0, 0.0]);
+        let holds = |x, y, z| whole.holds([8.0 + x, y, z], 1.0, [0.0, 1.0, 0.0]);
         assert!(holds(1.05, 3.49, 0.99) && holds(-1.05, -1.49, -0.99));
+        // Its length, with a tenth of a side and 0.1 m at both ends.
+        let at = [8.0, 1.0, 0.0];
+        assert!(whole.holds(at, 4.99, [0.0, 1.0, 0.0]) && !whole.holds(at, 5.01, [0.0, 1.0, 0.0]));
         assert!(!holds(1.07, 1.0, 0.0) && !holds(0.0, 3.51, 0.0) && !holds(0.0, 1.0, 1.01));
     }
 }

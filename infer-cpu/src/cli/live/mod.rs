@@ -58,7 +58,7 @@ start), latency_ms (from the arrival of the packet with the last point to this l
 without --udp or --realtime), whole_box (the box of the whole object, of which the points show a
 part, from all clusters of the track: its middle centre_m, its size_m, at least the usual one of its
 class, and its yaw_deg, -180 to 180, which is that of the front once the object has moved in the
-world; null where the class has no usual size or the cluster has fewer than --min-points).
+world; null where the class has no usual size).
 
 SIGTERM and Ctrl-C end the program after the last objects, with exit status 0. As a service of
 systemd (Type=notify), it reports when it receives packets, and serves the watchdog.")]
