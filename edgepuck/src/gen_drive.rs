@@ -14,8 +14,8 @@ use formats::vlp32c::{Capture, SEQUENCES_PER_PACKET, START_S};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::flags::number;
+use crate::gen_scenes::read_recipe;
 use crate::gen_scenes::sequence::Sequence;
-use crate::gen_scenes::{is_written, read_recipe};
 use crate::{Outcome, Usage};
 use formats::outputs::{Overwrite, need_extension};
 use turns::{Turns, whole_turns};
@@ -82,7 +82,10 @@ fn speed(word: &str) -> Result<f64, String> {
 
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     match args.layout {
-        Some(_) => args.overwrite.check_cleared([&*args.out], is_written)?,
+        Some(_) => {
+            let sequence = Sequence(args.out.clone());
+            args.overwrite.check_cleared([&*args.out], |file| sequence.has_written(file))?;
+        }
         None => {
             need_extension("--out", &args.out, &["pcap"])?;
             let [poses, truth] = ["tum", "truth.jsonl"].map(|end| args.out.with_extension(end));
@@ -144,9 +147,10 @@ fn fire(
 /// Writes the whole turns of a drive as a sequence and returns the number of points.
 fn write_sequence(stage: &Stage, drive: &mut Drive<'_>, args: &Args) -> anyhow::Result<usize> {
     let n_turns = whole_turns(drive, args.seconds)?;
-    args.overwrite.clear([&*args.out], is_written)?;
+    let sequence = Sequence(args.out.clone());
+    args.overwrite.clear([&*args.out], |file| sequence.has_written(file))?;
     let begun = UnfinishedFolder::begin(&args.out);
-    let mut turns = Turns::new(stage, Sequence(args.out.clone()));
+    let mut turns = Turns::new(stage, sequence);
     let n_packets = (f64::from(n_turns) * drive.period_s() / drive.packet_s()).ceil();
     fire(drive, n_packets, |drive, first, packets| {
         (first..).zip(packets).try_for_each(|(number, packet)| turns.add(drive, number, packet))

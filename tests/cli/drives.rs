@@ -168,6 +168,13 @@ fn points_of_a_sequence_lie_on_their_objects_when_its_poses_move_them() {
     for out in ["sequences/04 --overwrite", "sequences/05"] {
         folder.succeeds(&format!("{other} {out}"));
     }
+    // Neither a folder of sequences nor a recorded one is replaced.
+    folder.write("kitti/velodyne/000000.bin", "");
+    folder.write("kitti/calib.txt", "P0: 7.2e+02 0 6.1e+02 0 0 7.2e+02 1.9e+02 0 0 0 1 0\n");
+    for out in ["sequences", "kitti"] {
+        let said = folder.exits(2, &format!("{other} {out} --overwrite"));
+        assert!(said.contains("expected only files that this command wrote"), "{said}");
+    }
     assert!(!folder.at("sequences/04/velodyne/000002.bin").exists());
     for file in ["velodyne/000001.bin", "labels/000001.label", "poses.txt"] {
         let [one, again] =

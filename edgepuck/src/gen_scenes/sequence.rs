@@ -1,7 +1,8 @@
 //! Sequences of sweeps as SemanticKITTI and KITTI's odometry benchmark have them.
 
 use std::fmt::Write;
-use std::path::PathBuf;
+use std::fs;
+use std::path::{Path, PathBuf};
 
 use formats::hash::Hashing;
 use formats::scan::Column;
@@ -38,6 +39,25 @@ impl Sequence {
         write(format!("labels/{number:06}.label"), &labels)
     }
 
+    /// Whether `file` is one that an earlier run wrote: by its place, in a folder with this calibration,
+    /// which no recorded sequence has.
+    pub fn has_written(&self, file: &Path) -> bool {
+        let is_ours =
+            fs::read_to_string(self.0.join("calib.txt")).is_ok_and(|found| found == calibration());
+        let place = file.strip_prefix(&self.0).unwrap_or(file);
+        let is_sweep = |folder: &str, extension: &str| {
+            let stem = place.file_stem().unwrap_or_default().to_string_lossy();
+            place.parent() == Some(Path::new(folder))
+                && place.extension().is_some_and(|found| found == extension)
+                && stem.parse::<u32>().is_ok()
+        };
+        let texts = ["calib.txt", "poses.txt", "times.txt"];
+        is_ours
+            && (texts.iter().any(|text| place == Path::new(text))
+                || is_sweep("velodyne", "bin")
+                || is_sweep("labels", "label"))
+    }
+
     /// Writes the calibration, and the poses of the sensor, `period_s` apart.
     pub fn finish(
         &self,
@@ -51,14 +71,17 @@ impl Sequence {
             let time_s = i as f64 * period_s;
             writeln!(times, "{time_s:.6e}").expect("invariant: a string takes all");
         }
-        let cameras: String = CALIBRATION.lines().take(4).map(|line| format!("{line}\n")).collect();
-        let transform = CALIBRATION.lines().find_map(|line| line.strip_prefix("Tr_velo_to_cam"));
-        let transform = transform.expect("invariant: the calibration has it");
-        let calibration = format!("{cameras}Tr{transform}\n");
-        [("calib.txt", calibration), ("poses.txt", lines), ("times.txt", times)]
+        [("calib.txt", calibration()), ("poses.txt", lines), ("times.txt", times)]
             .into_iter()
             .try_for_each(|(file, text)| atomic::write_bytes(&self.0.join(file), text))
     }
+}
+
+fn calibration() -> String {
+    let cameras: String = CALIBRATION.lines().take(4).map(|line| format!("{line}\n")).collect();
+    let transform = CALIBRATION.lines().find_map(|line| line.strip_prefix("Tr_velo_to_cam"));
+    let transform = transform.expect("invariant: the calibration has it");
+    format!("{cameras}Tr{transform}\n")
 }
 
 /// The rows of the camera's pose in the camera's frame at the `first` pose of the sensor, to a
