@@ -73,7 +73,8 @@ pub struct EdgepuckMoves {
 pub struct EdgepuckRanges {
     /// The number of ranges for which each buffer has room.
     pub capacity: usize,
-    /// Metres; infinite where no return comes back. Of dual returns it is the strongest, or the second strongest if that is the last.
+    /// Metres; infinite where no return comes back. Of dual returns it is the strongest, or the second
+    /// strongest if that is the last.
     pub range_m: *mut f32,
     /// The number of the instance; UINT32_MAX where no return comes back, or one from the air.
     pub object: *mut u32,
