@@ -66,6 +66,26 @@ def test_the_image_has_a_row_for_each_ring() -> None:
         assert np.isinf(image[0, ring, len(in_time) :]).all()
 
 
+def test_intensities_and_second_returns_are_those_of_scans() -> None:
+    scene, _ = world()
+    settings = {"effects": {"footprint": {"samples": 7, "divergence_deg": [2, 2]}, "returns": "dual"}}
+    wanted = ["intensity", "power"]
+    batch = scene.cast(SENSOR, np.eye(4)[None], attributes=wanted, **settings)
+    columns = ["range", "beam", *wanted]
+    scan = scene.scan(SENSOR, pose=np.eye(4), seed=int(batch.seeds[0]), attributes=columns, **settings)
+    # Two returns of a beam follow each other, the last behind the strongest.
+    is_second = np.r_[False, scan.beam[1:] == scan.beam[:-1]]
+    assert is_second.sum() > 10
+    np.testing.assert_array_equal(batch.ranges[0, scan.beam[~is_second]], scan.range[~is_second])
+    np.testing.assert_array_equal(batch.second_ranges[0, scan.beam[is_second]], scan.range[is_second])
+    assert np.isfinite(batch.second_ranges).sum() == is_second.sum()
+    for name in wanted:
+        np.testing.assert_array_equal(
+            getattr(batch, name)[0, scan.beam[~is_second]], getattr(scan, name)[~is_second]
+        )
+    assert scene.cast(SENSOR, np.eye(4)[None]).power is None
+
+
 def test_noise_is_that_of_scans() -> None:
     scene, _ = world()
     settings = {"noise": 0.02, "dropout": 0.3, "effects": {"returns": "last"}}

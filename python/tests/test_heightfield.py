@@ -88,6 +88,7 @@ def test_a_png_has_y_upwards(tmp_path: Path) -> None:
         (([[0.0, np.nan], [2.0, 1.0]], {"cell": 1}), "expected a cell with four heights, found none"),
         ((np.zeros((2, 2)), {"cell": 0}), "cell: expected a number of metres above 0, found 0"),
         ((np.zeros((2, 2)), {"cell": [1, 2, 3]}), "cell: expected one number or two"),
+        ((np.zeros((2, 2)), {"cell": 1, "origin": 5.0}), "origin: expected three finite metres, found 5.0"),
         ((np.zeros((2, 2)), {"cell": 1, "height": 3}), "height: expected none beside heights in metres, found 3"),
         (("terrain.png", {"cell": 1}), "height: expected the height of white in metres, found None"),
         (("missing.png", {"cell": 1, "height": 1}), "missing.png: cannot be read"),
