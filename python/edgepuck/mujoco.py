@@ -361,7 +361,7 @@ def _seen(
 
 
 def _soft(model: mujoco.MjModel) -> list[str]:
-    """What deforms, and therefore is no instance of a mesh."""
+    """The names of flexes and skins, which deform and therefore cannot be instances of a mesh."""
     kinds = [("flex", model.nflex), ("skin", model.nskin)]
     return [_named(model, kind, number) for kind, n in kinds for number in range(n)]
 

@@ -228,11 +228,11 @@ fn array<T: numpy::Element>(
 
 /// The handles of the instances of these numbers.
 fn ids_of(scene: &sim_gpu::Scene, numbers: &[usize]) -> PyResult<Vec<sim_gpu::InstanceId>> {
-    let ids: Vec<_> = scene.ids().collect();
     let id = |&number: &usize| {
-        let n = ids.len();
+        let n = scene.instances().len();
         let missing = || format!("expected the number of one of {n} instances, found {number}");
-        ids.get(number).copied().ok_or_else(|| raised(missing()))
+        let found = u32::try_from(number).ok().and_then(|number| scene.id(number));
+        found.ok_or_else(|| raised(missing()))
     };
     numbers.iter().map(id).collect()
 }

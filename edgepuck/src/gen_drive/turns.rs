@@ -36,11 +36,15 @@ impl<'a> Turns<'a> {
             unreachable!("invariant: packets have these columns");
         };
         let origin_m = DVec3::from_array(scan.origin);
+        let mut sensor = pose(drive, self.turn);
         for (i, position) in scan.positions.iter().enumerate() {
-            self.begin(drive.turn(number, beams[i]))?;
-            let Pose { position_m, rotation } = pose(drive, self.turn);
+            let turn = drive.turn(number, beams[i]);
+            if turn > self.turn {
+                self.begin(turn)?;
+                sensor = pose(drive, turn);
+            }
             let at_m = origin_m + DVec3::from(position.map(f64::from));
-            let seen_m = rotation.inverse() * (at_m - position_m);
+            let seen_m = sensor.rotation.inverse() * (at_m - sensor.position_m);
             self.positions.push(seen_m.as_vec3().to_array());
             self.intensity.push(intensity[i]);
             self.labels.push(self.label(drive, objects[i])?);

@@ -8,12 +8,11 @@ use std::path::PathBuf;
 use edgepuck_scenes::{LabelledScene, ObjectBox, SceneError, Stage, is_test, place_in_set};
 use edgepuck_segment::OrientedBox;
 use formats::hash::Hashing;
-use formats::scan::Column;
 use formats::{FormatError, atomic, rows};
 use glam::DVec3;
 use sim_gpu::{Pose, glam};
 
-use super::sequence::Sequence;
+use super::sequence::{Sequence, point_columns};
 use super::sweep_file::semantic_labels;
 use crate::kitti::{CALIBRATION, Camera, corners, line};
 
@@ -60,12 +59,9 @@ impl Writer {
         let positions: Vec<[f32; 3]> = done.sweep.points().iter().map(to_level).collect();
         let intensity = done.sweep.scan.intensity.as_deref();
         let intensity = intensity.expect("invariant: sweeps have intensities");
-        let columns = [
-            (rows::AXES.to_vec(), Column::Vector(&positions)),
-            (vec!["intensity"], Column::F32(intensity)),
-        ];
-        let write = |file: &str, header: &[u8], columns: &rows::Columns<'_>| {
-            rows::write(&self.folder.join(file), Hashing::None, header, columns)
+        let write = |file: &str, header: &[u8]| {
+            let columns = point_columns(&positions, intensity);
+            rows::write(&self.folder.join(file), Hashing::None, header, &columns)
         };
         match self.layout {
             Layout::SemanticKitti => {
@@ -75,14 +71,14 @@ impl Writer {
                 self.sequence(is_test(number)).add(place, &positions, intensity, &labels)?;
             }
             Layout::Kitti => {
-                write(&format!("training/velodyne/{name}.bin"), b"", &columns)?;
+                write(&format!("training/velodyne/{name}.bin"), b"")?;
                 let lines = lines(stage, done, |class, of| self.kitti_line(class, of))?;
                 self.text(&format!("training/label_2/{name}.txt"), &lines)?;
                 self.text(&format!("training/calib/{name}.txt"), CALIBRATION)?;
             }
             Layout::OpenPcdet => {
                 let header = rows::npy_header(positions.len(), 4);
-                write(&format!("points/{name}.npy"), &header, &columns)?;
+                write(&format!("points/{name}.npy"), &header)?;
                 let lines = lines(stage, done, |class, of| Some(openpcdet_line(class, of)))?;
                 self.text(&format!("labels/{name}.txt"), &lines)?;
             }

@@ -27,10 +27,7 @@ impl Sequence {
         intensity: &[f32],
         labels: &[u32],
     ) -> Result<(), FormatError> {
-        let points = [
-            (rows::AXES.to_vec(), Column::Vector(positions)),
-            (vec!["intensity"], Column::F32(intensity)),
-        ];
+        let points = point_columns(positions, intensity);
         let labels = [(vec!["label"], Column::U32(labels))];
         let write = |file: String, columns: &rows::Columns<'_>| {
             rows::write(&self.0.join(file), Hashing::None, "", columns).map(drop)
@@ -75,6 +72,14 @@ impl Sequence {
             .into_iter()
             .try_for_each(|(file, text)| atomic::write_bytes(&self.0.join(file), text))
     }
+}
+
+/// The columns of the points of a sweep.
+pub fn point_columns<'a>(
+    positions: &'a [[f32; 3]],
+    intensity: &'a [f32],
+) -> [(Vec<&'static str>, Column<'a>); 2] {
+    [(rows::AXES.to_vec(), Column::Vector(positions)), (vec!["intensity"], Column::F32(intensity))]
 }
 
 fn calibration() -> String {

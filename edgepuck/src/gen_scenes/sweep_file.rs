@@ -9,7 +9,7 @@ use formats::rows;
 use formats::scan::Column;
 use formats::scan_file::{ScanFormat, write_scan};
 
-use super::sequence::Sequence;
+use super::sequence::{Sequence, point_columns};
 
 formats::named! {
     /// A file format of sweeps.
@@ -83,10 +83,6 @@ pub fn write(
     let of_points = of_points(stage, done).with_context(|| format.to_string())?;
     let column = |of: fn(&Surface) -> u32| of_points.iter().map(of).collect::<Vec<u32>>();
     let intensity = scan.intensity.as_deref().expect("invariant: sweeps have intensities");
-    let mut columns = vec![
-        (rows::AXES.to_vec(), Column::Vector(&scan.positions)),
-        (vec!["intensity"], Column::F32(intensity)),
-    ];
     match format {
         SweepFormat::Npz => {
             write_scan(&file("npz"), ScanFormat::Npz, Hashing::None, scan)?;
@@ -98,6 +94,7 @@ pub fn write(
         }
         SweepFormat::Pcd => {
             let [label, instance] = [column(|s| s.class.into()), column(|s| s.object.into())];
+            let mut columns = point_columns(&scan.positions, intensity).to_vec();
             columns.push((vec!["ring"], Column::U16(done.sweep.rings())));
             columns.push((vec!["label"], Column::U32(&label)));
             columns.push((vec!["instance"], Column::U32(&instance)));

@@ -25,7 +25,8 @@ const MOST_TURN_S: f64 = 0.4;
 const MOST_TRACKS: usize = 1024;
 /// Persons and two-wheelers, which are shorter, are not pieces of cars, which are longer, metres.
 const SHORT_M: f32 = 2.0;
-/// A track with so many clusters that are no pieces has its velocity, and keeps its clusters.
+/// From this many whole clusters on, the velocity of a track is trusted, and the track keeps the clusters
+/// that it matches.
 const SETTLED: u64 = 5;
 /// The least weight of the latest view of a track: views of about two seconds count at ten turns
 /// per second.

@@ -40,7 +40,7 @@ impl EdgepuckScene {
     /// The Rust library's handle.
     pub(crate) fn find(&self, instance: EdgepuckInstance) -> Result<InstanceId, Failure> {
         let EdgepuckInstance { scene, number } = instance;
-        let found = self.scene.ids().nth(number as usize);
+        let found = self.scene.id(number);
         found.filter(|_| scene == self.id).ok_or_else(|| {
             let (n, own) = (self.labels.len(), self.id);
             let message = format!(

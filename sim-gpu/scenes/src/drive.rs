@@ -60,7 +60,7 @@ pub struct Drive<'a> {
 #[derive(Clone, Debug)]
 pub struct Packet {
     /// Beams, ranges, intensities and objects in the order of firing, with positions in the world.
-    /// Object 0 is the ground, object `i` is [`Drive::object`] `i`, and [`AIR`] is none.
+    /// Object 0 is the ground, object `i` is [`Drive::object`] `i`, and [`AIR`] is the air.
     pub scan: Scan,
     pub(crate) points: ObjectPoints,
 }

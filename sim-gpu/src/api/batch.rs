@@ -114,9 +114,9 @@ impl<'a> BatchBuilder<'a> {
     /// Casts the batch.
     ///
     /// # Errors
-    /// As [`ScanBuilder::run`]; a pose in `moves` that is none; another number of poses in `moves` than
-    /// poses times instances; an instance that the scene does not have; another attribute than intensity and power;
-    /// more ranges than the memory holds.
+    /// As [`ScanBuilder::run`]; a pose that is no rotation; another number of poses in `moves` than poses
+    /// times instances; an instance that the scene does not have; another attribute than intensity and
+    /// power; more ranges than the memory holds.
     pub fn run(self) -> Result<Batch, Error> {
         self.check()?;
         let prepared = self.scan.prepare()?;
@@ -130,7 +130,8 @@ impl<'a> BatchBuilder<'a> {
             let scan = self.scan.clone().at(pose).seed(seed);
             let of_row = columns.each_mut().map(|column| column.next().unwrap_or_default());
             let [second_range_m, intensity, power] = of_row;
-            Row { number, scan, range_m, object, second_range_m, intensity, power }
+            let columns = Columns { range_m, object, second_range_m, intensity, power };
+            Row { number, scan, columns }
         });
         self.cast(rows.collect(), &prepared)?;
         Ok(batch)
@@ -140,19 +141,19 @@ impl<'a> BatchBuilder<'a> {
         let Prepared { caster, rays, .. } = prepared;
         let fits = self.scan.scene.instances().iter().all(|i| caster.fits(i.mesh.target()));
         if matches!(**caster, OpenCaster::Cpu(_)) || !fits {
-            return rows.par_iter_mut().try_for_each(|row| {
-                let (scan, placed) = (row.scan.clone(), self.placed(row));
-                let request = scan.request(rays);
-                Ok(cast_returns(caster.effects(), &placed, &request, |found| row.add(&found))?)
+            return rows.par_iter_mut().try_for_each(|Row { number, scan, columns }| {
+                let (placed, request) = (self.placed(*number, scan), scan.request(rays));
+                let add = |found| columns.add(&found);
+                Ok(cast_returns(caster.effects(), &placed, &request, add)?)
             });
         }
         let n_jobs = self.scan.scene.instances().len();
         let n_rows = (RAYS_AT_ONCE / (rays.len() * n_jobs).max(1)).max(1);
         let mut before: Option<(&mut [Row<'_, 'a>], Vec<CastJob>, Casting)> = None;
         for rows in rows.chunks_mut(n_rows) {
-            let aimed = rows
-                .par_iter()
-                .map(|row| aim_all(&self.placed(row), &row.scan.request(rays), caster.effects()));
+            let aimed = rows.par_iter().map(|Row { number, scan, .. }| {
+                aim_all(&self.placed(*number, scan), &scan.request(rays), caster.effects())
+            });
             let jobs: Vec<CastJob> = aimed.collect::<Vec<_>>().into_iter().flatten().collect();
             let casting = caster.submit(&jobs)?;
             if let Some(before) = before.replace((rows, jobs, casting)) {
@@ -174,24 +175,23 @@ impl<'a> BatchBuilder<'a> {
             return Ok(());
         }
         let cast = jobs.par_chunks(n).zip(casts.par_chunks(n));
-        rows.par_iter_mut().zip(cast).try_for_each(|(row, cast)| {
-            let (scan, placed) = (row.scan.clone(), self.placed(row));
-            let request = scan.request(rays);
-            let add = |found: BeamReturn| row.add(&found);
+        rows.par_iter_mut().zip(cast).try_for_each(|(Row { number, scan, columns }, cast)| {
+            let (placed, request) = (self.placed(*number, scan), scan.request(rays));
+            let add = |found| columns.add(&found);
             Ok(resolve_returns(caster.effects(), &placed, &request, cast, add)?)
         })
     }
 
-    /// The instances in the world of `row`.
-    fn placed(&self, row: &Row<'_, 'a>) -> Vec<PlacedTarget<'a>> {
+    /// The instances in the world of row `number`, which is scanned as `scan` says.
+    fn placed(&self, number: usize, scan: &ScanBuilder<'a>) -> Vec<PlacedTarget<'a>> {
         let Moves { instances, poses } = self.moves;
-        let of_row = &poses[row.number * instances.len()..][..instances.len()];
+        let of_row = &poses[number * instances.len()..][..instances.len()];
         let mut moved = vec![None; self.scan.scene.instances().len()];
         // The last of an instance that is named twice.
         for (id, pose) in instances.iter().zip(of_row) {
             moved[id.number() as usize] = Some(*pose);
         }
-        row.scan.placed(|number| moved[number as usize])
+        scan.placed(|number| moved[number as usize])
     }
 
     fn check(&self) -> Result<(), InvalidValue> {
@@ -242,10 +242,15 @@ impl<'a> BatchBuilder<'a> {
     }
 }
 
-/// A row on its way into a [`Batch`]. Columns that were not asked for are empty.
+/// A row on its way into a [`Batch`].
 struct Row<'r, 'a> {
     number: usize,
     scan: ScanBuilder<'a>,
+    columns: Columns<'r>,
+}
+
+/// The columns of a row; those that were not asked for are empty.
+struct Columns<'r> {
     range_m: &'r mut [f32],
     object: &'r mut [u32],
     second_range_m: &'r mut [f32],
@@ -253,7 +258,7 @@ struct Row<'r, 'a> {
     power: &'r mut [f32],
 }
 
-impl Row<'_, '_> {
+impl Columns<'_> {
     fn add(&mut self, found: &BeamReturn) {
         let beam = found.beam as usize;
         if found.is_second {

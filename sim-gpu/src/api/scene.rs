@@ -179,6 +179,13 @@ impl Scene {
         (0..self.instances.len() as u32).map(InstanceId)
     }
 
+    /// The handle of the instance with this number, if there is one.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn id(&self, number: u32) -> Option<InstanceId> {
+        ((number as usize) < self.instances.len()).then_some(InstanceId(number))
+    }
+
     /// All instances as a caster takes them. `stream` gives the key of an instance's random numbers by
     /// its name and number; `None` is that of the scan.
     #[doc(hidden)]

@@ -101,10 +101,7 @@ impl Bvh {
         corners: impl Fn(usize) -> [[f32; 3]; 3],
     ) -> Self {
         let (nodes, order) = build_nodes(builder, indices.len(), &corners);
-        let triangle = |at: usize| {
-            let nth = order[at] as usize;
-            LeafTriangle::new(corners(nth), indices[nth])
-        };
+        let triangle = |at: usize| leaf_triangle(order[at], indices, &corners);
         let wide = WideBvh::collapsed(&nodes, &triangle);
         let two_wide = OnceLock::new();
         if indices.len() <= KEPT_UP_TO {
@@ -122,11 +119,10 @@ impl Bvh {
             let mut all: Vec<(u32, [[f32; 3]; 3])> = self.wide.triangles().collect();
             // In the order of the first build, which gives the same tree.
             all.sort_unstable_by_key(|(index, _)| *index);
-            let (nodes, order) = build_nodes(self.builder, all.len(), &|nth| all[nth].1);
-            let triangle = |&nth: &u32| {
-                let (index, corners) = all[nth as usize];
-                LeafTriangle::new(corners, index)
-            };
+            let (indices, corners): (Vec<u32>, Vec<_>) = all.into_iter().unzip();
+            let corners = |nth: usize| corners[nth];
+            let (nodes, order) = build_nodes(self.builder, indices.len(), &corners);
+            let triangle = |nth: &u32| leaf_triangle(*nth, &indices, &corners);
             let triangles = order.iter().map(triangle).collect();
             self.two_wide.get_or_init(|| TwoWide { nodes, triangles })
         })
@@ -141,6 +137,15 @@ impl Bvh {
             .map_or(0, |tree| size_of_val(&tree.nodes[..]) + size_of_val(&tree.triangles[..]));
         of_shaders + self.wide.bytes()
     }
+}
+
+/// Triangle number `nth` of those with these `indices` and `corners`.
+fn leaf_triangle(
+    nth: u32,
+    indices: &[u32],
+    corners: &impl Fn(usize) -> [[f32; 3]; 3],
+) -> LeafTriangle {
+    LeafTriangle::new(corners(nth as usize), indices[nth as usize])
 }
 
 /// The two-wide nodes over `n` triangles, and the number of the triangle at each place of the leaves.

@@ -80,11 +80,10 @@ pub fn scan_objects(
         let (jobs, hits) = cast_nearest_first(objects, request);
         return finish(caster, objects, request, &jobs, hits, !fits);
     }
-    let jobs: Vec<CastJob> = objects.par_iter().map(|object| request.aim(object)).collect();
+    let jobs = aimed(objects, request);
     let casts = caster.cast(&jobs)?;
-    let answered = jobs.par_iter().zip(&casts);
-    let hits = answered.map(|(job, cast)| resolve(job, cast, request.pattern, caster.effects()));
-    finish(caster, objects, request, &jobs, hits.collect(), false)
+    let hits = resolved(&jobs, &casts, request, caster.effects());
+    finish(caster, objects, request, &jobs, hits, false)
 }
 
 /// Gives `each` return of the scan that `request` asks for, as [`each_return`]. The CPU casts.
@@ -102,8 +101,7 @@ pub fn cast_returns(
 /// The rays of the scan that `request` asks for, for an adapter with these effects.
 #[must_use]
 pub fn aim_all(objects: &[PlacedTarget], request: &ScanRequest, effects: &Effects) -> Vec<CastJob> {
-    let request = &request.in_motion(effects);
-    objects.iter().map(|object| request.aim(object)).collect()
+    aimed(objects, &request.in_motion(effects))
 }
 
 /// As [`cast_returns`], from the answers of an adapter to the jobs of [`aim_all`].
@@ -115,10 +113,22 @@ pub fn resolve_returns(
     each: impl FnMut(BeamReturn),
 ) -> Result<(), ScanError> {
     let request = &request.in_motion(effects);
-    let answered = jobs.iter().zip(casts);
-    let hits = answered.map(|(job, cast)| resolve(job, cast, request.pattern, effects));
-    let hits: Vec<Hits> = hits.collect();
+    let hits = resolved(jobs, casts, request, effects);
     Ok(each_return(request, effects, &hits_of(objects, jobs, &hits), each)?)
+}
+
+fn aimed(objects: &[PlacedTarget], request: &ScanRequest) -> Vec<CastJob> {
+    objects.par_iter().map(|object| request.aim(object)).collect()
+}
+
+fn resolved(
+    jobs: &[CastJob],
+    casts: &[Cast],
+    request: &ScanRequest,
+    effects: &Effects,
+) -> Vec<Hits> {
+    let answered = jobs.par_iter().zip(casts);
+    answered.map(|(job, cast)| resolve(job, cast, request.pattern, effects)).collect()
 }
 
 /// Casts on the CPU at the nearest object first, so that a beam that ends there is not cast at

@@ -31,10 +31,6 @@ pub fn attribute<'a>(of: Node<'a, 'a>, name: &str) -> Result<&'a str, ParseError
     of.attribute(name).ok_or_else(missing)
 }
 
-pub fn named<'a>(of: Node<'a, 'a>) -> Result<&'a str, ParseError> {
-    attribute(of, "name")
-}
-
 /// The finite numbers of an attribute, if it is there.
 pub fn numbers<const N: usize>(
     of: Node<'_, '_>,
@@ -78,8 +74,8 @@ pub fn radius(of: Node<'_, '_>) -> Result<f64, ParseError> {
 }
 
 /// The pose of the element `origin`: turned about the fixed axes x, y and z in this order.
-pub fn origin(of: Node<'_, '_>) -> Result<DAffine3, ParseError> {
-    let Some(origin) = of.children().find(|node| node.has_tag_name("origin")) else {
+pub fn origin<'a>(of: Node<'a, 'a>) -> Result<DAffine3, ParseError> {
+    let Some(origin) = child(of, "origin") else {
         return Ok(DAffine3::IDENTITY);
     };
     let position = numbers(origin, "xyz")?.unwrap_or_default();

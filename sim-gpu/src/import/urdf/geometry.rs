@@ -11,8 +11,8 @@ use super::element::{attribute, fault, lengths, numbers, origin, radius, require
 use crate::import::shapes;
 use crate::mesh::{AssembledMesh, Assembly, ParseError, Part, load};
 
-#[derive(Default)]
 /// The parts of links.
+#[derive(Default)]
 pub struct Builder<'a> {
     path: Option<&'a Path>,
     pub assembly: Assembly,

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use glam::{DAffine3, DVec3};
 use roxmltree::Node;
 
-use super::element::{attribute, child, fault, named, numbers, origin, required, within};
+use super::element::{attribute, child, fault, numbers, origin, required, within};
 use crate::import::Import;
 use crate::mesh::ParseError;
 
@@ -19,7 +19,7 @@ pub struct Joint<'a> {
 
 impl<'a> Joint<'a> {
     fn new(node: Node<'a, 'a>, links: &HashMap<&str, usize>) -> Result<Self, ParseError> {
-        let name = named(node)?;
+        let name = attribute(node, "name")?;
         let read = || {
             let kind = attribute(node, "type")?;
             let known = ["revolute", "continuous", "prismatic", "fixed", "floating", "planar"];
@@ -102,7 +102,7 @@ impl<'a> Robot<'a> {
     pub fn new(node: Node<'a, 'a>) -> Result<Self, ParseError> {
         let (mut links, mut numbers) = (Vec::new(), HashMap::new());
         for link in node.children().filter(|node| node.has_tag_name("link")) {
-            let name = named(link)?;
+            let name = attribute(link, "name")?;
             if numbers.insert(name, links.len()).is_some() {
                 let cause = format!("expected links of different names, found two {name:?}");
                 return Err(fault(link, cause));

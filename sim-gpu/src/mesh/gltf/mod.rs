@@ -24,9 +24,8 @@ use animation::{Animation, Rest};
 use buffers::{Buffers, MOST_ELEMENTS, is_index};
 
 /// Extensions that change where triangles are, and are not read.
-const COMPRESSIONS: [&str; 3] =
-    ["KHR_draco_mesh_compression", "EXT_meshopt_compression", INSTANCING];
-/// Without it, the file has one of many instances.
+const NOT_READ: [&str; 3] = ["KHR_draco_mesh_compression", "EXT_meshopt_compression", INSTANCING];
+/// Without it, the file has one of many instances, even where it is not required.
 const INSTANCING: &str = "EXT_mesh_gpu_instancing";
 
 /// All nodes at rest as one mesh. Buffers in other files are in `folder`.
@@ -105,10 +104,9 @@ fn opened(bytes: &[u8]) -> Result<Gltf, String> {
     let Gltf { document, blob } = Gltf::from_slice_without_validation(bytes)
         .map_err(|error| format!("expected glTF 2.0: {error}"))?;
     let mut json = document.into_json();
-    let compression = json.extensions_required.iter().find(|name| COMPRESSIONS.contains(&&***name));
-    let compression =
-        compression.or_else(|| json.extensions_used.iter().find(|name| **name == INSTANCING));
-    if let Some(extension) = compression {
+    let required = json.extensions_required.iter().filter(|name| NOT_READ.contains(&&***name));
+    let used = json.extensions_used.iter().filter(|name| **name == INSTANCING);
+    if let Some(extension) = required.chain(used).next() {
         return Err(format!("expected a file without {extension}: export it without"));
     }
     // Others are of materials and textures.
