@@ -14,8 +14,9 @@ use anyhow::{Context, bail, ensure};
 use edgepuck_assets::SCENE_RECIPES;
 use edgepuck_scenes::{ClusterCounts, LabelledScene, Recipe, Stage, generate};
 use edgepuck_segment::Settings;
+use formats::FormatError;
 use formats::atomic::{self, UnfinishedFolder};
-use formats::hash::of_bytes;
+use formats::hash::{of_bytes, of_file};
 use indicatif::{ProgressBar, ProgressStyle};
 use layout::{Layout, Writer};
 use serde_json::{Value, json};
@@ -108,8 +109,8 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let stage = stage.with_culling(args.caster.culling());
     stage.warnings().iter().for_each(|warning| formats::say!("warning: {warning}"));
     args.overwrite.clear(outputs(), is_written)?;
-    if record.exists() {
-        std::fs::remove_file(&record).with_context(|| record.display().to_string())?;
+    for file in [&preview, &record].into_iter().filter(|file| file.exists()) {
+        std::fs::remove_file(file).with_context(|| file.display().to_string())?;
     }
     let started = Instant::now();
     let style = ProgressStyle::with_template("{bar:40} {pos}/{len} scenes, {per_sec}, {eta} left")?;
@@ -140,7 +141,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     begun_set.into_iter().for_each(UnfinishedFolder::finish);
     begun.finish();
     if let Some(shard) = args.shard {
-        parts::write_record(&args.out, shard, settings(&stage, args))?;
+        parts::write_record(&args.out, shard, settings(&stage, args)?)?;
     }
     bar.finish_and_clear();
     let seconds = started.elapsed().as_secs_f64();
@@ -184,18 +185,20 @@ fn report(
     Ok(())
 }
 
-/// What decides of the files that are written, but for users' meshes.
-fn settings(stage: &Stage, args: &Args) -> Value {
+/// What decides of the files that are written.
+fn settings(stage: &Stage, args: &Args) -> Result<Value, FormatError> {
+    let meshes = stage.mesh_files().iter().map(|file| of_file(file));
     let sensors = stage.profiles().map(|profile| of_bytes(format!("{profile:?}").as_bytes()));
-    json!({
+    Ok(json!({
         "recipe": of_bytes(format!("{:?}", stage.recipe()).as_bytes()),
         "sensors": sensors.collect::<Vec<_>>(),
+        "meshes": meshes.collect::<Result<Vec<_>, _>>()?,
         "sweeps": args.sweeps,
         "seed": args.seed,
         "save": args.save,
         "format": args.format.to_string(),
         "layout": args.layout.map(Layout::name),
-    })
+    }))
 }
 
 /// Whether this command writes files of this name: packed clusters, and sweeps by their numbers.

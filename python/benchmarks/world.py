@@ -1,11 +1,13 @@
 """How fast moving scenes are cast, beside MuJoCo, MuJoCo-LiDAR and Open3D.
 
-    python python/benchmarks/world.py [--rows tori,poses,environments,move] [--rounds 9] [--small]
+    python python/benchmarks/world.py [--rows tori,poses,environments,move,build] [--rounds 9] [--small]
 
 - `tori`: 20 moving tori of 10,000 triangles and a floor, moved before each turn of a VLP-32C;
 - `poses`: 4,096 poses of a 2-D scanner of 359 rays in a room of 50,000 triangles;
 - `environments`: 1,024 environments of 2,048 rays, in each of which 8 objects stand elsewhere;
-- `move`: a turn of a VLP-32C alone, and after a move of 100 objects.
+- `move`: a turn of a VLP-32C alone, and after a move of 100 objects;
+- `build`: what it takes to make tori of 0.5, 5 and 10 million triangles ready to be cast, on one thread, and the
+  most memory that this takes beside the arrays, each in a process of its own.
 
 In each round, the programs take turns on the same poses and rays. The figures are medians of the rounds: milliseconds
 of the wall clock, and rays per CPU-second, which counts all threads; then the medians of the ratios of Edgepuck's rays
@@ -255,6 +257,50 @@ def row_move(rounds: int, share: float) -> None:
     measure("move: 100 objects, VLP-32C", casts, len(sensor.directions), rounds)
 
 
+def build_one(program: str, n: int) -> None:
+    """Build a torus of n triangles, and print the CPU-seconds and the bytes that it took at most."""
+    vertices, faces = torus(n // 4000, 2000)
+    sensor, ray = uniform(2, 1), np.array([[5.0, 0, 0, -1, 0, 0]], np.float32)
+    if program == "edgepuck":
+        vertices, faces = np.ascontiguousarray(vertices), faces.astype(np.int32)
+    else:
+        import open3d
+
+        vertices, faces = vertices.astype(np.float32), faces.astype(np.uint32)
+        open3d_cast(open3d_scene([floor()]), ray, 1)
+    before, start = held(), time.process_time()
+    if program == "edgepuck":
+        scene = ep.Scene()
+        scene.add(ep.Mesh(vertices, faces, normalize="none", units="m"))
+        scene.cast(sensor, AT[None])
+    else:
+        scene = open3d.t.geometry.RaycastingScene(nthreads=1)
+        scene.add_triangles(vertices, faces)
+        open3d_cast(scene, ray, 1)
+    print(time.process_time() - start, 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
+
+
+def held() -> int:
+    """The bytes of memory that this process holds."""
+    status = Path("/proc/self/status").read_text()
+    return 1024 * int(status.split("VmRSS:")[1].split()[0])
+
+
+def row_build(rounds: int, share: float) -> None:
+    programs = ["edgepuck", *(["Open3D"] if HAS["open3d"] else [])]
+    for n in (int(share * 1e6 * millions) for millions in (0.5, 5, 10)):
+        took = {program: [] for program in programs}
+        for _ in range(min(rounds, 3)):
+            for program in programs:
+                command = [sys.executable, __file__, f"--build={program},{n}"]
+                said = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+                took[program].append([float(word) for word in said.split()])
+        print(f"build: a torus of {n / 1e6:g} million triangles, one thread")
+        for program in programs:
+            seconds, most = np.median(took[program], axis=0)
+            print(f"  {program:20} {seconds:9.2f} CPU-s {most / 1e9:8.2f} GB at most", flush=True)
+
+
 def measure(title: str, casts: dict[str, Cast], n_rays: int, rounds: int) -> None:
     """Let the casts take turns; print the medians, and the ratios to the first."""
     first = {name: cast(0) for name, cast in casts.items()}
@@ -284,7 +330,7 @@ def agreement(ours: np.ndarray, theirs: np.ndarray) -> str:
     return f"{(np.isfinite(ours) == np.isfinite(theirs)).mean():.2%} hit alike, 99 % within {1e3 * np.quantile(off, 0.99):.3g} mm"
 
 
-ROWS = {"tori": row_tori, "poses": row_poses, "environments": row_environments, "move": row_move}
+ROWS = {"tori": row_tori, "poses": row_poses, "environments": row_environments, "move": row_move, "build": row_build}
 
 
 def main() -> None:
@@ -292,7 +338,12 @@ def main() -> None:
     parser.add_argument("--rows", default=",".join(ROWS), help="the rows to measure, by default all of them")
     parser.add_argument("--rounds", type=int, default=9)
     parser.add_argument("--small", action="store_true", help="cast a tenth of the poses and environments")
+    parser.add_argument("--build", help=argparse.SUPPRESS)
     words = parser.parse_args()
+    if words.build:
+        ep.set_num_threads(1)
+        program, n = words.build.split(",")
+        return build_one(program, int(n))
     names = words.rows.split(",")
     for name in names:
         if name not in ROWS:

@@ -57,16 +57,15 @@ impl Mesh {
                 raised(format!("faces: expected indices of {n} vertices, found {index}"))
             })
         };
-        let mut triangles = Vec::new();
+        let mut triangles = Vec::with_capacity(faces.shape()[0]);
         for row in faces.as_array().rows() {
             triangles.push([index(&row[0])?, index(&row[1])?, index(&row[2])?]);
         }
         let vertices = vertices.collect();
         let (mesh, warnings) = process::run(py, || {
-            let mesh = sim_gpu::Mesh::from_triangles(vertices, triangles).map_err(raised)?;
+            let mesh = sim_gpu::Mesh::from_triangles_in(vertices, triangles, up, unit);
+            let mesh = mesh.map_err(raised)?;
             let warnings = mesh.warnings().to_vec();
-            let mesh = mesh.scaled(unit.metres()).map_err(raised)?;
-            let mesh = if up == Up::Y { mesh.y_up() } else { mesh };
             Ok::<_, PyErr>((Self::new(&mesh, normalize), warnings))
         })??;
         warn(py, &warnings)?;

@@ -18,8 +18,8 @@ pub struct Surface {
     pub radius: f64,
     vertices: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
-    /// The same triangles, with corners sorted by coordinates.
-    sorted: Vec<[u32; 3]>,
+    /// For each triangle, which of [`ORDERS`] sorts its corners by coordinates.
+    orders: Vec<u8>,
     kept: Vec<u32>,
 }
 
@@ -66,8 +66,8 @@ impl Surface {
         vertices.iter_mut().for_each(|v| *v = frame.to_unit(*v));
         // More than the padding of boxes, 2^-18 on each axis (`bvh::BOX_PADDING`), times sqrt(3).
         let radius = farthest + 1e-5;
-        let sorted = mesh.triangles.iter().map(|&corners| sorted(corners, &vertices)).collect();
-        Self { frame, radius, vertices, triangles: mesh.triangles, sorted, kept }
+        let orders = mesh.triangles.iter().map(|corners| order(corners, &vertices)).collect();
+        Self { frame, radius, vertices, triangles: mesh.triangles, orders, kept }
     }
 
     /// The corners of triangle `index` of the mesh, in the unit frame.
@@ -95,7 +95,9 @@ impl Surface {
     #[must_use]
     #[inline]
     pub(crate) fn sorted_corners(&self, index: u32) -> [DVec3; 3] {
-        self.sorted[index as usize].map(|v| self.vertices[v as usize])
+        let corners = self.triangles[index as usize];
+        let order = ORDERS[usize::from(self.orders[index as usize])];
+        order.map(|nth| self.vertices[corners[nth] as usize])
     }
 
     /// The indices of the triangles that a ray can meet, ascending.
@@ -130,19 +132,31 @@ impl Target {
     /// The bytes that it takes, for memory budgets.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        let Surface { vertices, triangles, sorted, kept, .. } = &*self.surface;
+        let Surface { vertices, triangles, orders, kept, .. } = &*self.surface;
         self.bvh.bytes()
             + size_of_val(&vertices[..])
             + size_of_val(&triangles[..])
-            + size_of_val(&sorted[..])
+            + size_of_val(&orders[..])
             + size_of_val(&kept[..])
     }
 }
 
-fn sorted(mut corners: [u32; 3], vertices: &[DVec3]) -> [u32; 3] {
-    corners.sort_unstable_by(|&a, &b| {
-        let [p, q] = [a, b].map(|v| vertices[v as usize]);
-        p.x.total_cmp(&q.x).then_with(|| p.y.total_cmp(&q.y)).then_with(|| p.z.total_cmp(&q.z))
-    });
-    corners
+/// The orders of three corners.
+const ORDERS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
+
+/// The number of the first of [`ORDERS`] by which the coordinates of `corners` never fall.
+fn order(corners: &[u32; 3], vertices: &[DVec3]) -> u8 {
+    let [a, b, c] = corners.map(|v| vertices[v as usize]);
+    let falls = |p: DVec3, q: DVec3| {
+        let [x, y, z] = [p.x.total_cmp(&q.x), p.y.total_cmp(&q.y), p.z.total_cmp(&q.z)];
+        x.then(y).then(z).is_gt()
+    };
+    match (falls(a, b), falls(b, c), falls(a, c)) {
+        (false, false, _) => 0,
+        (false, true, false) => 1,
+        (true, _, false) => 2,
+        (true, false, true) => 3,
+        (false, true, true) => 4,
+        (true, true, true) => 5,
+    }
 }

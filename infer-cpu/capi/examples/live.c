@@ -1,6 +1,7 @@
 /*
  * live MODEL CAPTURE: prints the objects that a Velodyne saw, one a line: track,
- * class, x y z in metres, number of points. CAPTURE is a file in libpcap's classic
+ * class, x y z in metres, number of points, and the length of the whole object in
+ * metres where its class has a usual size. CAPTURE is a file in libpcap's classic
  * format, of Ethernet frames with IPv4.
  *
  * Build: see ../README.md.
@@ -25,9 +26,14 @@ static void print_objects(EdgepuckLive *live)
 {
     EdgepuckObject object;
     while (edgepuck_live_next(live, &object)) {
-        printf("%llu %s %.3f %.3f %.3f %zu\n", (unsigned long long)object.track,
+        printf("%llu %s %.3f %.3f %.3f %zu ", (unsigned long long)object.track,
                object.class_name != NULL ? object.class_name : "-", object.position_m[0],
                object.position_m[1], object.position_m[2], object.n_points);
+        if (object.whole_size_m[0] > 0) {
+            printf("%.3f\n", object.whole_size_m[0]);
+        } else {
+            puts("-");
+        }
     }
 }
 

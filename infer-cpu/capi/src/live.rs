@@ -48,6 +48,14 @@ pub struct EdgepuckObject {
     pub first_s: f64,
     /// When the last point was measured.
     pub last_s: f64,
+    /// The middle of the box of the whole object, metres, in the sensor's frame: its near side is that
+    /// of the box around the points, and its size and direction are from all clusters of the object. This
+    /// and the next two fields are NaN if the class has no usual size.
+    pub whole_position_m: [f64; 3],
+    /// Length, width and height of the box of the whole object, metres.
+    pub whole_size_m: [f64; 3],
+    /// The direction of its length, degrees counterclockwise from x, -180 to 180.
+    pub whole_yaw_deg: f64,
 }
 
 /// The numbers of packets since the start.
@@ -87,6 +95,7 @@ impl EdgepuckObject {
     fn new(object: &Object, names: &[CString]) -> Self {
         let name = object.class.as_deref().map(str::as_bytes);
         let name = names.iter().find(|known| Some(known.as_bytes()) == name);
+        let whole = object.whole_box;
         Self {
             track: object.track,
             turn: object.turn,
@@ -99,6 +108,9 @@ impl EdgepuckObject {
             n_points: object.points,
             first_s: object.first_s,
             last_s: object.last_s,
+            whole_position_m: whole.map_or([f64::NAN; 3], |whole| whole.centre_m),
+            whole_size_m: whole.map_or([f64::NAN; 3], |whole| whole.size_m),
+            whole_yaw_deg: whole.map_or(f64::NAN, |whole| whole.yaw_deg),
         }
     }
 }

@@ -62,7 +62,7 @@ fn the_example_of_packets_gives_what_the_rust_library_gives() {
     let compiler = need!(EDGEPUCK.c());
     let example = compiler.compile("examples/live.c", &EDGEPUCK.static_link());
     let model = compiler.folder().join("model.safetensors");
-    support::write_longest_axis_model(&model);
+    support::write_longest_axis_model_of(["car", "person", "truck"], &model);
     let sent = street::packets(&street::street(), 7, street::PACKETS_PER_S);
     let time_us = |i: usize| 1_000_000_000 + (i as f64 * street::PACKET_S * 1e6) as u64;
     let capture = compiler.folder().join("drive.pcap");
@@ -75,8 +75,9 @@ fn the_example_of_packets_gives_what_the_rust_library_gives() {
     let mut write = |object: &Object| {
         let [x, y, z] = object.position_m;
         let class = object.class.as_deref().unwrap_or("-");
-        let line = format!("{} {class} {x:.3} {y:.3} {z:.3} {}\n", object.track, object.points);
-        expected.push_str(&line);
+        let length = object.whole_box.map_or("-".into(), |whole| format!("{:.3}", whole.size_m[0]));
+        let (track, points) = (object.track, object.points);
+        expected += &format!("{track} {class} {x:.3} {y:.3} {z:.3} {points} {length}\n");
     };
     for (i, packet) in sent.iter().enumerate() {
         let (seconds, micros) = (time_us(i) / 1_000_000, time_us(i) % 1_000_000);
@@ -90,6 +91,8 @@ fn the_example_of_packets_gives_what_the_rust_library_gives() {
     assert_eq!(text(&output.stderr), "754 packets, 0 lost, 0 foreign\n");
     assert_eq!(text(&output.stdout), expected);
     assert!(expected.lines().count() > 20);
+    let n_whole = expected.lines().filter(|line| !line.ends_with(" -")).count();
+    assert!(n_whole > 10, "{expected}");
 
     std::fs::write(&capture, "no capture").unwrap();
     let output = run(&example, &[&model, &capture]);

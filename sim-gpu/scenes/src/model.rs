@@ -55,12 +55,19 @@ pub(crate) fn shared(mesh: TriangleMesh, builder: Builder) -> Mesh {
     Mesh::from_target(Target::new(Surface::new(mesh, kept), builder), DVec3::ZERO)
 }
 
+/// The files of the user's meshes, and what is doubtful about them.
+#[derive(Default)]
+pub(crate) struct UserFiles {
+    pub(crate) files: Vec<PathBuf>,
+    pub(crate) warnings: Vec<String>,
+}
+
 /// Reads the user's meshes for the entry `objects`, from a folder in `meshes`.
 pub(crate) fn user_models(
     objects: &Objects,
     meshes: Option<&Path>,
     seed: u64,
-    warnings: &mut Vec<String>,
+    read: &mut UserFiles,
 ) -> Result<Vec<OnceLock<Model>>, SceneError> {
     let name = objects.meshes.as_deref().unwrap_or_default();
     let missing =
@@ -78,10 +85,11 @@ pub(crate) fn user_models(
     let models = files.iter().zip(0..).map(|(file, n)| {
         let loaded = mesh::load(file)?;
         let doubts = loaded.warnings.iter();
-        warnings.extend(doubts.map(|doubt| format!("{}: {doubt}", file.display())));
+        read.warnings.extend(doubts.map(|doubt| format!("{}: {doubt}", file.display())));
         let world = to_world(&loaded.mesh, loaded.format.default_up(), Normalize::None);
         let model = Model::scaled(world.mesh, span.at(stream.unit(n)));
         let flat = || SceneError::FlatMesh { file: file.clone() };
+        read.files.push(file.clone());
         Ok(OnceLock::from(model.ok_or_else(flat)?))
     });
     models.collect()

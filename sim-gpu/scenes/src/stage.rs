@@ -1,6 +1,6 @@
 //! What all scenes of a recipe share: sensors with their casters, and models of objects.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
 use formats::streams::Stream;
@@ -13,7 +13,7 @@ use sim_gpu::internals::sensor::SensorProfile;
 use sim_gpu::{Caster, Glass, InstanceId, Mesh, Pose, Scene, Sensor};
 
 use crate::error::SceneError;
-use crate::model::{Model, user_models};
+use crate::model::{Model, UserFiles, user_models};
 use crate::placed_object::PlacedObject;
 use crate::recipe::Recipe;
 
@@ -26,7 +26,7 @@ pub struct Stage {
     pub(crate) culling: Culling,
     /// By entry of the recipe and by variant; built-in models are built when first used.
     models: Vec<Vec<OnceLock<Model>>>,
-    warnings: Vec<String>,
+    user_files: UserFiles,
 }
 
 pub(crate) struct StageSensor {
@@ -82,20 +82,26 @@ impl Stage {
             sensor.rays(&effects).map_err(in_file)?;
             sensors.push(StageSensor { sensor, caster: caster.for_effects(&effects)? });
         }
-        let mut warnings = Vec::new();
+        let mut user_files = UserFiles::default();
         let models = recipe.object.iter().map(|objects| match objects.built_in() {
             Some(_) => Ok((0..recipe.variants).map(|_| OnceLock::new()).collect()),
-            None => user_models(objects, meshes, seed, &mut warnings),
+            None => user_models(objects, meshes, seed, &mut user_files),
         });
         let models = models.collect::<Result<_, SceneError>>()?;
         let (classes, culling) = (recipe.classes(), Culling::On);
-        Ok(Self { classes, recipe, seed, sensors, culling, models, warnings })
+        Ok(Self { classes, recipe, seed, sensors, culling, models, user_files })
     }
 
     /// What is doubtful about the files of the user's meshes.
     #[must_use]
     pub fn warnings(&self) -> &[String] {
-        &self.warnings
+        &self.user_files.warnings
+    }
+
+    /// The files of the user's meshes, in the order in which they are read.
+    #[must_use]
+    pub fn mesh_files(&self) -> &[PathBuf] {
+        &self.user_files.files
     }
 
     /// The same stage with another `culling`, which changes the time of a sweep, not its points.

@@ -76,8 +76,19 @@ impl Mesh {
         vertices: Vec<[f64; 3]>,
         triangles: Vec<[u32; 3]>,
     ) -> Result<Self, Error> {
-        let vertices = vertices.into_iter().map(DVec3::from_array).collect();
-        Self::try_from(TriangleMesh { vertices, triangles })
+        Self::from_triangles_in(vertices, triangles, Up::Z, Unit::Metre)
+    }
+
+    /// As [`Mesh::from_triangles`], of arrays whose upward axis or unit may be another.
+    #[doc(hidden)]
+    pub fn from_triangles_in(
+        vertices: Vec<[f64; 3]>,
+        triangles: Vec<[u32; 3]>,
+        up: Up,
+        unit: Unit,
+    ) -> Result<Self, Error> {
+        let vertices = vertices.into_iter().map(|v| z_up(DVec3::from_array(v), up)).collect();
+        Self::try_from(TriangleMesh { vertices, triangles }.in_metres(unit))
     }
 
     /// The same mesh of a file whose y axis points up: (x, y, z) becomes (x, -z, y).

@@ -15,10 +15,15 @@ pub const EDGEPUCK: Package = Package {
     library: "edgepuck",
 };
 
-/// Writes a model of three classes: a cloud in the positive octant is of the axis along which it
-/// reaches farthest. A trunk that passes coordinates on, the maximum over points, a head that
-/// passes them on.
+/// Writes a model of the classes x, y and z: a cloud in the positive octant is of the axis along which
+/// it reaches farthest.
 pub fn write_longest_axis_model(path: &Path) {
+    write_longest_axis_model_of(["x", "y", "z"], path);
+}
+
+/// As [`write_longest_axis_model`], with other names of the classes. A trunk that passes coordinates
+/// on, the maximum over points, a head that passes them on.
+pub fn write_longest_axis_model_of(classes: [&str; 3], path: &Path) {
     let identity = Tensor { shape: vec![3, 3], values: vec![1., 0., 0., 0., 1., 0., 0., 0., 1.] };
     let zeros = Tensor { shape: vec![3], values: vec![0.0; 3] };
     let layers = ["feat.conv1", "feat.conv2", "fc1"].into_iter().flat_map(|layer| {
@@ -26,7 +31,7 @@ pub fn write_longest_axis_model(path: &Path) {
         [weight, (format!("{layer}.bias"), zeros.clone())]
     });
     let card = ModelCard {
-        classes: ["x", "y", "z"].map(str::to_owned).to_vec(),
+        classes: classes.map(str::to_owned).to_vec(),
         normalization: Normalization::None,
         ..ModelCard::default()
     };
