@@ -265,6 +265,20 @@ typedef struct EdgepuckObject {
    * When the last point was measured.
    */
   double last_s;
+  /**
+   * The middle of the box of the whole object, metres, in the sensor's frame: its near side is that
+   * of the box around the points, and its size and direction are from all clusters of the object. This
+   * and the next two fields are NaN if the class has no usual size.
+   */
+  double whole_position_m[3];
+  /**
+   * Length, width and height of the box of the whole object, metres.
+   */
+  double whole_size_m[3];
+  /**
+   * The direction of its length, degrees counterclockwise from x, -180 to 180.
+   */
+  double whole_yaw_deg;
 } EdgepuckObject;
 
 /**
