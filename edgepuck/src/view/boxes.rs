@@ -27,8 +27,8 @@ struct Object {
     confidence: Option<f64>,
     probability: Option<f64>,
     frame: Option<String>,
-    whole_box: Option<Box>,
-    r#box: Option<Box>,
+    whole_box: Option<Cuboid>,
+    r#box: Option<Cuboid>,
     /// Beside the size and the direction: the middle, or of `gen-scenes` that of the base.
     #[serde(alias = "centre_m")]
     position_m: Option<[f64; 3]>,
@@ -37,7 +37,7 @@ struct Object {
 }
 
 #[derive(Clone, Copy, Deserialize)]
-struct Box {
+struct Cuboid {
     centre_m: [f64; 3],
     size_m: [f64; 3],
     yaw_deg: f64,
@@ -74,9 +74,9 @@ impl Object {
     fn placed(self, in_world: bool) -> Option<Placed> {
         let own = || {
             let (centre_m, size_m) = (self.position_m?, self.size_m?);
-            Some(Box { centre_m, size_m, yaw_deg: self.yaw_deg? })
+            Some(Cuboid { centre_m, size_m, yaw_deg: self.yaw_deg? })
         };
-        let Box { centre_m, size_m, yaw_deg } = self.whole_box.or(self.r#box).or_else(own)?;
+        let Cuboid { centre_m, size_m, yaw_deg } = self.whole_box.or(self.r#box).or_else(own)?;
         Some(Placed {
             class: self.class,
             centre: centre_m,

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// The most points of a page: of a longer drive, every second or third sweep is shown, and so on.
-const MOST_POINTS: usize = 6_000_000;
+const MOST_POINTS: usize = 3_000_000;
 
 #[derive(clap::Args)]
 pub struct Args {
