@@ -176,7 +176,7 @@ mod tests {
         let picture = |corners: Option<[f64; 2]>| {
             let [low, high] = corners.unwrap_or_default();
             let corners = [[low, 0.0], [high, 0.0], [high, 0.5], [low, 0.5]];
-            let tint = plotters::style::RGBColor(9, 9, 9);
+            let tint = RGBColor(9, 9, 9);
             let outline = panel::Outline { corners, class: "car", score: 0.5, tint };
             let outlines = if high > low { vec![outline] } else { vec![] };
             draw_from_above(&scan, &[tint; 99], &outlines, "", &out).unwrap();

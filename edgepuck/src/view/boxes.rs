@@ -65,7 +65,7 @@ pub fn read(file: &Path) -> Result<Vec<Placed>, FormatError> {
     let is_seen = |object: &Object| sensor_pose.is_none() || object.points != Some(0);
     let objects = objects.into_iter().filter(is_seen).filter_map(|object| object.placed(false));
     Ok(match sensor_pose {
-        Some(pose) => objects.map(|placed| seen_from(pose, placed).as_truth()).collect(),
+        Some(pose) => objects.map(|placed| seen_from(pose, placed)).collect(),
         None => objects.collect(),
     })
 }
@@ -91,11 +91,11 @@ impl Object {
     }
 }
 
-/// A box with this base in the street's frame, from the sensor.
+/// The truth of a box with this base in the street's frame, from the sensor.
 fn seen_from(pose: Pose, placed: Placed) -> Placed {
     let back = pose.rotation.inverse();
     let middle = DVec3::from(placed.centre) + 0.5 * placed.size[2] * DVec3::Z;
     let ahead = back * (DQuat::from_rotation_z(placed.yaw) * DVec3::X);
     let centre = (back * (middle - pose.position_m)).to_array();
-    Placed { centre, yaw: ahead.y.atan2(ahead.x), ..placed }
+    Placed { centre, yaw: ahead.y.atan2(ahead.x), truth: true, ..placed }
 }

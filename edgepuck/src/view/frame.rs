@@ -184,12 +184,6 @@ impl Frame {
     }
 }
 
-impl Placed {
-    pub fn as_truth(self) -> Self {
-        Self { truth: true, ..self }
-    }
-}
-
 /// A sensor at the origin, which looks along x.
 pub const IDENTITY: [f64; 16] = [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.];
 

@@ -11,7 +11,7 @@ use crate::{Outcome, Usage};
 use anyhow::ensure;
 use files::Content;
 use formats::outputs::{Overwrite, need_extension};
-use frame::Pane;
+use frame::{Pane, Placed};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -83,7 +83,8 @@ fn panes(args: &Args) -> anyhow::Result<Vec<Pane>> {
         panes[pane].add(found, file)?;
     }
     if let Some(file) = &args.truth {
-        let found = boxes::read(file)?.into_iter().map(frame::Placed::as_truth).collect::<Vec<_>>();
+        let truth = |placed| Placed { truth: true, ..placed };
+        let found: Vec<_> = boxes::read(file)?.into_iter().map(truth).collect();
         for pane in &mut panes {
             pane.add(found.clone(), file)?;
         }
