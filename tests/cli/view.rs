@@ -18,7 +18,7 @@ fn bytes(block: &Value) -> Vec<u8> {
     STANDARD.decode(base64.as_str().unwrap()).unwrap()
 }
 
-fn frame<'a>(data: &'a Value, pane: usize) -> &'a Value {
+fn frame(data: &Value, pane: usize) -> &Value {
     &data["panes"][pane]["frames"][0]
 }
 
