@@ -24,7 +24,8 @@ use sweep_file::SweepFormat;
 
 use crate::caster::CasterArgs;
 use crate::shard::Shard;
-use crate::{Outcome, Usage, preview, segment};
+use crate::view::frame::Labels;
+use crate::{Outcome, Usage, preview};
 use formats::outputs::Overwrite;
 
 #[derive(clap::Args)]
@@ -128,9 +129,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
         n_points += done.sweep.points().len();
         done.scene.objects.iter().for_each(|object| stand[object.entry] = true);
         if done.scene.number == 0 {
-            let LabelledScene { sweep, labels, .. } = done;
-            let tints: Vec<_> = labels.iter().map(|&label| segment::tint(label)).collect();
-            preview::draw_from_above(&sweep.scan, &tints, &[], "scene 0", &preview)?;
+            draw(&stage, done, &preview)?;
         }
         if let Some(set) = &set {
             set.add(&stage, done)?;
@@ -158,6 +157,13 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
         return Ok(Outcome::SomeRefused);
     }
     Ok(Outcome::Success)
+}
+
+/// Draws the sweep of a scene, each point in the colour of its class.
+fn draw(stage: &Stage, done: &LabelledScene, out: &Path) -> anyhow::Result<()> {
+    let (names, values) = sweep_file::point_classes(stage, done);
+    let labels = Labels { name: "class", values, names: Some(names) };
+    preview::draw(&done.sweep.scan, Some(&labels), None, "scene 0", out)
 }
 
 /// Prints the clusters of each class, and what a whole set, of which a part need not have all, lacks.

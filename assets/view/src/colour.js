@@ -1,0 +1,56 @@
+// Colours of points and boxes. The one table is colours.json, which the Rust programs read, too.
+import table from "../colours.json";
+
+const rgb = (hex) => [1, 3, 5].map((at) => Number.parseInt(hex.slice(at, at + 2), 16));
+const ramp = table.ramp.map(rgb);
+const palette = table.palette.map(rgb);
+const GREY = [150, 150, 150];
+const SHADES = 256;
+const MOST_SAMPLED = 20000;
+
+export const css = ([red, green, blue]) => `rgb(${red}, ${green}, ${blue})`;
+export const rampCss = `linear-gradient(to right, ${table.ramp.join(", ")})`;
+
+/** The colour of the object, cluster or track with this number. */
+export const numberColour = (number) => palette[number % palette.length];
+
+/** The colour of a class, the same in all pictures: of one that the table lacks, by its name. */
+export function classColour(name) {
+  const known = table.classes[name];
+  // FNV-1a, as in Rust.
+  const mix = (hash, byte) => Math.imul(hash ^ byte, 0x01000193) >>> 0;
+  return known ? rgb(known) : numberColour(new TextEncoder().encode(name).reduce(mix, 0x811c9dc5));
+}
+
+export const nameOf = (column, value) => column.names?.[value] ?? `${value}`;
+
+/** How a column's values become colours, by `look`: from `low` to `high`, or each of `entries` its own. */
+export const scaleOf = (column) => (column.kind === "number" ? rampOf(column.values) : entriesOf(column));
+
+function entriesOf(column) {
+  const counts = new Map();
+  for (const value of column.values) counts.set(value, (counts.get(value) ?? 0) + 1);
+  const entries = [...counts].sort((a, b) => b[1] - a[1]).map(([value, count]) => ({ value, count }));
+  const colour = (value) => {
+    if (column.kind === "class") return classColour(nameOf(column, value));
+    return value === 0xffffffff ? classColour("air") : numberColour(value);
+  };
+  const colours = new Map(entries.map(({ value }) => [value, colour(value)]));
+  return { entries, look: (value) => colours.get(value) };
+}
+
+/** Without the least and the greatest values: a few far ones would take all colours. */
+function rampOf(values) {
+  const step = Math.ceil(values.length / MOST_SAMPLED);
+  const sample = values.filter((value, i) => i % step === 0 && Number.isFinite(value)).sort();
+  const [first, last] = [0.02, 0.96].map((share) => sample[Math.round(share * (sample.length - 1))] ?? 0);
+  const [low, high] = last > first ? [first, last] : [first - 0.5, first + 0.5];
+  const shades = Array.from({ length: SHADES }, (_, i) => {
+    const place = (i / (SHADES - 1)) * (ramp.length - 1);
+    const [left, right] = [ramp[Math.floor(place)], ramp[Math.ceil(place)]];
+    return left.map((x, j) => Math.round(x + (right[j] - x) * (place % 1)));
+  });
+  const factor = (SHADES - 1) / (high - low);
+  const look = (value) => shades[Math.min(SHADES - 1, Math.max(0, Math.round((value - low) * factor)))] ?? GREY;
+  return { low, high, look };
+}
