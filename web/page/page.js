@@ -72,16 +72,16 @@ function fields({ sensors, subjects }) {
 let file;
 const controls = {};
 
-const valueOf = (name) => controls[name].value;
+const chosen = (name) => controls[name].value;
 const settings = () => ({
-  sensor: valueOf("sensor"),
-  distance_m: Number(valueOf("distance")),
-  elevation_deg: Number(valueOf("elevation")),
-  azimuth_deg: Number(valueOf("azimuth")),
-  noise_m: Number(valueOf("noise")),
-  rain_mm_h: Number(valueOf("rain")),
-  fog_m: Number(valueOf("fog")),
-  returns: valueOf("returns") || null,
+  sensor: chosen("sensor"),
+  distance_m: Number(chosen("distance")),
+  elevation_deg: Number(chosen("elevation")),
+  azimuth_deg: Number(chosen("azimuth")),
+  noise_m: Number(chosen("noise")),
+  rain_mm_h: Number(chosen("rain")),
+  fog_m: Number(chosen("fog")),
+  returns: chosen("returns") || null,
 });
 
 function drawFields(all) {
@@ -133,7 +133,7 @@ function pane({ scan }, name) {
     columns.unshift({ name: "class", kind: "class", values, names: names.map((label) => label || "ground") });
   }
   const points = { position: positions, columns };
-  const sensors = [{ name: valueOf("sensor"), pose: Array.from(pose) }];
+  const sensors = [{ name: chosen("sensor"), pose: Array.from(pose) }];
   const meshes = data.mesh?.index.length ? [data.mesh] : [];
   return { name, frames: [{ name, points, sensors, meshes }] };
 }
@@ -175,9 +175,9 @@ async function update() {
   document.body.dataset.state = "busy";
   while (isStale) {
     isStale = false;
-    const subject = file ?? { name: valueOf("mesh"), key: valueOf("mesh") };
+    const subject = file ?? { name: chosen("mesh"), key: chosen("mesh") };
     const isNew = shownSubject !== subject.key;
-    const request = { runs: valueOf("run"), model: valueOf("model"), subject, settings: settings(), wantsMesh: isNew };
+    const request = { runs: chosen("run"), model: chosen("model"), subject, settings: settings(), wantsMesh: isNew };
     try {
       const reply = await ask(request);
       shownSubject = subject.key;
@@ -195,9 +195,9 @@ async function update() {
 }
 
 let nFiles = 0;
-async function take(chosen) {
-  if (!chosen) return;
-  file = { name: chosen.name, bytes: new Uint8Array(await chosen.arrayBuffer()), key: `file ${nFiles++}` };
+async function take(given) {
+  if (!given) return;
+  file = { name: given.name, bytes: new Uint8Array(await given.arrayBuffer()), key: `file ${nFiles++}` };
   await update();
 }
 

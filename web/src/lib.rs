@@ -9,7 +9,9 @@ mod subject;
 use infer_cpu::{Classifier, Options};
 use settings::Settings;
 use sim_gpu::formats::scan::Attribute;
-use sim_gpu::{Caster, Mesh, Sensor};
+use sim_gpu::internals::resolve::resolve;
+use sim_gpu::internals::scan::{ScanRequest, aim_all};
+use sim_gpu::{Caster, Effects, Mesh, Sensor};
 use subject::Subject;
 use wasm_bindgen::prelude::wasm_bindgen;
 
@@ -48,6 +50,17 @@ pub struct Scanned {
     pub pose: Vec<f64>,
     /// The labels of the instances, separated by commas.
     pub labels: String,
+}
+
+/// What a caster finds, without effects.
+#[wasm_bindgen(getter_with_clone)]
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Traced {
+    /// The caster's answer for each ray: a triangle, or none, and whether f64 decides.
+    pub codes: Vec<u32>,
+    /// The ranges of the rays that hit, metres.
+    pub ranges: Vec<f64>,
 }
 
 /// What the network calls a scan.
@@ -141,10 +154,7 @@ impl Simulator {
     /// # Errors
     /// A setting is out of its bounds; the sensor lacks what an effect needs; the adapter failed.
     pub async fn scan(&mut self, settings: &str) -> Result<Scanned, Words> {
-        let settings: Settings = serde_json::from_str(settings).map_err(words)?;
-        if self.sensor.name() != settings.sensor {
-            self.sensor = Sensor::named(&settings.sensor).map_err(words)?;
-        }
+        let settings = self.set(settings)?;
         let (scene, pose) = self.subject.scene(&settings);
         let attributes = [
             Attribute::Range,
@@ -171,6 +181,25 @@ impl Simulator {
         })
     }
 
+    /// What the caster finds by the sensor, the distance and the angles of `settings`: what tests compare
+    /// bit by bit.
+    ///
+    /// # Errors
+    /// As [`Simulator::scan`].
+    pub async fn trace(&mut self, settings: &str) -> Result<Traced, Words> {
+        let settings = self.set(settings)?;
+        let (scene, pose) = self.subject.scene(&settings);
+        let (plain, pattern) = (Effects::default(), self.sensor.pattern());
+        let placed = scene.placed(|_, _| None);
+        let jobs =
+            aim_all(&placed, &ScanRequest::new(self.sensor.profile(), pattern, pose), &plain);
+        let caster = self.caster.for_effects_async(&plain).await.map_err(words)?;
+        let casts = caster.cast_async(&jobs).await.map_err(words)?;
+        let solved = jobs.iter().zip(&casts).map(|(job, cast)| resolve(job, cast, pattern, &plain));
+        let ranges = solved.flat_map(|found| found.hits).map(|hit| hit.range_m).collect();
+        Ok(Traced { codes: casts.into_iter().flat_map(|cast| cast.codes).collect(), ranges })
+    }
+
     /// What the network calls the points of `scanned`; nothing without a network, without points, and
     /// for a street.
     ///
@@ -186,6 +215,17 @@ impl Simulator {
         let found = classifier.classify(points).map_err(words)?;
         let probability = found.confidence();
         Ok(Some(Answer { class: found.answer().to_owned(), probability }))
+    }
+}
+
+impl Simulator {
+    /// The settings in this JSON, whose sensor is taken from now on.
+    fn set(&mut self, settings: &str) -> Result<Settings, Words> {
+        let settings: Settings = serde_json::from_str(settings).map_err(words)?;
+        if self.sensor.name() != settings.sensor {
+            self.sensor = Sensor::named(&settings.sensor).map_err(words)?;
+        }
+        Ok(settings)
     }
 }
 

@@ -131,7 +131,11 @@ impl Caster {
     }
 
     /// As [`Caster::for_effects`], in a browser too.
-    pub(super) async fn for_effects_async(
+    ///
+    /// # Errors
+    /// As [`Caster::for_effects`].
+    #[doc(hidden)]
+    pub async fn for_effects_async(
         &self,
         effects: &Effects,
     ) -> Result<Arc<OpenCaster>, CastError> {
