@@ -72,6 +72,12 @@ pub const TASK_SCRIPT: &str = include_str!("jobs/task.txt");
 /// recommends from.
 pub const ADVISE_RECORD: &str = include_str!("advise.csv");
 
+/// The viewer of `edgepuck view` with three.js, as JavaScript.
+pub const VIEWER: &str = include_str!("view/viewer.js");
+
+/// The colours of pictures and pages, as JSON.
+pub const COLOURS: &str = include_str!("view/colours.json");
+
 /// The bundled models: a model's name and the bytes of its file.
 pub const MODELS: [(&str, &[u8]); 3] = [
     ("edge-64", include_bytes!("weights/edge-64.safetensors")),

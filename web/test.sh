@@ -19,5 +19,5 @@ npx biome ci --error-on-warnings .
 out="${CARGO_TARGET_DIR:-../target}/web"
 rm -rf "$out"
 sh build.sh "$out/page"
-cargo run --release --package edgepuck-web --example traced -- "$out/traced"
+cargo run --profile test --package edgepuck-web --example traced -- "$out/traced"
 CHROMIUM="$chromium" node test/browser.mjs "$out/page" "$out/traced"

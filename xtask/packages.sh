@@ -8,7 +8,7 @@
 set -eu
 
 backported="mesa-vulkan-drivers libvulkan1"
-plain="g++ lintian munge parallel pcl-tools qemu-user slurm-wlm libusb-1.0-0"
+plain="chromium g++ lintian munge parallel pcl-tools qemu-user slurm-wlm libusb-1.0-0"
 targets="aarch64-unknown-linux-musl aarch64-apple-darwin x86_64-pc-windows-msvc \
     wasm32-unknown-unknown wasm32-wasip1"
 # The releases of LLVM whose llvm-mca knows Neoverse N1, the newest first.

@@ -3,7 +3,7 @@
 use crate::{
     Outcome, adapters, calibrate, card, cluster, corrupt, gen_dataset, gen_drive, gen_scenes,
     gen_shapes, merge_dataset, outcome, preview_scan, profile, sample_surfaces, scan, segment,
-    signals, weather,
+    signals, view, weather,
 };
 #[cfg(feature = "models")]
 use crate::{advise, detect, export_onnx, import_weights};
@@ -43,8 +43,10 @@ enum Command {
     /// Find and classify the objects in a sweep
     #[cfg(feature = "models")]
     Detect(detect::DetectArgs),
-    /// Draw a picture of a scan from the side, from above and from the front
+    /// Draw a picture of points: a sweep from above, others from the side, from above and the front
     Preview(preview_scan::Args),
+    /// Show points, meshes, boxes and scenes in three dimensions, in a page for the browser
+    View(view::Args),
     /// List the built-in sensors, or check and describe a sensor profile
     Profile(profile::ProfileArgs),
     /// Measure a sensor from captures or sweeps at rest, and write its profile
@@ -134,6 +136,7 @@ fn run(command: &Command) -> anyhow::Result<Outcome> {
         #[cfg(feature = "models")]
         Command::Detect(args) => detect::run(args),
         Command::Preview(args) => preview_scan::run(args),
+        Command::View(args) => view::run(args),
         Command::Profile(args) => profile::run(args),
         Command::Calibrate(args) => calibrate::run(args),
         Command::Adapters => adapters::run(),

@@ -7,7 +7,6 @@ use edgepuck_segment::{Hierarchy, Label, Node, OrientedBox, Segmenter, Settings,
 use formats::{Scan, atomic};
 use infer_cpu::rule::{MARGIN_OF_WHOLES, Rule};
 use infer_cpu::{Classifier, ClassifierTeam, Options, Precision, Prediction, usual_size_m};
-use plotters::style::RGBColor;
 use serde_json::{Value, json};
 
 use crate::flags::probability;
@@ -15,8 +14,7 @@ use crate::kitti::{Camera, corners, line};
 use crate::points::SweepArgs;
 use crate::preview::panel::Outline;
 use crate::segment::tint;
-use crate::street::StreetClass;
-use crate::{Outcome, Usage, preview};
+use crate::{Outcome, Usage, colours, preview};
 use formats::outputs::{Overwrite, need_extension};
 
 /// The least confidence of an object, chosen by the false alarms on labelled sweeps
@@ -93,7 +91,7 @@ pub(crate) fn run(args: &DetectArgs) -> anyhow::Result<Outcome> {
     atomic::write_bytes(&args.out, written)?;
     // Greys: clusters without an object are darker than all around them.
     let tints = labels.iter().map(|&label| match (found.object(label), label) {
-        (Some(object), _) => objects[object].tint(),
+        (Some(object), _) => colours::of_class(&objects[object].class),
         (None, Label::Cluster(_)) => tint(Label::Ground),
         (None, _) => tint(Label::Small),
     });
@@ -106,7 +104,7 @@ pub(crate) fn run(args: &DetectArgs) -> anyhow::Result<Outcome> {
                 corners: [a, b, c, d].map(|corner| corner.truncate().to_array()),
                 class: &object.class,
                 score: object.confidence,
-                tint: object.tint(),
+                tint: colours::of_class(&object.class),
             }
         })
         .collect();
@@ -224,8 +222,6 @@ pub struct Object {
     pub cluster: u32,
     /// Its class.
     pub class: String,
-    /// The number of its class among those of the model.
-    pub class_number: usize,
     /// The confidence of the network in the class, 0 to 1.
     pub confidence: f64,
     /// The number of its points.
@@ -246,17 +242,10 @@ impl Object {
             whole: usual_size_m(&class)
                 .map_or(place, |usual_m| place.completed(usual_m, ground_z_m)),
             class,
-            class_number: answer.class,
             confidence: answer.confidence(),
             n_points: cloud.len(),
             place,
         }
-    }
-
-    /// The colour of its class.
-    fn tint(&self) -> RGBColor {
-        let of_number = tint(Label::Cluster(self.class_number as u32));
-        StreetClass::named(&self.class).map_or(of_number, |class| class.tint)
     }
 
     fn json(&self) -> Value {

@@ -23,7 +23,8 @@ use sweep_file::SweepFormat;
 
 use crate::caster::CasterArgs;
 use crate::shard::Shard;
-use crate::{Outcome, Usage, preview, segment};
+use crate::view::frame::{Labels, Points};
+use crate::{Outcome, Usage, preview};
 use formats::outputs::Overwrite;
 
 #[derive(clap::Args)]
@@ -127,9 +128,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
         n_points += done.sweep.points().len();
         done.scene.objects.iter().for_each(|object| stand[object.entry] = true);
         if done.scene.number == 0 {
-            let LabelledScene { sweep, labels, .. } = done;
-            let tints: Vec<_> = labels.iter().map(|&label| segment::tint(label)).collect();
-            preview::draw_from_above(&sweep.scan, &tints, &[], "scene 0", &preview)?;
+            draw(&stage, done, &preview)?;
         }
         if let Some(set) = &set {
             set.add(&stage, done)?;
@@ -157,6 +156,13 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
         return Ok(Outcome::SomeRefused);
     }
     Ok(Outcome::Success)
+}
+
+/// Draws the sweep of a scene, each point in the colour of its class.
+fn draw(stage: &Stage, done: &LabelledScene, out: &Path) -> anyhow::Result<()> {
+    let (names, values) = sweep_file::point_classes(stage, done);
+    let labels = vec![Labels { name: "class", values, names: Some(names) }];
+    preview::draw(&Points { scan: done.sweep.scan.clone(), labels }, None, "scene 0", out)
 }
 
 /// Prints the clusters of each class, and what a whole set, of which a part need not have all, lacks.

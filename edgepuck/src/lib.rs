@@ -9,6 +9,7 @@ mod card;
 mod caster;
 pub mod cli;
 mod cluster;
+mod colours;
 mod corrupt;
 #[cfg(feature = "models")]
 pub mod detect;
@@ -38,6 +39,7 @@ mod signals;
 pub mod significant_digits;
 #[cfg_attr(not(feature = "models"), allow(dead_code, reason = "`detect` uses the rest"))]
 mod street;
+mod view;
 mod weather;
 
 pub use formats::outcome::{self, Outcome, Usage};

@@ -1,6 +1,7 @@
 //! `edgepuck preview`: a picture of a scan.
 
 use crate::points::PointsArgs;
+use crate::view::files;
 use crate::{Outcome, preview};
 use formats::outputs::{Overwrite, need_extension};
 use std::path::{Path, PathBuf};
@@ -8,8 +9,10 @@ use std::path::{Path, PathBuf};
 #[derive(clap::Args)]
 pub struct Args {
     /// Points to draw: a scan (.npz, .ply, .csv), a capture (.pcap or .pcapng), of which the first
-    /// turn is drawn, or a cloud (.npy, .pcd, .xyz, .txt, .pts, .las, KITTI's or nuScenes' .bin). If
-    /// a scan is in the folder clean/ of a dataset, its noisy version is drawn below it
+    /// turn is drawn, or a cloud (.npy, .pcd, .xyz, .txt, .pts, .las, KITTI's or nuScenes' .bin); a
+    /// scene (.toml), what its sensors see; the folder of clusters of segment, or another of sweeps,
+    /// of which the first is drawn. If a scan is in the folder clean/ of a dataset, its noisy version
+    /// is drawn below it
     #[arg(value_name = "SCAN")]
     scan: PathBuf,
 
@@ -31,16 +34,16 @@ pub struct Args {
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     need_extension("--out", &args.out, &["png"])?;
     args.overwrite.check([&*args.out])?;
-    let clean = args.points.read(&args.scan)?;
-    if clean.is_empty() {
+    let clean = files::first_points(&args.scan, &args.points)?;
+    let Some(clean) = clean.filter(|points| !points.scan.is_empty()) else {
         formats::say!("{}: expected points to draw, found none", args.scan.display());
         return Ok(Outcome::SomeRefused);
-    }
+    };
     let noisy = args.noisy.clone().or_else(|| noisy_twin(&args.scan));
     let noisy = noisy.map(|file| args.points.read(&file)).transpose()?;
     let title = args.scan.file_stem().unwrap_or_default().to_string_lossy();
     preview::draw(&clean, noisy.as_ref(), &title, &args.out)?;
-    formats::say!("{} points: {}", clean.len(), args.out.display());
+    formats::say!("{} points: {}", clean.scan.len(), args.out.display());
     Ok(Outcome::Success)
 }
 

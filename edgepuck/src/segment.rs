@@ -1,5 +1,5 @@
 use crate::points::SweepArgs;
-use crate::{Outcome, Usage, preview};
+use crate::{Outcome, Usage, colours, preview};
 use edgepuck_segment::{Label, Segmentation, Segmenter, Settings, Sweep};
 use formats::atomic::UnfinishedFolder;
 use formats::cloud_file::write_cloud;
@@ -7,7 +7,7 @@ use formats::hash::Hashing;
 use formats::outputs::Overwrite;
 use formats::scan::Column;
 use formats::{FormatError, Scan, rows};
-use plotters::style::{Color, HSLColor, RGBColor};
+use plotters::style::RGBColor;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -67,17 +67,13 @@ pub fn run(args: &SegmentArgs) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-/// The colour of a label: grey for the ground, light grey for points in no cluster, and for
-/// clusters hues a golden angle apart, so that consecutive ones differ.
+/// The colour of a label: grey for the ground, light grey for points in no cluster, and that of its
+/// number for a cluster.
 pub fn tint(label: Label) -> RGBColor {
     match label {
-        Label::Ground => RGBColor(150, 150, 150),
-        Label::Small | Label::Invalid => RGBColor(205, 205, 205),
-        Label::Cluster(number) => {
-            let hue = (f64::from(number) * 0.618_033_988_75).fract();
-            let (red, green, blue) = HSLColor(hue, 0.8, 0.42).rgb();
-            RGBColor(red, green, blue)
-        }
+        Label::Ground => colours::of_class("ground"),
+        Label::Small | Label::Invalid => colours::of_class("small"),
+        Label::Cluster(number) => colours::of_number(number),
     }
 }
 

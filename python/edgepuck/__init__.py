@@ -25,6 +25,7 @@ from ._scene import Batch, Scene, scan_scene
 from ._scenes import DrawnScene, Scenes
 from ._segment import segment
 from ._sensor import Sensor
+from ._view import View, view
 
 __version__ = _version("edgepuck")
 
@@ -41,6 +42,7 @@ __all__ = [
     "Scene",
     "Scenes",
     "Sensor",
+    "View",
     "adapters",
     "box",
     "detect",
@@ -48,4 +50,5 @@ __all__ = [
     "scan_scene",
     "segment",
     "set_num_threads",
+    "view",
 ]

@@ -36,6 +36,9 @@ class DrawnScene:
     cluster_height: NDArray[np.float32]
     """The height of each cluster's lowest point above the ground, metres, [n_clusters]."""
 
+    def _repr_html_(self) -> str:
+        return self.scan._repr_html_()
+
     def __repr__(self) -> str:
         clusters = len(self.cluster_class)
         return f"<DrawnScene of {self.sensor}: {self.scan!r}, {len(self.objects)} objects, {clusters} clusters>"

@@ -30,6 +30,7 @@ mod surfaces;
 mod sweeps;
 mod tars;
 mod training;
+mod view;
 mod weather;
 
 use formats::Scan;

@@ -11,6 +11,7 @@ mod sanitize;
 mod structure;
 mod targets;
 mod test_programs;
+mod viewer;
 
 use crate::summary::{Counts, Summary};
 use anyhow::{bail, ensure};
@@ -74,6 +75,7 @@ fn run_all(args: &Args, summary: &mut Summary) {
     summary.step("tests", |summary| tests(summary, install));
     laboratory(summary, install);
     let programs = peers::programs();
+    viewer::run(summary, install, &programs);
     // A peer takes the binary for the Raspberry Pi.
     let _ = pi_binary.and_then(meanwhile::Meanwhile::end);
     // Peers wait for clocks and sockets, so what only needs the processor runs beside them.

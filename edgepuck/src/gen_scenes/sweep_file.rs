@@ -68,6 +68,14 @@ pub fn classes(stage: &Stage) -> Vec<&str> {
     ["air", "ground"].into_iter().chain(stage.classes().iter().map(String::as_str)).collect()
 }
 
+/// The names of the classes, and the number of that of each point.
+pub fn point_classes(stage: &Stage, done: &LabelledScene) -> (Vec<String>, Vec<u32>) {
+    let surfaces = surfaces(stage, &done.scene);
+    let air = surfaces.len() - 1;
+    let of_points = done.sweep.surfaces().iter().map(|&i| surfaces[air.min(i as usize)].class.into());
+    (classes(stage).into_iter().map(str::to_owned).collect(), of_points.collect())
+}
+
 /// Writes the sweep into the folder `sweeps`.
 pub fn write(
     stage: &Stage,

@@ -1,5 +1,7 @@
 //! What a point's colour says, and the bar that explains it.
 
+use std::collections::BTreeMap;
+
 use anyhow::Result;
 use formats::Scan;
 use plotters::prelude::*;
@@ -7,6 +9,8 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::canvas::{Area, metres, text};
 use super::frame::Frame;
+use crate::colours;
+use crate::view::frame::Labels;
 
 const BAR_LEFT: i32 = 14;
 const BAR_THICKNESS: i32 = 18;
@@ -14,8 +18,8 @@ const BAR_TOP: i32 = 56;
 const BAR_LENGTH: i32 = 360;
 const TICKS: i32 = 5;
 
-/// The part of viridis that stands out on white: its last yellow does not.
-const BRIGHTEST: f64 = 0.92;
+/// The most entries of a legend.
+const MOST_ENTRIES: usize = 20;
 
 /// How values become colours.
 pub struct Colours {
@@ -59,12 +63,7 @@ impl Colours {
     }
 
     fn tint(&self, value: f64) -> RGBColor {
-        let share = ((value - self.low) / (self.high - self.low)).clamp(0.0, 1.0);
-        // NaN is passed on by clamp; it has no place on the bar.
-        if share.is_nan() {
-            return RGBColor(150, 150, 150);
-        }
-        ViridisRGB.get_color(share * BRIGHTEST)
+        colours::on_ramp((value - self.low) / (self.high - self.low))
     }
 
     /// Draws the bar that says which value has which colour.
@@ -91,4 +90,29 @@ impl Colours {
         }
         Ok(())
     }
+}
+
+/// The colour of one of the numbers of `labels`.
+pub fn tint(labels: &Labels, value: u32) -> RGBColor {
+    match labels.names.as_ref().and_then(|names| names.get(value as usize)) {
+        Some(name) => colours::of_class(name),
+        None => colours::of_number(value),
+    }
+}
+
+/// Draws a legend of the most frequent numbers of `labels`.
+pub fn draw_legend(area: &Area<'_>, labels: &Labels) -> Result<()> {
+    area.draw_text(labels.name, &text(16), (BAR_LEFT, BAR_TOP - 30))?;
+    let mut counts = BTreeMap::<u32, usize>::new();
+    labels.values.iter().for_each(|value| *counts.entry(*value).or_default() += 1);
+    let mut entries: Vec<_> = counts.into_iter().collect();
+    entries.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+    for (y, (value, _)) in (BAR_TOP..).step_by(22).zip(entries.into_iter().take(MOST_ENTRIES)) {
+        let swatch = Circle::new((BAR_LEFT + 6, y), 6, tint(labels, value).filled());
+        area.draw(&swatch)?;
+        let name = labels.names.as_ref().and_then(|names| names.get(value as usize).cloned());
+        let beside = text(14).pos(Pos::new(HPos::Left, VPos::Center));
+        area.draw_text(&name.unwrap_or(value.to_string()), &beside, (BAR_LEFT + 20, y))?;
+    }
+    Ok(())
 }

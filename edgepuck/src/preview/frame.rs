@@ -5,6 +5,12 @@ use formats::Scan;
 /// Room around the points, as a share of the cube they lie in.
 const MARGIN: f64 = 1.06;
 
+/// What is farther from the sensor is left out of a sweep's picture.
+const FARTHEST_M: f64 = 50.0;
+
+/// What is smaller is an object, seen from three sides.
+const LEAST_SWEEP_M: f64 = 8.0;
+
 /// A cube in metres: the same for all panels, so that they share one scale.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame {
@@ -23,6 +29,24 @@ impl Frame {
         let centre = axes.map(|axis| (low[axis] + high[axis]) / 2.0);
         let half = axes.map(|axis| (high[axis] - low[axis]) / 2.0).into_iter().fold(0.0, f64::max);
         Self { centre, half: if half > 0.0 { half * MARGIN } else { 0.5 } }
+    }
+
+    /// What is near the sensor of a sweep; the rest would make the picture all road.
+    pub fn near_sensor(scan: &Scan) -> Self {
+        let sensor_m = scan.sensor_position_m();
+        let centre = [0, 1, 2].map(|axis| sensor_m[axis] - scan.origin[axis]);
+        let finite = scan.positions.iter().filter(|point| point.iter().all(|x| x.is_finite()));
+        let away = finite.flat_map(|at| [0, 1].map(|axis| (f64::from(at[axis]) - centre[axis]).abs()));
+        let farthest = away.fold(1.0, f64::max);
+        Self { centre, half: farthest.min(FARTHEST_M) }
+    }
+
+    /// Whether `scan` is a sweep: one picture from above shows it.
+    pub fn is_sweep(scan: &Scan) -> bool {
+        let Some((low, high)) = bounds(&scan.positions) else { return false };
+        let size = [0, 1, 2].map(|axis| high[axis] - low[axis]);
+        let across = size[0].max(size[1]);
+        across > LEAST_SWEEP_M && across > 3.0 * size[2]
     }
 
     pub fn extent(&self, axis: usize) -> std::ops::Range<f64> {

@@ -1,5 +1,5 @@
-//! A picture of a scan: side, top and front views, clean above noisy, as in
-//! the paper's figure.
+//! A picture of a scan: a sweep from above; anything else from the side, the top and the front, clean
+//! above noisy, as in the paper's figure.
 
 mod canvas;
 mod colours;
@@ -11,24 +11,30 @@ use std::path::Path;
 
 use anyhow::Result;
 use formats::Scan;
+use plotters::style::RGBColor;
 
+use crate::view::frame::Points;
 use canvas::{draw_png, text};
 use colours::Colours;
 use frame::{Frame, View};
 pub use from_above::draw_from_above;
+use from_above::EDGE;
 
 const TITLE_HEIGHT: u32 = 52;
 const ROW_HEADING_HEIGHT: u32 = 30;
-const BAR_WIDTH: u32 = 120;
+const BAR_WIDTH: u32 = 160;
 
 /// Draws `clean`, and `noisy` below it, to the PNG file `out`, atomically.
 ///
 /// All panels share one scale, in metres: the frame is the bounding box of the
-/// clean points, with a margin. Points are coloured by range where both scans
-/// know it and by height otherwise, as the colour bar says. Points outside the
+/// clean points, with a margin. Points are coloured by the first of their labels,
+/// as the legend says; or by range where both scans know it, and by height otherwise,
+/// as the colour bar says. Points outside the
 /// frame are counted in their row's heading; those that are not finite count
 /// with them. Axes start at the scans' origin where that is not 0.
-pub fn draw(clean: &Scan, noisy: Option<&Scan>, title: &str, out: &Path) -> Result<()> {
+pub fn draw(clean: &Points, noisy: Option<&Scan>, title: &str, out: &Path) -> Result<()> {
+    let Points { scan: clean, labels } = clean;
+    let labels = labels.first().filter(|_| noisy.is_none());
     let rows: Vec<_> =
         [(if noisy.is_some() { "clean" } else { "" }, Some(clean)), ("noisy", noisy)]
             .into_iter()
@@ -38,21 +44,32 @@ pub fn draw(clean: &Scan, noisy: Option<&Scan>, title: &str, out: &Path) -> Resu
         scan.check_lengths()?;
     }
     let scans: Vec<_> = rows.iter().map(|&(_, scan)| scan).collect();
-    let frame = Frame::around(&scans);
+    let (views, frame, panel_width, panel_height) = match noisy.is_none() && Frame::is_sweep(clean) {
+        true => (&View::ALL[1..2], Frame::near_sensor(clean), EDGE, EDGE),
+        false => (&View::ALL[..], Frame::around(&scans), panel::WIDTH, panel::HEIGHT),
+    };
     let colours = Colours::of(&scans, &frame);
 
-    let width = panel::WIDTH * View::ALL.len() as u32 + BAR_WIDTH;
-    let row_height = ROW_HEADING_HEIGHT + panel::HEIGHT;
+    let width = panel_width * views.len() as u32 + BAR_WIDTH;
+    let row_height = ROW_HEADING_HEIGHT + panel_height;
     let height = TITLE_HEIGHT + row_height * rows.len() as u32;
     draw_png(out, (width, height), (title, TITLE_HEIGHT), |below| {
         let (panels, bar) = below.split_horizontally(width - BAR_WIDTH);
-        colours.draw_bar(&bar)?;
+        match labels {
+            Some(labels) => colours::draw_legend(&bar, labels)?,
+            None => colours.draw_bar(&bar)?,
+        }
         for (row, &(name, scan)) in panels.split_evenly((rows.len(), 1)).iter().zip(&rows) {
-            let (heading, views) = row.split_vertically(ROW_HEADING_HEIGHT);
+            let (heading, panels) = row.split_vertically(ROW_HEADING_HEIGHT);
             heading.draw_text(&row_heading(name, scan, &frame), &text(17), (16, 6))?;
-            let tints = colours.tints(scan);
-            for (area, view) in views.split_evenly((1, View::ALL.len())).iter().zip(View::ALL) {
-                panel::draw(area, view, scan, &tints, &frame, &[])?;
+            let tints: Vec<RGBColor> = match labels {
+                Some(labels) => {
+                    labels.values.iter().map(|value| colours::tint(labels, *value)).collect()
+                }
+                None => colours.tints(scan),
+            };
+            for (area, view) in panels.split_evenly((1, views.len())).iter().zip(views) {
+                panel::draw(area, *view, scan, &tints, &frame, &[])?;
             }
         }
         Ok(())
@@ -82,6 +99,10 @@ fn row_heading(name: &str, scan: &Scan, frame: &Frame) -> String {
 mod tests {
     use super::*;
     use std::fs;
+
+    fn points(scan: &Scan) -> Points {
+        Points { scan: scan.clone(), labels: Vec::new() }
+    }
 
     fn sphere(n: usize, range: bool) -> Scan {
         let golden = std::f32::consts::PI * (3.0 - 5f32.sqrt());
@@ -114,9 +135,9 @@ mod tests {
         };
         for n in [0, 1, 2, 500] {
             for scan in [sphere(n, true), sphere(n, false), far.clone(), wild.clone()] {
-                draw(&scan, Some(&sphere(n, true)), "a sphere", &out).unwrap();
+                draw(&points(&scan), Some(&sphere(n, true)), "a sphere", &out).unwrap();
                 let two_rows = size(&fs::read(&out).unwrap());
-                draw(&scan, None, "", &out).unwrap();
+                draw(&points(&scan), None, "", &out).unwrap();
                 let one_row = size(&fs::read(&out).unwrap());
                 assert_eq!(one_row[0], two_rows[0]);
                 assert_eq!(two_rows[1] - one_row[1], panel::HEIGHT + ROW_HEADING_HEIGHT);
@@ -129,7 +150,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let [first, second] = ["first.png", "second.png"].map(|name| {
             let out = folder.path().join(name);
-            draw(&sphere(2000, true), None, "a sphere", &out).unwrap();
+            draw(&points(&sphere(2000, true)), None, "a sphere", &out).unwrap();
             fs::read(out).unwrap()
         });
         assert_eq!(first, second);

@@ -1,0 +1,30 @@
+// The parts of the viewer that pages call, as EdgepuckViewer.
+import { createViewer } from "./viewer.js";
+
+export { createViewer };
+
+const TYPES = { f32: Float32Array, u8: Uint8Array, u16: Uint16Array, u32: Uint32Array };
+
+function bytesOf(base64) {
+  if (Uint8Array.fromBase64) return Uint8Array.fromBase64(base64);
+  const text = atob(base64);
+  const bytes = new Uint8Array(text.length);
+  for (let i = 0; i < text.length; i++) bytes[i] = text.charCodeAt(i);
+  return bytes;
+}
+
+/** The data of a page of `edgepuck view`: JSON in which `{ "f32": "…" }` has numbers in base64. */
+export function decode(json) {
+  return JSON.parse(json, (_, value) => {
+    const type = value && Object.keys(TYPES).find((name) => typeof value[name] === "string");
+    return type ? new TYPES[type](bytesOf(value[type]).buffer) : value;
+  });
+}
+
+/** Shows the data in the element `dataId` of this page, in the element `id`. */
+export function show(id, dataId) {
+  const holder = document.getElementById(dataId);
+  const data = decode(holder.textContent);
+  holder.remove();
+  return createViewer(document.getElementById(id), data);
+}

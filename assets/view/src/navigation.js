@@ -1,0 +1,68 @@
+// Moves the camera: a turntable around a target, or flight with the keys W A S D Q E.
+import { Vector3 } from "three";
+import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+
+const KEYS = { w: [0, 1], s: [0, -1], a: [1, -1], d: [1, 1], q: [2, -1], e: [2, 1] };
+
+export class Navigation {
+  constructor(camera, canvas, changed) {
+    this.camera = camera;
+    this.changed = changed;
+    this.pressed = new Set();
+    this.orbit = new OrbitControls(camera, canvas);
+    this.orbit.addEventListener("change", changed);
+    this.flies = false;
+    this.radius = 10;
+    canvas.addEventListener("pointermove", (event) => {
+      if (this.flies && event.buttons) this.#look(event.movementX, event.movementY);
+    });
+  }
+
+  /** Looks at an extent from behind and above. */
+  fit({ middle, radius, floor }) {
+    const target = new Vector3(middle[0], middle[1], Math.max(floor, middle[2] - radius / 4));
+    this.radius = radius;
+    this.camera.near = radius / 500;
+    this.camera.far = radius * 200;
+    this.camera.position.copy(target).addScaledVector(new Vector3(-0.82, -0.55, 0.62), 1.75 * radius);
+    this.orbit.target.copy(target);
+    this.camera.updateProjectionMatrix();
+    this.orbit.update();
+    this.changed();
+  }
+
+  fly(flies) {
+    const ahead = this.camera.getWorldDirection(new Vector3());
+    this.orbit.target.copy(this.camera.position).addScaledVector(ahead, this.radius);
+    this.flies = flies;
+    this.orbit.enabled = !flies;
+    this.pressed.clear();
+  }
+
+  #look(x, y) {
+    const { camera } = this;
+    const ahead = camera.getWorldDirection(new Vector3());
+    const right = new Vector3().crossVectors(ahead, camera.up).normalize();
+    ahead.applyAxisAngle(camera.up, -x * 0.004).applyAxisAngle(right, -y * 0.004);
+    if (Math.abs(ahead.z) < 0.99) camera.lookAt(ahead.add(camera.position));
+    this.changed();
+  }
+
+  key(key, isDown) {
+    if (!this.flies || !KEYS[key]) return;
+    if (isDown) this.pressed.add(key);
+    else this.pressed.delete(key);
+    this.changed();
+  }
+
+  /** Moves by the pressed keys for this time; returns whether any is pressed. */
+  advance(seconds) {
+    const ahead = this.camera.getWorldDirection(new Vector3());
+    const axes = [ahead, new Vector3().crossVectors(ahead, this.camera.up).normalize(), this.camera.up];
+    for (const key of this.pressed) {
+      const [axis, sign] = KEYS[key];
+      this.camera.position.addScaledVector(axes[axis], sign * seconds * this.radius * 0.5);
+    }
+    return this.pressed.size > 0;
+  }
+}

@@ -1,0 +1,207 @@
+// What is drawn of one frame: points, meshes, boxes, sensors and the grid, as objects of three.js.
+import * as THREE from "three";
+import { LineMaterial } from "three/addons/lines/LineMaterial.js";
+import { LineSegments2 } from "three/addons/lines/LineSegments2.js";
+import { LineSegmentsGeometry } from "three/addons/lines/LineSegmentsGeometry.js";
+import { classColour, numberColour, paint, scaleOf } from "./colour.js";
+
+const VERTEX = `
+  attribute vec3 tint; uniform float size; uniform float focus; varying vec3 vTint;
+  void main() {
+    vec4 seen = modelViewMatrix * vec4(position, 1.0);
+    gl_Position = projectionMatrix * seen;
+    gl_PointSize = size * clamp(sqrt(focus / max(-seen.z, 1e-6)), 0.7, 3.0);
+    vTint = tint;
+  }`;
+const FRAGMENT = `
+  varying vec3 vTint;
+  void main() {
+    vec2 off = 2.0 * gl_PointCoord - 1.0;
+    float away = dot(off, off);
+    if (away > 1.0) discard;
+    gl_FragColor = vec4(vTint * (1.0 - 0.35 * away), 1.0);
+  }`;
+
+/** The material of all points: round, of `size` pixels at the distance `focus`. */
+export const pointMaterial = () =>
+  new THREE.ShaderMaterial({
+    vertexShader: VERTEX,
+    fragmentShader: FRAGMENT,
+    uniforms: { size: { value: 3 }, focus: { value: 10 } },
+  });
+
+function drawLines(positions, colours, settings) {
+  const geometry = new LineSegmentsGeometry().setPositions(positions).setColors(colours);
+  return new LineSegments2(geometry, new LineMaterial({ vertexColors: true, ...settings })).computeLineDistances();
+}
+
+/** The corners that each edge of a box joins; bits of a corner's number tell its sides. */
+const EDGES = [0, 1, 2, 3, 4, 5, 6, 7, 0, 2, 1, 3, 4, 6, 5, 7, 0, 4, 1, 5, 2, 6, 3, 7];
+
+function corners({ centre: [x, y, z], size, yaw = 0 }) {
+  const [cos, sin] = [Math.cos(yaw), Math.sin(yaw)];
+  return Array.from({ length: 8 }, (_, i) => {
+    const [ahead, aside, up] = size.map((side, axis) => (((i >> axis) & 1) - 0.5) * side);
+    return [x + cos * ahead - sin * aside, y + sin * ahead + cos * aside, z + up];
+  });
+}
+
+export const boxColour = (box) => (box.class ? classColour(box.class) : numberColour(box.track ?? 0));
+
+function drawBoxes(boxes, settings) {
+  const [positions, colours] = [[], []];
+  for (const box of boxes) {
+    const at = corners(box);
+    // Truth is paler.
+    const colour = boxColour(box).map((x) => ((box.truth ? 0.45 * x + 140 : x) / 255) ** 2.2);
+    for (const corner of EDGES) {
+      positions.push(...at[corner]);
+      colours.push(...colour);
+    }
+  }
+  return drawLines(positions, colours, settings);
+}
+
+function drawMesh(mesh, number, isOne) {
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute("position", new THREE.BufferAttribute(mesh.position, 3));
+  geometry.setIndex(new THREE.BufferAttribute(mesh.index, 1));
+  const tint = mesh.class ? classColour(mesh.class) : isOne ? [176, 190, 205] : numberColour(number);
+  const colour = new THREE.Color().setRGB(...tint.map((x) => x / 255), THREE.SRGBColorSpace);
+  const settings = { color: colour, flatShading: true, side: THREE.DoubleSide };
+  return new THREE.Mesh(geometry, new THREE.MeshLambertMaterial(settings));
+}
+
+/** The axes of a sensor: x red, y green, z blue. */
+function drawSensor({ pose }, length) {
+  const at = [pose[3], pose[7], pose[11]];
+  const [positions, colours] = [[], []];
+  for (const axis of [0, 1, 2]) {
+    positions.push(...at, ...at.map((x, row) => x + length * pose[4 * row + axis]));
+    const colour = [0.25, 0.3, 0.35].with(axis, 0.95);
+    colours.push(...colour, ...colour);
+  }
+  return drawLines(positions, colours, { linewidth: 3 });
+}
+
+function drawRays(rays) {
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute("position", new THREE.BufferAttribute(rays, 3));
+  const settings = { color: 0x6fd3ff, transparent: true, opacity: 0.14, depthWrite: false };
+  return new THREE.LineSegments(geometry, new THREE.LineBasicMaterial(settings));
+}
+
+function drawGrid({ middle, floor, radius }) {
+  const step = 10 ** Math.round(Math.log10(Math.max(radius, 1e-3) / 6));
+  const n = 2 * Math.ceil((2.2 * radius) / step);
+  const grid = new THREE.GridHelper(n * step, n, 0x4a5568, 0x2a313d);
+  grid.rotation.x = Math.PI / 2;
+  const place = middle.map((x) => Math.round(x / step) * step);
+  grid.position.set(place[0], place[1], floor);
+  grid.material.depthWrite = false;
+  return { grid, step };
+}
+
+/** The middle, the radius and the floor of what most of a frame's points, meshes and boxes span. */
+export function extentOf(frame) {
+  const axes = [[], [], []];
+  const add = (positions) => {
+    const step = Math.max(1, Math.floor(positions.length / 3 / 20000));
+    for (let i = 0; i + 2 < positions.length; i += 3 * step) {
+      if (Number.isFinite(positions[i] + positions[i + 1] + positions[i + 2])) {
+        for (const axis of [0, 1, 2]) axes[axis].push(positions[i + axis]);
+      }
+    }
+  };
+  add(frame.points?.position ?? []);
+  for (const mesh of frame.meshes ?? []) add(mesh.position);
+  for (const box of axes[0].length ? [] : (frame.boxes ?? [])) add(corners(box).flat());
+  if (!axes[0].length) return { middle: [0, 0, 0], radius: 5, floor: 0 };
+  for (const axis of axes) axis.sort((a, b) => a - b);
+  const at = (axis, share) => axes[axis][Math.round(share * (axes[axis].length - 1))];
+  const isSweep = !frame.meshes?.length && at(0, 0.5) !== undefined && frame.sensors?.length;
+  // Of a sweep, the near part matters; of an object all.
+  const [low, high] = isSweep ? [0.1, 0.9] : [0, 1];
+  const middle = [0, 1, 2].map((axis) => (at(axis, low) + at(axis, high)) / 2);
+  const half = [0, 1, 2].map((axis) => (at(axis, high) - at(axis, low)) / 2);
+  return { middle, radius: Math.max(Math.hypot(...half), 1e-3), floor: at(2, 0.01) };
+}
+
+/** The columns by which points can be coloured: those of the file, the height and the range. */
+export function columnsOf(frame) {
+  const { points, sensors } = frame;
+  if (!points) return [];
+  const columns = points.columns.slice();
+  const { position } = points;
+  const add = (name, of) => {
+    if (columns.some((column) => column.name === name)) return;
+    const values = new Float32Array(position.length / 3);
+    for (let i = 0; i < values.length; i++) values[i] = of(3 * i);
+    columns.push({ name, unit: "m", kind: "number", values });
+  };
+  add("height", (i) => position[i + 2]);
+  const [x, y, z] = [3, 7, 11].map((i) => sensors?.[0]?.pose[i] ?? 0);
+  add("range", (i) => Math.hypot(position[i] - x, position[i + 1] - y, position[i + 2] - z));
+  return columns;
+}
+
+/** One frame as a scene of three.js. `shown` says which of its parts are visible. */
+export class Stage {
+  constructor(frame, material, extent) {
+    this.frame = frame;
+    this.scene = new THREE.Scene();
+    this.scene.add(new THREE.HemisphereLight(0xffffff, 0x445566, 2.2));
+    const sun = new THREE.DirectionalLight(0xffffff, 1.6);
+    sun.position.set(-1, -2, 4);
+    this.scene.add(sun);
+    this.columns = columnsOf(frame);
+    this.parts = {};
+    if (frame.points) {
+      const geometry = new THREE.BufferGeometry();
+      const { position } = frame.points;
+      this.tints = new THREE.BufferAttribute(new Uint8Array(position.length), 3, true);
+      geometry.setAttribute("position", new THREE.BufferAttribute(position, 3));
+      geometry.setAttribute("tint", this.tints);
+      this.#add("points", new THREE.Points(geometry, material));
+      this.parts.points[0].frustumCulled = false;
+    }
+    const { meshes = [], boxes = [], sensors = [] } = frame;
+    meshes.forEach((mesh, i) => {
+      this.#add("meshes", drawMesh(mesh, i, meshes.length === 1));
+    });
+    const [truth, found] = [boxes.filter((box) => box.truth), boxes.filter((box) => !box.truth)];
+    if (found.length) this.#add("boxes", drawBoxes(found, { linewidth: 2.5 }));
+    const dashes = { linewidth: 1.5, dashed: true, dashSize: 0.35, gapSize: 0.25, transparent: true };
+    if (truth.length) this.#add("truth", drawBoxes(truth, { ...dashes, opacity: 0.9 }));
+    for (const sensor of sensors) {
+      this.#add("sensors", drawSensor(sensor, extent.radius / 10));
+      if (sensor.rays?.length) this.#add("beams", drawRays(sensor.rays));
+    }
+    const { grid, step } = drawGrid(extent);
+    this.#add("grid", grid);
+    this.gridStep = step;
+  }
+
+  #add(name, object) {
+    this.parts[name] ??= [];
+    this.parts[name].push(object);
+    this.scene.add(object);
+  }
+
+  /** Colours the points by the column of this name; returns the column and its scale. */
+  colourBy(name) {
+    const column = this.columns.find((one) => one.name === name) ?? this.columns[0];
+    if (!column) return undefined;
+    column.scale ??= scaleOf(column);
+    paint(column, column.scale, this.tints.array);
+    this.tints.needsUpdate = true;
+    return column;
+  }
+
+  dispose() {
+    this.scene.traverse((object) => {
+      object.geometry?.dispose();
+      if (!object.isPoints) object.material?.dispose();
+    });
+  }
+}

@@ -1,0 +1,325 @@
+import * as THREE from "three";
+import { css } from "./colour.js";
+import { boxesHtml, escaped, factsHtml, scaleHtml, shown, titleOf } from "./legend.js";
+import { Navigation } from "./navigation.js";
+import { pick } from "./picking.js";
+import { boxColour, extentOf, pointMaterial, Stage } from "./stage.js";
+import style from "./viewer.css";
+
+/**
+ * Draws points, meshes, boxes and sensors in `element`, and returns the viewer.
+ *
+ *     const viewer = EdgepuckViewer.createViewer(element, data);
+ *     viewer.setData(data);            // the camera and the chosen colour stay
+ *     viewer.setData(data, { fit: true });
+ *     viewer.dispose();
+ *
+ * `data` is `{ panes: [pane] }`, with one pane or two side by side. Lengths are in metres, z is up.
+ * All but the names, `frames`, `position` and `columns` may be left out.
+ *
+ *     pane   { name, frames: [frame] }                      several frames get a slider
+ *     frame  { name, points, meshes: [mesh], boxes: [box], sensors: [sensor] }
+ *     points { position: Float32Array [3 n], origin: [x, y, z], columns: [column] }
+ *     column { name, unit, kind: "number" | "class" | "id", values: typed array [n], names: [string] }
+ *     mesh   { name, class, position: Float32Array [3 v], index: Uint32Array [3 t] }
+ *     box    { class, centre: [x, y, z], size: [length, width, height], yaw: radians,
+ *              score: 0 to 1, track: number, truth: boolean }
+ *     sensor { name, pose: [16], 4 by 4 row by row, rays: Float32Array [6 r], start and end of each }
+ *
+ * Positions are relative to `origin`, by default 0. Values of a class are indices of `names`. The arrays
+ * are used as they are, without a copy.
+ */
+export function createViewer(element, data = { panes: [] }) {
+  const viewer = new Viewer(element);
+  viewer.setData(data, { fit: true });
+  return viewer;
+}
+
+const PARTS = ["boxes", "truth", "labels", "meshes", "beams", "sensors", "grid"];
+const USUAL_COLOURS = ["class", "cluster", "object", "range", "height"];
+const MOST_LABELS = 60;
+const PLAY_MS = 150;
+
+const countOf = (frame) => (frame?.points?.position.length ?? 0) / 3;
+
+class Viewer {
+  constructor(element) {
+    this.root = document.createElement("div");
+    this.root.className = "edgepuck-viewer";
+    this.root.innerHTML = `<style>${style}</style><canvas tabindex="0"></canvas><div class="labels"></div>
+      <div class="bar"></div><div class="legend"></div><div class="facts" hidden></div>
+      <div class="time"><button name="play">play</button><input type="range" name="frame"><output></output></div>`;
+    element.append(this.root);
+    const part = (name) => this.root.querySelector(name);
+    [this.canvas, this.labels, this.bar] = [part("canvas"), part(".labels"), part(".bar")];
+    [this.legend, this.facts, this.time] = [part(".legend"), part(".facts"), part(".time")];
+    this.renderer = new THREE.WebGLRenderer({ canvas: this.canvas, antialias: true });
+    this.renderer.setClearColor(0x12161d);
+    this.renderer.autoClear = false;
+    this.camera = new THREE.PerspectiveCamera(50, 1, 0.1, 1000);
+    this.camera.up.set(0, 0, 1);
+    this.navigation = new Navigation(this.camera, this.canvas, () => this.invalidate());
+    [this.material, this.hidden, this.panes, this.frame] = [pointMaterial(), new Set(), [], 0];
+    this.marker = new THREE.Points(new THREE.BufferGeometry(), pointMaterial());
+    this.marker.material.depthTest = false;
+    this.marker.frustumCulled = false;
+    this.#listen();
+  }
+
+  #listen() {
+    const { canvas } = this;
+    let down = [0, 0];
+    canvas.addEventListener("pointerdown", ({ offsetX, offsetY }) => {
+      down = [offsetX, offsetY];
+      canvas.focus();
+    });
+    canvas.addEventListener("pointerup", ({ offsetX, offsetY, button }) => {
+      const moved = Math.hypot(offsetX - down[0], offsetY - down[1]);
+      if (moved < 4 && button === 0) this.pick(offsetX, offsetY);
+    });
+    canvas.addEventListener("keydown", (event) => this.#press(event.key.toLowerCase()));
+    canvas.addEventListener("keyup", ({ key }) => this.navigation.key(key.toLowerCase(), false));
+    this.root.addEventListener("input", ({ target }) => this.#change(target));
+    this.root.addEventListener("click", ({ target }) => this.#press(target.name));
+    this.resizes = new ResizeObserver(() => this.#resize());
+    this.resizes.observe(this.root);
+  }
+
+  #press(what) {
+    if (what === "reset" || what === "r") this.fit();
+    else if (what === "fly" || what === "f") {
+      this.navigation.fly(!this.navigation.flies);
+      this.#drawBar();
+    } else if (what === "play") {
+      clearInterval(this.playing);
+      const next = () => this.showFrame((this.frame + 1) % this.nFrames);
+      this.playing = this.playing ? undefined : setInterval(next, PLAY_MS);
+      this.#drawTime();
+    } else if (what === "arrowright") this.showFrame(this.frame + 1);
+    else if (what === "arrowleft") this.showFrame(this.frame - 1);
+    else if (what) this.navigation.key(what, true);
+  }
+
+  #change({ name, value, checked }) {
+    if (name === "colour") this.colourBy(value);
+    else if (name === "frame") this.showFrame(Number(value));
+    else if (name === "size") this.pixels = Number(value);
+    else this.hidden[checked ? "delete" : "add"](name);
+    this.#hide();
+  }
+
+  setData(data, { fit = false } = {}) {
+    this.data = data;
+    this.nFrames = Math.max(1, ...data.panes.map((pane) => pane.frames.length));
+    this.time.hidden = this.nFrames < 2;
+    // The first turn of a capture may have only a few points.
+    const frames = [...(data.panes[0]?.frames ?? [])].sort((a, b) => countOf(b) - countOf(a));
+    this.extent = extentOf(frames[0] ?? {});
+    this.frame = Math.min(this.frame, this.nFrames - 1);
+    this.#stageFrames();
+    this.#drawBar();
+    if (fit) this.fit();
+    this.#resize();
+  }
+
+  #stageFrames() {
+    for (const { stage } of this.panes) stage.dispose();
+    this.panes = this.data.panes.map(({ name, frames }) => {
+      const frame = frames[Math.min(this.frame, frames.length - 1)] ?? {};
+      return { name, frame, stage: new Stage(frame, this.material, this.extent) };
+    });
+    const columns = this.panes.flatMap(({ stage }) => stage.columns);
+    this.names = [...new Set(columns.map(({ name }) => name))];
+    const most = Math.max(0, ...this.panes.map(({ frame }) => countOf(frame)));
+    this.pixels ??= most < 5e3 ? 5 : most < 4e4 ? 4 : most < 4e5 ? 3 : 2;
+    this.unpick();
+    this.#hide();
+    this.#drawTime();
+    const usual = USUAL_COLOURS.find((name) => this.names.includes(name));
+    this.colourBy(this.names.includes(this.colour) ? this.colour : usual);
+  }
+
+  /** Colours the points by the column of this name. */
+  colourBy(name) {
+    this.colour = name;
+    for (const pane of this.panes) pane.column = pane.stage.colourBy(name);
+    const scales = this.panes.filter(({ column }) => column).map(({ column }) => scaleHtml(column));
+    const boxes = boxesHtml(this.panes.flatMap(({ frame }) => frame.boxes ?? []));
+    const grid = `<small>grid ${shown(this.panes[0]?.stage.gridStep ?? 1)} m</small>`;
+    this.legend.innerHTML = [...new Set(scales), boxes, grid].join("");
+    this.invalidate();
+  }
+
+  /** Shows the frame with this number of each pane. */
+  showFrame(number) {
+    const frame = Math.min(this.nFrames - 1, Math.max(0, number));
+    if (frame === this.frame) return;
+    this.frame = frame;
+    this.#stageFrames();
+  }
+
+  /** Looks at all of the first pane. */
+  fit() {
+    this.navigation.fit(this.extent);
+    this.material.uniforms.focus.value = 1.8 * this.extent.radius;
+  }
+
+  #hide() {
+    for (const { stage } of this.panes) {
+      for (const [name, objects] of Object.entries(stage.parts)) {
+        for (const object of objects) object.visible = !this.hidden.has(name);
+      }
+    }
+    this.invalidate();
+  }
+
+  #drawBar() {
+    const has = (name) => this.panes.some(({ stage }) => stage.parts[name === "labels" ? "boxes" : name]);
+    const toggle = (name) => {
+      const checked = this.hidden.has(name) ? "" : "checked";
+      return `<label><input type="checkbox" name="${name}" ${checked}>${name}</label>`;
+    };
+    const option = (name) => `<option ${name === this.colour ? "selected" : ""}>${escaped(name)}</option>`;
+    const points = `<label>colour <select name="colour">${this.names.map(option).join("")}</select></label>
+      <label>size <input type="range" name="size" min="1" max="10" step="0.5" value="${this.pixels}"></label>`;
+    const title = "F: turntable (drag, wheel) or flight (drag to look; keys W A S D Q E)";
+    this.bar.innerHTML = `${this.names.length ? points : ""}${PARTS.filter(has).map(toggle).join("")}
+      <button name="fly" title="${title}">${this.navigation.flies ? "fly" : "turntable"}</button>
+      <button name="reset" title="R: look at all">reset</button>`;
+  }
+
+  #drawTime() {
+    const [play, slider, text] = this.time.children;
+    play.textContent = this.playing ? "pause" : "play";
+    [slider.max, slider.value] = [this.nFrames - 1, this.frame];
+    const name = this.panes.find(({ frame }) => frame.name)?.frame.name ?? "";
+    text.textContent = `${name}  ${this.frame + 1} of ${this.nFrames}`;
+  }
+
+  #resize() {
+    const { clientWidth: width, clientHeight: height } = this.root;
+    if (!width || !height) return;
+    this.renderer.setPixelRatio(Math.min(2, window.devicePixelRatio));
+    this.renderer.setSize(width, height, false);
+    this.size = [width, height];
+    this.invalidate();
+  }
+
+  /** Draws soon, once for all changes until then. */
+  invalidate() {
+    this.request ??= requestAnimationFrame((now) => {
+      this.request = undefined;
+      const seconds = Math.min(0.1, (now - (this.drawnAt ?? now)) / 1000);
+      this.drawnAt = now;
+      if (this.navigation.advance(seconds)) this.invalidate();
+      this.render();
+    });
+  }
+
+  /** Draws now. */
+  render() {
+    if (!this.size || !this.panes.length) return;
+    const { renderer, camera } = this;
+    const [width, height] = [this.size[0] / this.panes.length, this.size[1]];
+    camera.aspect = width / height;
+    camera.updateProjectionMatrix();
+    camera.updateMatrixWorld();
+    const [all, one, ratio] = [this.material.uniforms, this.marker.material.uniforms, renderer.getPixelRatio()];
+    all.size.value = this.pixels * ratio;
+    one.size.value = (this.pixels + 7) * ratio;
+    one.focus.value = all.focus.value;
+    renderer.setScissorTest(true);
+    this.panes.forEach(({ stage }, i) => {
+      renderer.setViewport(i * width, 0, width, height);
+      renderer.setScissor(i * width, 0, width, height);
+      renderer.clear();
+      renderer.render(stage.scene, camera);
+    });
+    this.#placeLabels(width, height);
+    this.firstPictureMs ??= performance.now();
+  }
+
+  #placeLabels(width, height) {
+    const made = [];
+    const add = (pane, place, className, text, onclick, colour = "") => {
+      const at = new THREE.Vector3(...place).project(this.camera);
+      if (at.z > 1 || Math.abs(at.x) > 1 || Math.abs(at.y) > 1) return;
+      const label = Object.assign(document.createElement("span"), { className, textContent: text, onclick });
+      const [x, y] = [(pane + (at.x + 1) / 2) * width, ((1 - at.y) / 2) * height];
+      label.style = `left:${x.toFixed(1)}px; top:${y.toFixed(1)}px; color:${colour}`;
+      made.push({ label, depth: at.z });
+    };
+    this.panes.forEach(({ name, frame }, pane) => {
+      for (const box of this.hidden.has("labels") || this.hidden.has("boxes") ? [] : (frame.boxes ?? [])) {
+        if (box.truth) continue;
+        const words = [box.class, box.track && `#${box.track}`, box.score?.toFixed(2)].filter(Boolean).join(" ");
+        const facts = () => this.#showFacts(box.class ?? "box", Object.entries(box));
+        const top = box.centre.with(2, box.centre[2] + box.size[2] / 2);
+        add(pane, top, "box", words, facts, css(boxColour(box)));
+      }
+      for (const sensor of this.hidden.has("sensors") ? [] : (frame.sensors ?? [])) {
+        add(
+          pane,
+          [3, 7, 11].map((i) => sensor.pose[i]),
+          "sensor",
+          sensor.name,
+        );
+      }
+      const count = frame.points ? `, ${countOf(frame).toLocaleString("en")} points` : "";
+      const label = Object.assign(document.createElement("span"), { className: "title", textContent: name + count });
+      label.style.left = `${(pane + 0.5) * width}px`;
+      made.push({ label, depth: -1 });
+    });
+    made.sort((a, b) => a.depth - b.depth);
+    this.labels.replaceChildren(...made.slice(0, MOST_LABELS).map(({ label }) => label));
+  }
+
+  /** Picks the point that is drawn at this place, pixels of the element, and returns its number, or -1. */
+  pick(x, y) {
+    const width = this.size[0] / this.panes.length;
+    const { frame, stage } = this.panes[Math.min(this.panes.length - 1, Math.floor(x / width))];
+    const wished = [(2 * (x % width)) / width - 1, 1 - (2 * y) / this.size[1]];
+    const half = [width / 2, this.size[1] / 2];
+    this.unpick();
+    this.picked = pick(this.camera, frame.points?.position ?? [], wished, half, Math.max(8, this.pixels));
+    if (this.picked >= 0) this.#showPoint(frame.points, stage);
+    this.invalidate();
+    return this.picked;
+  }
+
+  unpick() {
+    this.marker.removeFromParent();
+    this.facts.hidden = true;
+    this.picked = -1;
+  }
+
+  #showPoint({ position, origin = [0, 0, 0] }, stage) {
+    const number = this.picked;
+    const at = position.slice(3 * number, 3 * number + 3);
+    this.marker.geometry.setAttribute("position", new THREE.BufferAttribute(at, 3));
+    this.marker.geometry.setAttribute("tint", new THREE.BufferAttribute(new Float32Array([1, 1, 1]), 3));
+    stage.scene.add(this.marker);
+    const place = ["x (m)", "y (m)", "z (m)"].map((name, i) => [name, (at[i] + origin[i]).toFixed(4)]);
+    const columns = stage.columns.map((column) => {
+      const value = column.values[number];
+      return [titleOf(column), column.names?.[value] ?? value];
+    });
+    this.#showFacts(`point ${number}`, [...place, ...columns]);
+  }
+
+  #showFacts(title, facts) {
+    this.facts.innerHTML = factsHtml(title, facts);
+    this.facts.hidden = false;
+  }
+
+  /** Removes the viewer and frees its memory. */
+  dispose() {
+    clearInterval(this.playing);
+    cancelAnimationFrame(this.request);
+    this.resizes.disconnect();
+    for (const { stage } of this.panes) stage.dispose();
+    this.navigation.orbit.dispose();
+    this.renderer.dispose();
+    this.root.remove();
+  }
+}

@@ -1,0 +1,121 @@
+// Opens pages of `edgepuck view` in Chromium: node test/browser.mjs PROGRAM CHROMIUM [FOLDER for pictures]
+import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
+import { mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { pathToFileURL } from "node:url";
+import { chromium } from "playwright-core";
+
+const [program, executablePath, pictures] = process.argv.slice(2);
+const folder = mkdtempSync(join(tmpdir(), "edgepuck-view-"));
+const run = (words) => execFileSync(program, words.split(" "), { cwd: folder, stdio: ["ignore", "ignore", "inherit"] });
+
+const SCENE = `attributes = ["ring", "range", "object"]
+[[object]]
+mesh = "meshes/chair/train/chair_0001.off"
+label = "chair"
+[[object]]
+mesh = "meshes/table/train/table_0001.off"
+position_m = [-1.2, -0.6, 0.0]
+[[sensor]]
+name = "left"
+profile = "vlp16"
+position_m = [3.0, 1.0, 1.0]
+look_at_m = [0.0, 0.0, 0.5]
+`;
+
+const args =
+  "--no-sandbox --disable-quic --no-first-run --disable-background-networking --disable-component-update --disable-sync --use-angle=swiftshader --enable-unsafe-swiftshader";
+const browser = await chromium.launch({ executablePath, headless: true, args: args.split(" ") });
+const context = await browser.newContext({ viewport: { width: 1280, height: 800 } });
+let nChecks = 0;
+
+/** Shows these files in a page, which may ask for nothing and report no error, and checks it. */
+async function check(name, words, test) {
+  run(`view ${words} --out ${name}.html`);
+  const [page, faults] = [await context.newPage(), []];
+  const url = pathToFileURL(join(folder, `${name}.html`)).href;
+  page.on("request", (request) => request.url() !== url && faults.push(`request: ${request.url().slice(0, 100)}`));
+  page.on("console", (message) => ["error", "warning"].includes(message.type()) && faults.push(message.text()));
+  page.on("pageerror", (error) => faults.push(error.message));
+  await page.goto(url);
+  await page.waitForFunction(() => viewer.firstPictureMs > 0);
+  await test(page);
+  if (pictures) await page.screenshot({ path: join(pictures, `${name}.png`) });
+  // What SwiftShader says of its own speed is no fault of the page.
+  assert.deepEqual(
+    faults.filter((fault) => !/GPU stall due to ReadPixels|swiftshader/i.test(fault)),
+    [],
+    name,
+  );
+  await page.close();
+  nChecks += 1;
+}
+
+const legend = (page) => page.textContent(".legend");
+const tints = (page) => page.evaluate(() => Array.from(viewer.panes[0].stage.tints.array.slice(0, 300)).join());
+
+try {
+  if (pictures) mkdirSync(pictures, { recursive: true });
+  run("gen-scenes street --sweeps 2 --save 2 --seed 3 --adapter cpu --out street");
+  run("detect street/sweeps/000000.npz --out objects.json");
+  run("segment street/sweeps/000000.npz --out clusters");
+  run("gen-shapes --out meshes --train 1 --test 1");
+  run("gen-drive --seconds 1 --layout semantickitti --out drive");
+  writeFileSync(join(folder, "scene.toml"), SCENE);
+  await check("sweep", "street/sweeps/000000.npz objects.json", async (page) => {
+    assert.match(await legend(page), /class.*ground.*boxes.*lines: found, dashes: truth/s);
+    const before = await tints(page);
+    await page.selectOption("select[name=colour]", "range");
+    assert.match(await legend(page), /range \(m\)/);
+    assert.notEqual(await tints(page), before);
+    const { objects } = JSON.parse(readFileSync(join(folder, "objects.json")));
+    assert.equal(
+      await page.evaluate(() => viewer.panes[0].frame.boxes.filter((box) => !box.truth).length),
+      objects.length,
+    );
+    await page.uncheck("input[name=truth]");
+    assert.equal(await page.evaluate(() => viewer.panes[0].stage.parts.truth[0].visible), false);
+    await page.click(".labels .box >> nth=0", { force: true });
+    assert.match(await page.textContent(".facts"), /score0\.\d/);
+    // The point that is drawn nearest to the middle of the picture is picked there.
+    const at = await page.evaluate(() => {
+      const [w, h] = viewer.size;
+      for (let i = 0; i < 400; i++) {
+        const [x, y] = [w / 2 + 5 * (i % 20), h / 2 + 5 * Math.floor(i / 20)];
+        if (viewer.pick(x, y) >= 0) return [x, y, viewer.picked];
+      }
+    });
+    await page.evaluate(() => viewer.unpick());
+    await page.mouse.click(at[0], at[1]);
+    assert.match(await page.textContent(".facts"), new RegExp(`point ${at[2]}.*x \\(m\\).*range \\(m\\)`, "s"));
+  });
+  await check("drive", "drive", async (page) => {
+    assert.match(await page.textContent("output"), /1 of 10/);
+    const first = await page.evaluate(() => viewer.panes[0].frame.name);
+    await page.fill("input[name=frame]", "5");
+    assert.match(await page.textContent("output"), /6 of 10/);
+    assert.notEqual(await page.evaluate(() => viewer.panes[0].frame.name), first);
+    assert.match(await legend(page), /class.*(car|building)/s);
+  });
+  await check("clusters", "clusters", async (page) => assert.match(await legend(page), /cluster/));
+  await check("scene", "scene.toml", async (page) => {
+    const parts = await page.evaluate(() => Object.keys(viewer.panes[0].stage.parts).sort());
+    assert.deepEqual(parts, ["beams", "grid", "meshes", "points", "sensors"]);
+    const camera = () => page.evaluate(() => viewer.camera.position.toArray().join());
+    await page.click("button[name=fly]");
+    const before = await camera();
+    await page.focus("canvas");
+    await page.keyboard.press("w", { delay: 200 });
+    assert.notEqual(await camera(), before);
+    await page.click("button[name=reset]");
+  });
+  await check("two", "meshes/lamp/train/lamp_0001.off street/sweeps/000001.npz", async (page) => {
+    assert.equal(await page.locator(".labels .title").count(), 2);
+  });
+  console.log(`${nChecks} pages are as expected`);
+} finally {
+  await browser.close();
+  rmSync(folder, { recursive: true });
+}

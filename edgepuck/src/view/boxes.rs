@@ -1,0 +1,101 @@
+//! Boxes in the JSON files of `detect`, `live`, `gen-scenes` and `gen-drive`.
+
+use super::frame::Placed;
+use formats::FormatError;
+use formats::foreign::read_text;
+use glam::{DQuat, DVec3};
+use serde::Deserialize;
+use sim_gpu::{Pose, glam};
+use std::path::Path;
+
+/// A file of one sweep.
+#[derive(Deserialize)]
+struct OfSweep {
+    objects: Vec<Object>,
+    /// Of `gen-scenes`, whose objects stand in the street's frame.
+    sensor_pose: Option<Pose>,
+}
+
+/// What the commands tell of an object; each has its own part of it.
+#[derive(Deserialize)]
+struct Object {
+    class: Option<String>,
+    turn: Option<u64>,
+    track: Option<u64>,
+    object: Option<u64>,
+    points: Option<u64>,
+    confidence: Option<f64>,
+    probability: Option<f64>,
+    frame: Option<String>,
+    whole_box: Option<Box>,
+    r#box: Option<Box>,
+    /// Beside the size and the direction: the middle, or of `gen-scenes` that of the base.
+    #[serde(alias = "centre_m")]
+    position_m: Option<[f64; 3]>,
+    size_m: Option<[f64; 3]>,
+    yaw_deg: Option<f64>,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+struct Box {
+    centre_m: [f64; 3],
+    size_m: [f64; 3],
+    yaw_deg: f64,
+}
+
+/// Reads the boxes in `file`: an object of JSON with all, or a line of JSON for each.
+pub fn read(file: &Path) -> Result<Vec<Placed>, FormatError> {
+    let text = read_text(file, u64::MAX).map_err(|source| FormatError::io(file, source))?;
+    let flaw = |key: &str, error: serde_json::Error| {
+        let cause = format!("expected boxes as of detect, live, gen-scenes or gen-drive: {error}");
+        FormatError::malformed(file, key, cause)
+    };
+    if file.extension().is_some_and(|found| found.eq_ignore_ascii_case("jsonl")) {
+        let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
+        let objects = lines.map(|(i, line)| {
+            let key = format!("line {}", i + 1);
+            let object: Object = serde_json::from_str(line).map_err(|error| flaw(&key, error))?;
+            Ok((object.frame.as_deref() != Some("sensor"), object))
+        });
+        let objects = objects.collect::<Result<Vec<_>, FormatError>>()?;
+        return Ok(objects.into_iter().filter_map(|(world, of)| of.placed(world)).collect());
+    }
+    let OfSweep { objects, sensor_pose } =
+        serde_json::from_str(&text).map_err(|error| flaw("objects", error))?;
+    let is_seen = |object: &Object| sensor_pose.is_none() || object.points != Some(0);
+    let objects = objects.into_iter().filter(is_seen).filter_map(|object| object.placed(false));
+    Ok(match sensor_pose {
+        Some(pose) => objects.map(|placed| seen_from(pose, placed).as_truth()).collect(),
+        None => objects.collect(),
+    })
+}
+
+impl Object {
+    fn placed(self, in_world: bool) -> Option<Placed> {
+        let own = || {
+            let (centre_m, size_m) = (self.position_m?, self.size_m?);
+            Some(Box { centre_m, size_m, yaw_deg: self.yaw_deg? })
+        };
+        let Box { centre_m, size_m, yaw_deg } = self.whole_box.or(self.r#box).or_else(own)?;
+        Some(Placed {
+            class: self.class,
+            centre: centre_m,
+            size: size_m,
+            yaw: yaw_deg.to_radians(),
+            score: self.confidence.or(self.probability),
+            track: self.track.or(self.object),
+            truth: false,
+            turn: self.turn,
+            in_world,
+        })
+    }
+}
+
+/// A box with this base in the street's frame, from the sensor.
+fn seen_from(pose: Pose, placed: Placed) -> Placed {
+    let back = pose.rotation.inverse();
+    let middle = DVec3::from(placed.centre) + 0.5 * placed.size[2] * DVec3::Z;
+    let ahead = back * (DQuat::from_rotation_z(placed.yaw) * DVec3::X);
+    let centre = (back * (middle - pose.position_m)).to_array();
+    Placed { centre, yaw: ahead.y.atan2(ahead.x), ..placed }
+}

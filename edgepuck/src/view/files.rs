@@ -1,0 +1,277 @@
+//! Files and folders, as frames or boxes.
+
+use super::boxes;
+use super::frame::{Frame, Labels, Placed, Points};
+use super::scene;
+use crate::points::{PointsArgs, warn_of_packets};
+use crate::Usage;
+use anyhow::{Context, ensure};
+use formats::cloud_file::{CloudFormat, must_be_scan};
+use formats::labelled::read_labelled;
+use formats::labelled_sweep::read_labelled_sweep;
+use formats::turns::read_turns;
+use formats::{FormatError, Scan, Senders, ouster};
+use sim_gpu::internals::import::Format;
+use sim_gpu::internals::mesh::MeshFormat;
+use std::collections::HashMap;
+use std::fs;
+use std::io::Read;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+/// What a file holds.
+pub enum Content {
+    Frames(Vec<Frame>),
+    Boxes(Vec<Placed>),
+}
+
+/// The most clouds of a packed set and turns of a capture that are shown.
+const MOST_FRAMES: usize = 500;
+
+/// SemanticKITTI's labels (semantic-kitti.yaml of semantic-kitti-api), and their names here.
+const SEMANTIC_KITTI: [(u16, &str); 33] = [
+    (1, "air"),
+    (10, "car"),
+    (11, "bicycle"),
+    (13, "bus"),
+    (15, "motorcycle"),
+    (16, "on-rails"),
+    (18, "truck"),
+    (20, "other-vehicle"),
+    (30, "person"),
+    (31, "cyclist"),
+    (32, "motorcyclist"),
+    (40, "road"),
+    (44, "parking"),
+    (48, "sidewalk"),
+    (49, "ground"),
+    (50, "building"),
+    (51, "fence"),
+    (52, "other-structure"),
+    (60, "lane-marking"),
+    (70, "vegetation"),
+    (71, "trunk"),
+    (72, "terrain"),
+    (80, "pole"),
+    (81, "traffic-sign"),
+    (99, "other"),
+    (252, "car"),
+    (253, "cyclist"),
+    (254, "person"),
+    (255, "motorcyclist"),
+    (256, "on-rails"),
+    (257, "bus"),
+    (258, "truck"),
+    (259, "other-vehicle"),
+];
+
+/// Reads a file or a folder of any kind.
+pub fn read(file: &Path, points: &PointsArgs) -> anyhow::Result<Content> {
+    let extension = file.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    Ok(Content::Frames(match &*extension {
+        _ if file.is_dir() => folder(file, points)?,
+        "json" | "jsonl" => return Ok(Content::Boxes(boxes::read(file)?)),
+        _ if points.is_capture(file) => turns(file, points)?,
+        "toml" | "urdf" => vec![scene::read(file)?],
+        "ply" if !has_faces(file) => vec![cloud(file, points)?],
+        _ if Format::from_path(file).is_some() => vec![scene::read(file)?],
+        _ if MeshFormat::from_path(file).is_some() => vec![scene::of_mesh(file)?],
+        "npz" if points.format.is_none() && !must_be_scan(file) => set(file, points)?,
+        _ => vec![cloud(file, points)?],
+    }))
+}
+
+/// The first points in a file or a folder of any kind; of a capture, those of its first whole turn.
+pub fn first_points(file: &Path, points: &PointsArgs) -> anyhow::Result<Option<Points>> {
+    if points.is_capture(file) {
+        return Ok(cloud(file, points)?.points);
+    }
+    Ok(match read(file, points)? {
+        Content::Frames(frames) => frames.into_iter().find_map(|frame| frame.points),
+        Content::Boxes(_) => None,
+    })
+}
+
+/// The points in `file`; with the classes that labels beside it have, or with the objects that
+/// `gen-scenes` describes beside it.
+fn cloud(file: &Path, points: &PointsArgs) -> anyhow::Result<Frame> {
+    let scan = points.read(file)?;
+    let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let mut labels = semantic_labels(file, scan.len())?;
+    // Another file of this name is no description of a sweep.
+    let described = boxes::read(&file.with_extension("json")).unwrap_or_default();
+    let truth: Vec<_> = described.into_iter().filter(|placed| placed.truth).collect();
+    labels.extend(scan.object.as_ref().filter(|_| !truth.is_empty()).map(|of| classes(of, &truth)));
+    Ok(Frame { boxes: truth, ..Frame::of_scan(name, scan, labels) })
+}
+
+/// The class of each point by the number of its object.
+fn classes(objects: &[u32], truth: &[Placed]) -> Labels {
+    let mut names = vec!["other".to_owned(), "ground".to_owned()];
+    let mut numbers = HashMap::from([(0, 1)]);
+    for placed in truth {
+        let class = placed.class.clone().unwrap_or_default();
+        let known = names.iter().position(|name| *name == class).unwrap_or(names.len());
+        if known == names.len() {
+            names.push(class);
+        }
+        numbers.extend(placed.track.map(|object| (object, known as u32)));
+    }
+    let class = |object: &u32| numbers.get(&u64::from(*object)).copied().unwrap_or(0);
+    let values = objects.iter().map(class).collect();
+    Labels { name: "class", values, names: Some(names) }
+}
+
+/// Whether the PLY file has triangles: then it is a mesh.
+fn has_faces(file: &Path) -> bool {
+    let mut start = Vec::new();
+    let read = fs::File::open(file).and_then(|file| file.take(4096).read_to_end(&mut start));
+    let text = String::from_utf8_lossy(&start);
+    let header = text.split("end_header").next().unwrap_or_default();
+    let mut elements = header.lines().map(|line| line.split_whitespace().collect::<Vec<_>>());
+    read.is_ok()
+        && elements.any(|words| {
+            matches!(words[..], ["element", "face" | "tristrips", count] if count != "0")
+        })
+}
+
+/// The labels of SemanticKITTI of `velodyne/N.bin`, which are in `labels/N.label`.
+fn semantic_labels(file: &Path, n_points: usize) -> anyhow::Result<Vec<Labels>> {
+    let sequence = file.parent().filter(|folder| folder.ends_with("velodyne")).and_then(Path::parent);
+    let stem = file.file_stem().unwrap_or_default();
+    let Some(found) = sequence
+        .map(|sequence| sequence.join("labels").join(stem).with_extension("label"))
+        .filter(|labels| labels.is_file())
+    else {
+        return Ok(Vec::new());
+    };
+    let bytes = fs::read(&found).map_err(|source| FormatError::io(&found, source))?;
+    let (words, rest) = bytes.as_chunks::<4>();
+    ensure!(
+        rest.is_empty() && words.len() == n_points,
+        "{}: expected 4 bytes for each of {n_points} points, found {}",
+        found.display(),
+        bytes.len()
+    );
+    let words: Vec<u32> = words.iter().map(|word| u32::from_le_bytes(*word)).collect();
+    let mut names = vec!["other".to_owned()];
+    names.extend(SEMANTIC_KITTI.map(|(_, name)| name.to_owned()));
+    let class = |word: &u32| {
+        let known = SEMANTIC_KITTI.iter().position(|(label, _)| u32::from(*label) == word & 0xffff);
+        // Those that move have the names of those that stand.
+        let first = |at: usize| names.iter().position(|name| *name == names[at]);
+        known.and_then(|at| first(at + 1)).unwrap_or(0) as u32
+    };
+    let classes = words.iter().map(class).collect();
+    let objects = words.iter().map(|word| word >> 16).collect();
+    Ok(vec![
+        Labels { name: "class", values: classes, names: Some(names) },
+        Labels { name: "object", values: objects, names: None },
+    ])
+}
+
+/// A packed set, a frame for each cloud; a labelled sweep with its boxes; or else a cloud.
+fn set(file: &Path, points: &PointsArgs) -> anyhow::Result<Vec<Frame>> {
+    if let Ok(set) = read_labelled(file) {
+        let shown = set.len().min(MOST_FRAMES);
+        if shown < set.len() {
+            let file = file.display();
+            formats::say!("{file}: the first {shown} of {} clouds are shown", set.len());
+        }
+        let class = |label: usize| {
+            set.classes.as_ref().map_or(format!("class {label}"), |classes| classes[label].clone())
+        };
+        let frame = |i: usize| {
+            let points = set.cloud(i).to_vec();
+            let name = set.names.as_ref().map_or(String::new(), |names| names[i].clone());
+            let class = class(set.labels[i]);
+            let name = format!("{class} {name}");
+            let values = vec![0; points.len()];
+            let labels = Labels { name: "class", values, names: Some(vec![class]) };
+            Frame::of_scan(name, Scan { positions: points, ..Scan::default() }, vec![labels])
+        };
+        return Ok((0..shown).map(frame).collect());
+    }
+    let Ok(sweep) = read_labelled_sweep(file) else { return Ok(vec![cloud(file, points)?]) };
+    let scan = Scan { ring: sweep.lasers, ..Scan::of_points(&sweep.points) };
+    let mut frame = Frame::of_scan(String::new(), scan, Vec::new());
+    frame.boxes.extend(sweep.boxes.into_iter().map(|of| Placed {
+        class: Some(of.class),
+        centre: of.centre_m,
+        size: of.size_m,
+        yaw: of.yaw_rad,
+        score: None,
+        track: None,
+        truth: true,
+        turn: None,
+        in_world: false,
+    }));
+    Ok(vec![frame])
+}
+
+/// The sweeps of a sequence or of a folder; or the clusters that `segment` wrote, as one frame.
+fn folder(folder: &Path, points: &PointsArgs) -> anyhow::Result<Vec<Frame>> {
+    for inside in ["sweeps", "velodyne"] {
+        if folder.join(inside).is_dir() {
+            return self::folder(&folder.join(inside), points);
+        }
+    }
+    let entries = fs::read_dir(folder).map_err(|source| FormatError::io(folder, source))?;
+    let mut files: Vec<PathBuf> =
+        entries.filter_map(|entry| Some(entry.ok()?.path())).filter(|file| file.is_file()).collect();
+    files.sort();
+    let is_cluster = |file: &&PathBuf| {
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        name.starts_with("cluster-") && name.ends_with(".npy")
+    };
+    if files.iter().any(|file| is_cluster(&file)) {
+        let clusters: Vec<&PathBuf> = files.iter().filter(is_cluster).collect();
+        return Ok(vec![of_clusters(&clusters, points)?]);
+    }
+    files.retain(|file| CloudFormat::of_path(file).is_ok() || points.is_capture(file));
+    let cause = "expected a folder of sweeps or clusters, found no file of points in it";
+    ensure!(!files.is_empty(), Usage(format!("{}: {cause}", folder.display())));
+    files.iter().map(|file| cloud(file, points)).collect()
+}
+
+fn of_clusters(files: &[&PathBuf], points: &PointsArgs) -> anyhow::Result<Frame> {
+    let (mut positions, mut values) = (Vec::new(), Vec::new());
+    for (file, number) in files.iter().zip(0..) {
+        positions.extend(points.read(file)?.positions);
+        values.resize(positions.len(), number);
+    }
+    let labels = Labels { name: "cluster", values, names: None };
+    let scan = Scan { positions, pose: Some(super::frame::IDENTITY), ..Scan::default() };
+    Ok(Frame::of_scan(String::new(), scan, vec![labels]))
+}
+
+/// The turns of a capture, in the sensor's frame.
+fn turns(file: &Path, points: &PointsArgs) -> anyhow::Result<Vec<Frame>> {
+    let metadata = points.metadata.as_deref().map(ouster::Metadata::read).transpose()?;
+    let mut senders = Senders::new(points.from);
+    let (mut first, mut scans) = (None, Vec::<Scan>::new());
+    let (_, counts) = read_turns(file, metadata.as_ref(), &mut senders, |turned| {
+        let turn = turned.turns.floor();
+        let number = (turn - *first.get_or_insert(turn)).max(0.0) as usize;
+        if number >= MOST_FRAMES {
+            return ControlFlow::Break(());
+        }
+        if scans.len() <= number {
+            scans.resize_with(number + 1, Scan::default);
+        }
+        let scan = &mut scans[number];
+        scan.positions.push(turned.found.point_m);
+        scan.range_m.get_or_insert_default().push(turned.found.range_m);
+        scan.ring.get_or_insert_default().push(turned.found.ring);
+        scan.time_s.get_or_insert_default().push(turned.time_s as f32);
+        scan.reflectivity.get_or_insert_default().push(turned.found.reflectivity);
+        ControlFlow::Continue(())
+    })
+    .with_context(|| "showing the turns of a capture")?;
+    warn_of_packets(file, &senders, &counts);
+    let frame = |(scan, turn): (Scan, u64)| {
+        let name = format!("turn {turn}");
+        Frame { turn: Some(turn), ..Frame::of_scan(name, scan, Vec::new()) }
+    };
+    Ok(scans.into_iter().zip(0..).map(frame).collect())
+}

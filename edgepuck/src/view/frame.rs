@@ -1,0 +1,269 @@
+//! What a page shows, in the form that the viewer's JavaScript takes (`createViewer` in
+//! assets/view/src/viewer.js).
+
+use anyhow::ensure;
+use base64::display::Base64Display;
+use base64::engine::general_purpose::STANDARD;
+use bytemuck::cast_slice;
+use formats::Scan;
+use formats::scan::{Attribute, Column};
+use serde::ser::{SerializeMap, SerializeStruct};
+use serde::{Serialize, Serializer};
+use std::path::Path;
+
+use crate::Usage;
+
+/// A file, or a drive or a folder of sweeps.
+#[derive(Serialize)]
+pub struct Pane {
+    name: String,
+    pub frames: Vec<Frame>,
+}
+
+/// What is seen at once.
+#[derive(Default, Serialize)]
+pub struct Frame {
+    pub name: String,
+    /// The number of the turn, which boxes name; that of the frame if it is not known.
+    #[serde(skip)]
+    pub turn: Option<u64>,
+    pub points: Option<Points>,
+    pub meshes: Vec<Mesh>,
+    pub boxes: Vec<Placed>,
+    pub sensors: Vec<Sensor>,
+}
+
+/// Points with their attributes.
+pub struct Points {
+    pub scan: Scan,
+    /// What a scan has no attribute for.
+    pub labels: Vec<Labels>,
+}
+
+/// A number of each point.
+#[derive(Clone)]
+pub struct Labels {
+    pub name: &'static str,
+    pub values: Vec<u32>,
+    /// The names of classes, if the numbers are their indices.
+    pub names: Option<Vec<String>>,
+}
+
+/// Triangles, metres from the origin of the frame's points.
+#[derive(Serialize)]
+pub struct Mesh {
+    pub name: String,
+    pub class: Option<String>,
+    #[serde(serialize_with = "block_f32")]
+    pub position: Vec<[f32; 3]>,
+    #[serde(serialize_with = "block_u32")]
+    pub index: Vec<[u32; 3]>,
+}
+
+/// A sensor, and some of its beams up to where they end.
+#[derive(Serialize)]
+pub struct Sensor {
+    pub name: String,
+    pub pose: [f64; 16],
+    #[serde(serialize_with = "block_f32")]
+    pub rays: Vec<[f32; 3]>,
+}
+
+/// A box around an object.
+#[derive(Clone, Serialize)]
+pub struct Placed {
+    pub class: Option<String>,
+    pub centre: [f64; 3],
+    pub size: [f64; 3],
+    /// The direction of the length, radians counterclockwise from x.
+    pub yaw: f64,
+    pub score: Option<f64>,
+    pub track: Option<u64>,
+    pub truth: bool,
+    #[serde(skip)]
+    pub turn: Option<u64>,
+    /// Whether its frame is the world's, and not the sensor's.
+    #[serde(skip)]
+    pub in_world: bool,
+}
+
+impl Pane {
+    pub fn new(file: &Path, frames: Vec<Frame>) -> Self {
+        let name = file.file_name().unwrap_or(file.as_os_str());
+        Self { name: name.to_string_lossy().into_owned(), frames }
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.frames.iter().all(|frame| {
+            frame.n_points() + frame.meshes.len() + frame.boxes.len() == 0
+        })
+    }
+
+    /// What it shows, for people.
+    pub fn told(&self) -> String {
+        let count = |n: usize, what: &str| (n > 0).then(|| format!("{n} {what}"));
+        let sum = |of: fn(&Frame) -> usize| self.frames.iter().map(of).sum::<usize>();
+        let parts = [
+            count(sum(Frame::n_points), "points"),
+            count(sum(|frame| frame.meshes.len()), "meshes"),
+            count(sum(|frame| frame.boxes.len()), "boxes"),
+            Some(self.frames.len()).filter(|n| *n > 1).map(|n| format!("{n} frames")),
+        ];
+        parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
+    }
+
+    /// Adds the boxes in `file` to the frames of their turns, or to all frames if they name none.
+    pub fn add(&mut self, boxes: Vec<Placed>, file: &Path) -> anyhow::Result<()> {
+        if self.frames.is_empty() {
+            let mut turns: Vec<_> = boxes.iter().map(|placed| placed.turn).collect();
+            turns.sort_unstable();
+            turns.dedup();
+            let frame = |turn: Option<u64>| {
+                let name = turn.map_or(String::new(), |turn| format!("turn {turn}"));
+                Frame { name, turn, ..Frame::default() }
+            };
+            self.frames = turns.into_iter().map(frame).collect();
+        }
+        let has_points = self.frames.iter().any(|frame| frame.n_points() > 0);
+        ensure!(
+            !has_points || boxes.iter().all(|placed| !placed.in_world),
+            Usage(format!(
+                "{}: expected boxes in the sensor's frame, as its points are, found boxes in the \
+                 world's: show them alone, or of `live` without --poses",
+                file.display()
+            ))
+        );
+        for (number, frame) in (0..).zip(&mut self.frames) {
+            let is_of = |placed: &&Placed| {
+                placed.turn.is_none_or(|turn| turn == frame.turn.unwrap_or(number))
+            };
+            let shift = frame.sensor_m();
+            let boxes = boxes.iter().filter(is_of).cloned().map(|mut placed| {
+                placed.centre = [0, 1, 2].map(|axis| placed.centre[axis] + shift[axis]);
+                placed
+            });
+            let boxes: Vec<_> = boxes.collect();
+            frame.boxes.extend(boxes);
+        }
+        Ok(())
+    }
+
+    /// Keeps so few frames, evenly, that they have at most `most` points.
+    pub fn thin(&mut self, most: usize) {
+        let n_points: usize = self.frames.iter().map(Frame::n_points).sum();
+        let every = n_points.div_ceil(most.max(1));
+        if every > 1 && self.frames.len() > 1 {
+            let n = self.frames.len();
+            let mut number = 0..;
+            self.frames.retain(|_| number.next().is_some_and(|i: usize| i.is_multiple_of(every)));
+            let (name, left) = (&self.name, self.frames.len());
+            formats::say!("{name}: {left} of {n} frames are shown, which have {most} points at most");
+        }
+    }
+}
+
+impl Frame {
+    /// Points, with the place of the sensor if they are a sensor's.
+    pub fn of_scan(name: String, scan: Scan, labels: Vec<Labels>) -> Self {
+        let measured = [&scan.range_m, &scan.intensity].into_iter().any(Option::is_some)
+            || scan.ring.is_some()
+            || scan.pose.is_some();
+        let origin = scan.origin;
+        let pose = from_origin(scan.pose.unwrap_or(IDENTITY), origin);
+        let sensor = Sensor { name: "sensor".to_owned(), pose, rays: Vec::new() };
+        let sensors = measured.then_some(sensor).into_iter().collect();
+        Self { name, points: Some(Points { scan, labels }), sensors, ..Self::default() }
+    }
+
+    pub fn n_points(&self) -> usize {
+        self.points.as_ref().map_or(0, |points| points.scan.len())
+    }
+
+    /// The position of the sensor of the points from their origin, metres.
+    fn sensor_m(&self) -> [f64; 3] {
+        let Some(Points { scan, .. }) = &self.points else { return [0.0; 3] };
+        let at = scan.sensor_position_m();
+        [0, 1, 2].map(|axis| at[axis] - scan.origin[axis])
+    }
+}
+
+impl Placed {
+    pub fn as_truth(self) -> Self {
+        Self { truth: true, ..self }
+    }
+}
+
+/// A sensor at the origin, which looks along x.
+pub const IDENTITY: [f64; 16] =
+    [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.];
+
+/// The pose as seen from `origin`.
+pub fn from_origin(mut pose: [f64; 16], origin: [f64; 3]) -> [f64; 16] {
+    (0..3).for_each(|axis| pose[4 * axis + 3] -= origin[axis]);
+    pose
+}
+
+/// Numbers as the viewer takes them: little-endian, in base64, by their type.
+struct Block<'a>(Column<'a>);
+
+impl Serialize for Block<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let (kind, bytes): (_, &[u8]) = match self.0 {
+            Column::F32(values) => ("f32", cast_slice(values)),
+            Column::U8(values) => ("u8", values),
+            Column::U16(values) => ("u16", cast_slice(values)),
+            Column::U32(values) => ("u32", cast_slice(values)),
+            Column::Vector(values) => ("f32", cast_slice(values)),
+        };
+        let mut map = serializer.serialize_map(Some(1))?;
+        map.serialize_entry(kind, &format_args!("{}", Base64Display::new(bytes, &STANDARD)))?;
+        map.end()
+    }
+}
+
+fn block_f32<S: Serializer>(values: &[[f32; 3]], serializer: S) -> Result<S::Ok, S::Error> {
+    Block(Column::Vector(values)).serialize(serializer)
+}
+
+fn block_u32<S: Serializer>(values: &[[u32; 3]], serializer: S) -> Result<S::Ok, S::Error> {
+    Block(Column::U32(values.as_flattened())).serialize(serializer)
+}
+
+#[derive(Serialize)]
+struct Values<'a> {
+    name: &'a str,
+    unit: &'a str,
+    kind: &'a str,
+    values: Block<'a>,
+    names: Option<&'a [String]>,
+}
+
+impl Serialize for Points {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let media = ["surface", "rain", "snow", "fog", "dust"].map(str::to_owned);
+        let of_scan = self.scan.columns().filter_map(|(attribute, column)| {
+            let (unit, kind) = match attribute {
+                Attribute::Range => ("m", "number"),
+                Attribute::Time => ("s", "number"),
+                Attribute::Object | Attribute::Triangle | Attribute::Return => ("", "id"),
+                Attribute::Medium => ("", "class"),
+                Attribute::Sensor | Attribute::Attitude | Attribute::Normal => return None,
+                _ => ("", "number"),
+            };
+            let names = (attribute == Attribute::Medium).then_some(&media[..]);
+            Some(Values { name: attribute.name(), unit, kind, values: Block(column), names })
+        });
+        let labels = self.labels.iter().map(|Labels { name, values, names }| Values {
+            name,
+            unit: "",
+            kind: if names.is_some() { "class" } else { "id" },
+            values: Block(Column::U32(values)),
+            names: names.as_deref(),
+        });
+        let mut fields = serializer.serialize_struct("Points", 3)?;
+        fields.serialize_field("position", &Block(Column::Vector(&self.scan.positions)))?;
+        fields.serialize_field("origin", &self.scan.origin)?;
+        fields.serialize_field("columns", &labels.chain(of_scan).collect::<Vec<_>>())?;
+        fields.end()
+    }
+}

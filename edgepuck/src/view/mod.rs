@@ -1,0 +1,112 @@
+//! `edgepuck view`: a page that shows points, meshes, boxes and scenes in three dimensions.
+
+mod boxes;
+pub mod files;
+pub mod frame;
+mod page;
+mod scene;
+
+use crate::points::PointsArgs;
+use crate::{Outcome, Usage};
+use anyhow::ensure;
+use files::Content;
+use formats::outputs::{Overwrite, need_extension};
+use frame::Pane;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// The most points of a page: of a longer drive, every second or third sweep is shown, and so on.
+const MOST_POINTS: usize = 6_000_000;
+
+#[derive(clap::Args)]
+pub struct Args {
+    /// What to show: scans, sweeps and clouds of any format; captures; meshes and scenes (.toml),
+    /// with what their sensors see; packed sets; folders of sweeps, of clusters or of a sequence of
+    /// SemanticKITTI. Two are shown side by side. Boxes, as of detect (.json) and live (.jsonl), are
+    /// drawn in what is named before them
+    #[arg(value_name = "FILE", required = true)]
+    files: Vec<PathBuf>,
+
+    /// Boxes to draw as truth: the JSON file of a sweep of gen-scenes, or as of detect
+    #[arg(long, value_name = "FILE")]
+    truth: Option<PathBuf>,
+
+    #[command(flatten)]
+    points: PointsArgs,
+
+    /// Page to write (.html) [default: one in the folder for temporary files, which is opened]
+    #[arg(long, value_name = "HTML")]
+    out: Option<PathBuf>,
+
+    #[command(flatten)]
+    overwrite: Overwrite,
+}
+
+pub fn run(args: &Args) -> anyhow::Result<Outcome> {
+    if let Some(out) = &args.out {
+        need_extension("--out", out, &["html"])?;
+        args.overwrite.check([&**out])?;
+    }
+    let panes = panes(args)?;
+    if panes.iter().all(Pane::is_empty) {
+        let files = args.files.iter().map(|file| file.display().to_string()).collect::<Vec<_>>();
+        formats::say!("{}: expected something to show, found nothing", files.join(", "));
+        return Ok(Outcome::SomeRefused);
+    }
+    let out = args.out.clone().unwrap_or_else(|| temporary(&args.files[0]));
+    page::write(&panes, &out)?;
+    let told = panes.iter().map(Pane::told).collect::<Vec<_>>();
+    formats::say!("{}: {}", told.join(" | "), out.display());
+    if args.out.is_none() {
+        open(&out);
+    }
+    Ok(Outcome::Success)
+}
+
+fn panes(args: &Args) -> anyhow::Result<Vec<Pane>> {
+    let (mut panes, mut boxes) = (Vec::<Pane>::new(), Vec::new());
+    for file in &args.files {
+        match files::read(file, &args.points)? {
+            Content::Frames(frames) => panes.push(Pane::new(file, frames)),
+            // Before the first pane, they belong to it.
+            Content::Boxes(found) => boxes.push((panes.len().max(1) - 1, file, found)),
+        }
+    }
+    ensure!(
+        panes.len() <= 2,
+        Usage(format!("expected at most two files side by side, found {}", panes.len()))
+    );
+    if panes.is_empty() {
+        panes.push(Pane::new(&args.files[0], Vec::new()));
+    }
+    for (pane, file, found) in boxes {
+        panes[pane].add(found, file)?;
+    }
+    if let Some(file) = &args.truth {
+        let found = boxes::read(file)?.into_iter().map(frame::Placed::as_truth).collect::<Vec<_>>();
+        for pane in &mut panes {
+            pane.add(found.clone(), file)?;
+        }
+    }
+    let most = MOST_POINTS / panes.len();
+    panes.iter_mut().for_each(|pane| pane.thin(most));
+    Ok(panes)
+}
+
+/// A page in the folder for temporary files. The same input has the same page, so that few pile up.
+fn temporary(file: &Path) -> PathBuf {
+    let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+    std::env::temp_dir().join(format!("edgepuck-view-{stem}.html"))
+}
+
+/// Opens `page` in the browser, if this machine has one; its path is printed anyway.
+fn open(page: &Path) {
+    let (program, words): (_, &[&str]) = match std::env::consts::OS {
+        "windows" => ("cmd", &["/c", "start", ""]),
+        "macos" => ("open", &[]),
+        _ => ("xdg-open", &[]),
+    };
+    let mut command = Command::new(program);
+    command.args(words).arg(page);
+    let _ = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+}

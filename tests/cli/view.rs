@@ -1,0 +1,112 @@
+//! `view`: what its pages hold. How a browser shows them is tested by assets/view/test/browser.mjs.
+
+use crate::Folder;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use serde_json::Value;
+
+/// The data of the page `file`.
+fn data(folder: &Folder, file: &str) -> Value {
+    let page = folder.text(file);
+    assert!(!page.contains("src=") && !page.contains("https://cdn"), "it needs another file");
+    let (_, data) = page.split_once("id=\"data\">").unwrap();
+    serde_json::from_str(data.split_once("</script>").unwrap().0).unwrap()
+}
+
+fn bytes(block: &Value) -> Vec<u8> {
+    let (_, base64) = block.as_object().unwrap().iter().next().unwrap();
+    STANDARD.decode(base64.as_str().unwrap()).unwrap()
+}
+
+fn frame<'a>(data: &'a Value, pane: usize) -> &'a Value {
+    &data["panes"][pane]["frames"][0]
+}
+
+#[test]
+fn a_page_holds_the_points_their_columns_and_the_boxes() {
+    let folder = Folder::new();
+    folder.succeeds("gen-scenes street --sweeps 1 --save 1 --seed 3 --adapter cpu --out street");
+    let sweep = "street/sweeps/000000.npz";
+    folder.succeeds(&format!("detect {sweep} --out objects.json"));
+    let said = folder.succeeds(&format!("view {sweep} objects.json --out page.html"));
+    let scan = folder.scan(sweep);
+    assert!(said.contains(&format!("{} points, ", scan.len())), "{said}");
+
+    let data = data(&folder, "page.html");
+    let frame = frame(&data, 0);
+    let positions = bytes(&frame["points"]["position"]);
+    let expected = scan.positions.as_flattened().iter().flat_map(|x| x.to_le_bytes());
+    assert!(positions == expected.collect::<Vec<_>>());
+    let columns = frame["points"]["columns"].as_array().unwrap();
+    let names: Vec<_> = columns.iter().map(|column| column["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["class", "range", "beam", "ring", "time", "object", "intensity"]);
+    // The class of each point is that of its object in the description beside the sweep.
+    let described: Value = serde_json::from_str(&folder.text("street/sweeps/000000.json")).unwrap();
+    let classes: Vec<_> = bytes(&columns[0]["values"]).as_chunks().0.iter().copied().map(u32::from_le_bytes).collect();
+    for (object, class) in scan.object.as_ref().unwrap().iter().zip(classes) {
+        let name = &columns[0]["names"][class as usize];
+        match object.checked_sub(1) {
+            None => assert_eq!(name, "ground"),
+            Some(i) => assert_eq!(*name, described["objects"][i as usize]["class"]),
+        }
+    }
+    let found: Value = serde_json::from_str(&folder.text("objects.json")).unwrap();
+    let boxes = frame["boxes"].as_array().unwrap();
+    let (truth, detected): (Vec<_>, Vec<_>) = boxes.iter().partition(|placed| placed["truth"] == true);
+    assert_eq!(detected.len(), found["objects"].as_array().unwrap().len());
+    // A car that was found stands where one was drawn, within the size of a person.
+    let first = detected.iter().find(|placed| placed["class"] == "car").unwrap();
+    let is_near = |other: &&&Value| {
+        let off = |axis: usize| {
+            let [a, b] = [first, **other].map(|of| of["centre"][axis].as_f64().unwrap());
+            a - b
+        };
+        other["class"] == "car" && off(0).hypot(off(1)) < 0.7
+    };
+    assert!(truth.iter().any(|other| is_near(&other)), "{first}: {truth:?}");
+}
+
+#[test]
+fn folders_captures_meshes_and_scenes_are_shown() {
+    let folder = Folder::with_meshes();
+    folder.succeeds("gen-drive --seconds 0.5 --out drive.pcap");
+    folder.succeeds("gen-drive --seconds 0.3 --layout semantickitti --out drive");
+    folder.succeeds("view drive.pcap drive --out drives.html");
+    let drives = data(&folder, "drives.html");
+    let n_frames = |pane: usize| drives["panes"][pane]["frames"].as_array().unwrap().len();
+    assert!([5, 6].contains(&n_frames(0)), "{}", n_frames(0));
+    assert_eq!(n_frames(1), 3);
+    let column = &frame(&drives, 1)["points"]["columns"][0];
+    assert!(column["names"].as_array().unwrap().contains(&"car".into()), "{column}");
+    folder.succeeds("view drive.truth.jsonl --out truth.html");
+    assert!(!frame(&data(&folder, "truth.html"), 0)["boxes"].as_array().unwrap().is_empty());
+
+    folder.succeeds("gen-shapes --out shapes --train 1 --test 1");
+    let mesh = "shapes/chair/train/chair_0001.off";
+    folder.write(
+        "scene.toml",
+        format!("[[object]]\nmesh = \"{mesh}\"\nlabel = \"</script>\"\n[[sensor]]\nprofile = \"vlp16\"\nposition_m = [3, 0, 1]\nlook_at_m = [0, 0, 0]\n"),
+    );
+    folder.succeeds(&format!("view {mesh} scene.toml --out two.html"));
+    let two = data(&folder, "two.html");
+    assert_eq!(frame(&two, 0)["points"], Value::Null);
+    assert_eq!(frame(&two, 1)["meshes"][0]["class"], "</script>");
+    assert!(bytes(&frame(&two, 1)["sensors"][0]["rays"]).len() > 100 * 24);
+    folder.refuses(
+        2,
+        &[
+            ("view drive.pcap --out page.png", "--out: expected a name with .html, found page.png"),
+            ("view drive.pcap --out two.html", "two.html: it exists already"),
+            ("view drive drive drive --out a.html", "expected at most two files side by side, found 3"),
+            ("view drive.pcap drive.truth.jsonl --out a.html", "expected boxes in the sensor's frame"),
+        ],
+    );
+    folder.write("empty/notes.md", "nothing");
+    folder.write("bad.json", "{}");
+    folder.refuses(2, &[("view empty --out a.html", "found no file of points in it")]);
+    folder.refuses(1, &[
+        ("view nowhere.npz --out a.html", "nowhere.npz"),
+        ("view bad.json --out a.html", "bad.json: objects: expected boxes as of detect"),
+    ]);
+    assert!(!folder.at("a.html").exists());
+}

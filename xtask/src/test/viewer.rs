@@ -1,0 +1,71 @@
+//! The viewer in `assets/view`: its sources are linted, what the programs embed is built again and
+//! compared, and pages are opened in Chromium.
+
+use super::peers::Programs;
+use crate::summary::{Counts, Summary};
+use anyhow::{Context, anyhow, ensure};
+use std::path::PathBuf;
+use std::process::Command;
+use xtask::venv::{cache_dir, succeeds};
+use xtask::workspace::{output, root};
+
+/// The names of Chromium.
+const BROWSERS: [&str; 2] = ["chromium", "google-chrome"];
+
+/// Checks the viewer with the packages of npm, which are downloaded first if `install` is set.
+pub fn run(summary: &mut Summary, install: bool, programs: &anyhow::Result<Programs>) {
+    summary.step("viewer", |summary| {
+        let lack = match succeeds(Command::new("npm").arg("--version")) {
+            Err(_) => Some("there is no npm"),
+            Ok(()) if install => {
+                let mut ci = in_viewer("npm");
+                succeeds(ci.args(["ci", "--silent"])).err().map(|_| "npm cannot download packages")
+            }
+            Ok(()) if !folder().join("node_modules").is_dir() => Some("its packages are missing"),
+            Ok(()) => None,
+        };
+        if let Some(lack) = lack {
+            return Ok(summary.skip("viewer", 3, lack));
+        }
+        passes(in_viewer("npm").args(["run", "--silent", "check"]))?;
+        same_bundle()?;
+        let counts = Counts { passed: 2, ..Counts::default() };
+        let answers = |name: &&str| succeeds(Command::new(name).arg("--version")).is_ok();
+        let Some(browser) = BROWSERS.iter().find(answers) else {
+            return Ok(counts.and(summary.skip("pages in a browser", 1, "there is no Chromium")));
+        };
+        let programs = programs.as_ref().map_err(|cause| anyhow!("{cause:#}"))?;
+        let path = output(Command::new("which").arg(browser))?;
+        passes(in_viewer("node").arg("test/browser.mjs").arg(&programs[0].1).arg(path.trim()))?;
+        Ok(counts.and(Counts::PASSED))
+    });
+}
+
+fn folder() -> PathBuf {
+    root().join("assets/view")
+}
+
+fn in_viewer(program: &str) -> Command {
+    let mut command = Command::new(program);
+    command.current_dir(folder());
+    command
+}
+
+fn passes(command: &mut Command) -> anyhow::Result<()> {
+    succeeds(command).map_err(|cause| anyhow!(cause))
+}
+
+/// Checks that `viewer.js` is what its sources make.
+fn same_bundle() -> anyhow::Result<()> {
+    let built = cache_dir().join("viewer.js");
+    passes(in_viewer("node").arg("build.mjs").arg(&built))?;
+    let read = |file: PathBuf| std::fs::read(&file).with_context(|| file.display().to_string());
+    let is_same = read(built.clone())? == read(folder().join("viewer.js"))?;
+    ensure!(
+        is_same,
+        "assets/view/viewer.js is not what its sources make, which is {}: `npm ci && npm run build` \
+         in assets/view makes it",
+        built.display()
+    );
+    Ok(())
+}
