@@ -58,7 +58,7 @@ function fields({ sensors, subjects }) {
     { name: "sensor", label: "Sensor", value: "vlp32c", options: same(sensors) },
     { name: "distance", label: "Distance, in the object's radii", value: 3, min: 1.2, max: 40, step: 0.1, unit: "" },
     { name: "elevation", label: "Elevation", value: 20, min: -80, max: 80, step: 1, unit: "°" },
-    { name: "azimuth", label: "Azimuth", value: 30, min: 0, max: 359, step: 1, unit: "°" },
+    { name: "azimuth", label: "Azimuth", value: 215, min: 0, max: 359, step: 1, unit: "°" },
     { name: "noise", label: "Noise of the range", value: 0, min: 0, max: 0.1, step: 0.001, unit: " m" },
     { name: "rain", label: "Rain", value: 0, min: 0, max: 100, step: 1, unit: " mm/h" },
     { name: "fog", label: "Visibility in fog", value: 0, min: 0, max: 300, step: 5, unit: " m", zero: "no fog" },
@@ -108,6 +108,13 @@ function drawFields(all) {
   $("fields").replaceChildren(...rows);
 }
 
+/** Shows the settings of objects, which scenes lack: their sensors have places of their own. */
+function showFields(isObject) {
+  for (const name of ["distance", "elevation", "azimuth", "model"]) {
+    controls[name].closest(".field").hidden = !isObject;
+  }
+}
+
 /** The link: what differs from the usual settings. */
 function link() {
   const changed = Object.entries(controls).filter(([, control]) => control.value !== control.dataset.usual);
@@ -144,6 +151,10 @@ function draw(reply, name, isNew) {
   const shown = { title: "Edgepuck", panes: [pane(reply, name)] };
   if (viewer) viewer.setData(shown, { fit: isNew });
   else viewer = EdgepuckViewer.createViewer($("viewer"), shown);
+  // All of an object, in the middle of the picture.
+  const { extent, navigation } = viewer;
+  const { middle, radius } = extent;
+  if (isNew && data.mesh?.index.length) navigation.fit({ middle, radius: 1.3 * radius, floor: middle[2] });
 }
 
 const whole = (number) => number.toLocaleString("en");
@@ -152,7 +163,7 @@ const ms = (number) => `${number.toFixed(number < 10 ? 1 : 0)} ms`;
 function say({ scan, answer, castMs, classMs, place }) {
   const nPoints = scan.range.length;
   const found = answer && `${answer.class} ${(100 * answer.probability).toFixed(0)} %`;
-  $("class").textContent = found ?? (nPoints ? "a scene" : "no point: nothing is in view");
+  $("class").textContent = found ?? (nPoints ? chosen("mesh") : "no point: nothing is in view");
   const facts = [`${whole(nPoints)} points`, `cast in ${ms(castMs)} on ${place}`];
   if (answer) facts.push(`named in ${ms(classMs)} on the CPU`);
   $("facts").textContent = facts.join(" · ");
@@ -182,6 +193,7 @@ async function update() {
       const reply = await ask(request);
       shownSubject = subject.key;
       fail(reply.warnings.join("\n"));
+      if (isNew) showFields(reply.scan.mesh.index.length > 0);
       draw(reply, subject.name, isNew);
       say(reply);
     } catch (error) {

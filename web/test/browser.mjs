@@ -140,7 +140,8 @@ await test("a file that is dropped is scanned and named, and one that is no mesh
 
 await test("a street is scanned, in the dark", async () => {
   const { opened, done } = await show("#mesh=street&rain=20", { colorScheme: "dark" });
-  assert.equal(await text(opened, "class"), "a scene");
+  assert.equal(await text(opened, "class"), "street");
+  assert.ok(await opened.locator("#distance").isHidden());
   await opened.screenshot({ path: join(pictures, "dark.png") });
   await done();
 });
