@@ -131,7 +131,7 @@ await test("a file that is dropped is scanned and named, and one that is no mesh
   await drop(opened, "chair_0046.obj", chair);
   assert.match(await text(opened, "class"), /^chair \d+ %$/);
   await drop(opened, "bad.off", "OFF\n3 1 0\n0 0 0\n1 0 zero\n");
-  assert.equal(await text(opened, "error"), 'bad.off:4: expected a coordinate, found "zero"');
+  assert.equal(await text(opened, "error"), 'bad.off:4: expected a finite coordinate, found "zero"');
   await opened.screenshot({ path: join(pictures, "error.png") });
   await drop(opened, "chair_0046.obj", chair);
   assert.ok(await opened.locator("#error").isHidden());

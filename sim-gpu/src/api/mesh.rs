@@ -65,7 +65,7 @@ impl Mesh {
     /// ```
     /// # use sim_gpu::Mesh;
     /// let error = Mesh::from_bytes("a.off", b"OFF\n3 1 0\n0 0 zero\n").unwrap_err();
-    /// assert_eq!(error.to_string(), "a.off:3: expected a coordinate, found \"zero\"");
+    /// assert_eq!(error.to_string(), "a.off:3: expected a finite coordinate, found \"zero\"");
     /// ```
     ///
     /// # Errors
