@@ -164,7 +164,7 @@ impl Simulator {
             Attribute::Triangle,
         ];
         let scan = scene.scan(&self.sensor, pose).with(&self.caster).seed(settings.seed);
-        let scan = scan.effects(settings.effects()).attributes(attributes.into_iter());
+        let scan = scan.effects(settings.effects()).attributes(attributes);
         let points = scan.run_async().await.map_err(words)?.points;
         let label = |instance: &sim_gpu::Instance| instance.label.clone().unwrap_or_default();
         let labels: Vec<String> = scene.instances().iter().map(label).collect();

@@ -14,7 +14,7 @@ export function serve(folders) {
       response.setHeader("content-type", TYPES[extname(url.split("?")[0])] ?? "application/octet-stream");
       response.end(content);
     } catch {
-      response.statusCode = 404;
+      response.statusCode = url === "/favicon.ico" ? 204 : 404;
       response.end();
     }
   });
