@@ -11,12 +11,12 @@
 // Three words for each beam of a pattern.
 @group(0) @binding(5) var<storage, read> directions: array<i32>;
 // Batches of different sizes reuse the buffers, so that array lengths do not give the number of
-// elements. These counts come with each dispatch, so that the bind groups stay the same.
+// elements.
 struct Counts {
     rays: u32,
     views: u32,
 }
-var<immediate> counts: Counts;
+@group(0) @binding(6) var<uniform> counts: Counts;
 
 // The view of ray `i`: the last whose first ray is not after it.
 fn view_of(i: u32) -> View {

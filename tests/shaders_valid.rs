@@ -59,8 +59,7 @@ fn parsed(effects: &Effects) -> naga::Module {
     let wgsl = compose(effects);
     let module = naga::front::wgsl::parse_str(&wgsl)
         .unwrap_or_else(|error| panic!("{}", error.emit_to_string(&wgsl)));
-    // The number of rays is immediate data.
-    Validator::new(ValidationFlags::all(), Capabilities::default() | Capabilities::IMMEDIATES)
+    Validator::new(ValidationFlags::all(), Capabilities::default())
         .validate(&module)
         .unwrap_or_else(|error| panic!("{}", error.emit_to_string(&wgsl)));
     module

@@ -3,13 +3,14 @@
 # what Open3D links to, PCL, a browser, what judges Debian packages, Slurm, GNU parallel,
 # PyTorch for the documentation's examples, for the Raspberry Pi an emulator and a model of its
 # core, and the standard libraries of the targets that code is checked for: the Raspberry Pi,
-# and systems of Metal and of Direct3D 12. Both the README and CI run this, through `cargo xtask
+# systems of Metal and of Direct3D 12, and WebAssembly. Both the README and CI run this, through `cargo xtask
 # test`.
 set -eu
 
 backported="mesa-vulkan-drivers libvulkan1"
 plain="chromium g++ lintian munge parallel pcl-tools qemu-user slurm-wlm libusb-1.0-0"
-targets="aarch64-unknown-linux-musl aarch64-apple-darwin x86_64-pc-windows-msvc"
+targets="aarch64-unknown-linux-musl aarch64-apple-darwin x86_64-pc-windows-msvc \
+    wasm32-unknown-unknown wasm32-wasip1"
 # The releases of LLVM whose llvm-mca knows Neoverse N1, the newest first.
 llvms="22 21 20 19"
 

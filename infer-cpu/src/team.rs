@@ -134,11 +134,15 @@ impl<W: Work> Team<W> {
     /// they are finished.
     pub fn run(&self, n_chunks: usize) {
         assert!(n_chunks <= MOST_CHUNKS, "a task of {n_chunks} chunks");
+        let alone = || (0..n_chunks).for_each(|chunk| self.work.chunk(0, chunk));
+        // Before the clock is read, which WebAssembly lacks.
+        if n_chunks <= 1 || self.workers.is_empty() {
+            return alone();
+        }
         let start = Instant::now();
         let mut backoff = self.backoff.lock().unwrap_or_else(PoisonError::into_inner);
-        if n_chunks <= 1 || self.workers.is_empty() || backoff.is_on(start) {
-            (0..n_chunks).for_each(|chunk| self.work.chunk(0, chunk));
-            return;
+        if backoff.is_on(start) {
+            return alone();
         }
         let queue = &*self.queue;
         queue.announce(n_chunks);

@@ -56,34 +56,41 @@ impl FromStr for AdapterRequest {
 impl OpenCaster {
     /// The caster that answers `request` and models `effects`.
     pub fn open(request: &AdapterRequest, effects: &Effects) -> Result<Self, CastError> {
+        pollster::block_on(Self::open_async(request, effects))
+    }
+
+    /// As [`OpenCaster::open`], in a browser too, where nothing may wait.
+    pub async fn open_async(
+        request: &AdapterRequest,
+        effects: &Effects,
+    ) -> Result<Self, CastError> {
         match request {
             AdapterRequest::Cpu => Ok(Self::Cpu(effects.clone())),
-            AdapterRequest::Auto => Ok(Self::open_best(effects).0),
-            AdapterRequest::Named(name) => Self::open_named(name, effects),
+            AdapterRequest::Auto => Ok(Self::open_best(effects).await.0),
+            AdapterRequest::Named(name) => Self::open_named(name, effects).await,
         }
     }
 
     #[cfg(feature = "gpu")]
-    fn open_named(name: &str, effects: &Effects) -> Result<Self, CastError> {
-        let adapter = gpu::find_adapter(name)?;
-        Ok(Self::Gpu(Box::new(GpuCaster::open(&adapter, effects)?)))
+    async fn open_named(name: &str, effects: &Effects) -> Result<Self, CastError> {
+        let adapter = gpu::find_adapter(name).await?;
+        Ok(Self::Gpu(Box::new(GpuCaster::open(&adapter, effects).await?)))
     }
 
     #[cfg(not(feature = "gpu"))]
-    fn open_named(name: &str, _: &Effects) -> Result<Self, CastError> {
+    async fn open_named(name: &str, _: &Effects) -> Result<Self, CastError> {
         Err(CastError::NoGpuSupport { wanted: name.to_owned() })
     }
 
     /// The best GPU that opens, or else the CPU; and why better GPUs did not open.
     #[cfg(feature = "gpu")]
-    #[must_use]
-    pub fn open_best(effects: &Effects) -> (Self, Vec<CastError>) {
+    pub async fn open_best(effects: &Effects) -> (Self, Vec<CastError>) {
         let mut passed_over = Vec::new();
-        for adapter in gpu::adapters() {
+        for adapter in gpu::adapters().await {
             if gpu::kind(&adapter) == gpu::AdapterKind::Software {
                 continue;
             }
-            match GpuCaster::open(&adapter, effects) {
+            match GpuCaster::open(&adapter, effects).await {
                 Ok(gpu) => return (Self::Gpu(Box::new(gpu)), passed_over),
                 Err(error) => passed_over.push(error),
             }
@@ -93,8 +100,7 @@ impl OpenCaster {
 
     /// The best caster that opens, which without the feature `gpu` is the CPU.
     #[cfg(not(feature = "gpu"))]
-    #[must_use]
-    pub fn open_best(effects: &Effects) -> (Self, Vec<CastError>) {
+    pub async fn open_best(effects: &Effects) -> (Self, Vec<CastError>) {
         (Self::Cpu(effects.clone()), Vec::new())
     }
 
@@ -148,15 +154,24 @@ impl OpenCaster {
     pub fn cast(&self, jobs: &[CastJob]) -> Result<Vec<Cast>, CastError> {
         self.submit(jobs)?.wait()
     }
+
+    /// As [`OpenCaster::cast`], in a browser too.
+    pub async fn cast_async(&self, jobs: &[CastJob]) -> Result<Vec<Cast>, CastError> {
+        self.submit(jobs)?.answers().await
+    }
 }
 
 impl Casting {
     /// The answers, one per job, in order.
     pub fn wait(self) -> Result<Vec<Cast>, CastError> {
+        pollster::block_on(self.answers())
+    }
+
+    async fn answers(self) -> Result<Vec<Cast>, CastError> {
         match self {
             Self::Done(casts) => Ok(casts),
             #[cfg(feature = "gpu")]
-            Self::Pending(pending) => pending.wait(),
+            Self::Pending(pending) => pending.answers().await,
         }
     }
 }

@@ -4,6 +4,7 @@ mod docs;
 mod fuzz;
 mod lints;
 mod meanwhile;
+mod page;
 mod peers;
 pub mod python;
 mod sanitize;
@@ -88,6 +89,7 @@ fn run_all(args: &Args, summary: &mut Summary) {
             smallest_lints(&mut summary);
             summary.step("dependencies", |_| infer_cpu_is_light());
             targets::run(&mut summary, install);
+            page::run(&mut summary);
             let with_pytorch = args.peers == peers::Which::All;
             let wheel = python::run(&mut summary, wheel, with_pytorch);
             docs::run_blocks(&mut summary, &wheel);

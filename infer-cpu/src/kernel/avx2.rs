@@ -1,18 +1,18 @@
 //! AVX2 with FMA and F16C: tiles of 6 rows by 16 channels, whose sums take 12 of the 16 registers.
-//! See [`super::x86`] for the loops.
+//! See [`super::loops`] for the loops.
 
 use std::arch::x86_64::*;
 
 use half::f16;
 
-use super::x86::{Lanes, Vector, implement};
+use super::loops::{Lanes, Vector, implement};
 
-super::x86::declare!(
+super::loops::declare!(
     Avx2, __m256, "avx2,fma,f16c",
     runs_here: is_x86_feature_detected!("avx2")
         && is_x86_feature_detected!("fma")
         && is_x86_feature_detected!("f16c"),
-    prefilters: false
+    fused: true, prefilters: false
 );
 
 implement!(Vector for __m256 {

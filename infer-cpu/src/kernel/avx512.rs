@@ -1,5 +1,5 @@
 //! AVX-512 with VNNI: tiles of 12 rows by 32 channels, whose sums take 24 of the 32 registers. See
-//! [`super::x86`] for the loops.
+//! [`super::loops`] for the loops.
 //!
 //! VNNI is required: machines with AVX-512 but without VNNI (before Cascade Lake) use AVX2.
 
@@ -7,15 +7,15 @@ use std::arch::x86_64::*;
 
 use half::f16;
 
-use super::x86::{Lanes, Vector, implement};
+use super::loops::{Lanes, Vector, implement};
 
-super::x86::declare!(
+super::loops::declare!(
     Avx512, __m512, "avx512f,avx512bw,avx512vl,avx512vnni",
     runs_here: is_x86_feature_detected!("avx512f")
         && is_x86_feature_detected!("avx512bw")
         && is_x86_feature_detected!("avx512vl")
         && is_x86_feature_detected!("avx512vnni"),
-    prefilters: true
+    fused: true, prefilters: true
 );
 
 implement!(Vector for __m512 {

@@ -25,6 +25,8 @@ mod avx2;
 mod avx512;
 #[cfg(all(test, not(windows), any(target_arch = "x86_64", target_arch = "aarch64")))]
 mod flushed;
+#[cfg(any(target_arch = "x86_64", all(target_arch = "wasm32", target_feature = "simd128")))]
+mod loops;
 #[cfg(target_arch = "aarch64")]
 mod neon;
 #[cfg(target_arch = "aarch64")]
@@ -34,10 +36,10 @@ mod neon_f16;
 mod panels;
 mod pooled;
 mod scalar;
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+mod simd128;
 #[cfg(test)]
 pub(crate) mod suite;
-#[cfg(target_arch = "x86_64")]
-mod x86;
 
 /// Declares the kernels of one file together with the tests that compare them with the reference,
 /// so that no kernel is untested. `runs_here` says whether this machine has the instructions.
@@ -284,6 +286,8 @@ formats::named! {
         NeonF16 = "neon_f16",
         /// NEON with FEAT_DotProd.
         NeonDot = "neon_dot",
+        /// WebAssembly with vectors of 128 bits.
+        Simd128 = "simd128",
     }
 }
 
@@ -303,6 +307,8 @@ impl KernelName {
             Self::NeonF16 => neon_f16::kernels(),
             #[cfg(target_arch = "aarch64")]
             Self::NeonDot => neon_dot::kernels(),
+            #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+            Self::Simd128 => simd128::kernels(),
             #[allow(unreachable_patterns, reason = "each architecture leaves others out")]
             _ => None,
         }

@@ -46,7 +46,12 @@ impl Caster {
     /// The best GPU that opens, or else the CPU. [`Caster::why_no_gpu`] says why it is the CPU.
     #[must_use]
     pub fn auto() -> Self {
-        let (best, errors) = OpenCaster::open_best(&Effects::default());
+        pollster::block_on(Self::auto_async())
+    }
+
+    /// As [`Caster::auto`], in a browser too, where nothing may wait.
+    pub async fn auto_async() -> Self {
+        let (best, errors) = OpenCaster::open_best(&Effects::default()).await;
         let skipped: Vec<String> = errors.iter().map(ToString::to_string).collect();
         let why = if !cfg!(feature = "gpu") {
             "this program was built without GPU support".to_owned()
@@ -65,10 +70,20 @@ impl Caster {
     /// # Errors
     /// No adapter has such a name (the message lists those that there are), or it does not open.
     pub fn named(name: &str) -> Result<Self, Error> {
+        pollster::block_on(Self::named_async(name))
+    }
+
+    /// As [`Caster::named`], in a browser too, where nothing may wait.
+    ///
+    /// # Errors
+    /// As [`Caster::named`].
+    pub async fn named_async(name: &str) -> Result<Self, Error> {
         match name.parse() {
-            Ok(AdapterRequest::Auto) => Ok(Self::auto()),
+            Ok(AdapterRequest::Auto) => Ok(Self::auto_async().await),
             Ok(AdapterRequest::Cpu) => Ok(Self::cpu()),
-            Ok(request) => Ok(Self::of(OpenCaster::open(&request, &Effects::default())?)),
+            Ok(request) => {
+                Ok(Self::of(OpenCaster::open_async(&request, &Effects::default()).await?))
+            }
         }
     }
 
@@ -112,18 +127,41 @@ impl Caster {
     /// The adapter does not open.
     #[doc(hidden)]
     pub fn for_effects(&self, effects: &Effects) -> Result<Arc<OpenCaster>, CastError> {
-        let mut opened = self.opened.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(caster) = opened.iter().find(|caster| caster.effects() == effects) {
-            return Ok(Arc::clone(caster));
-        }
-        if opened.iter().any(|caster| matches!(**caster, OpenCaster::Cpu(_))) {
-            return Ok(Arc::new(OpenCaster::Cpu(effects.clone())));
+        pollster::block_on(self.for_effects_async(effects))
+    }
+
+    /// As [`Caster::for_effects`], in a browser too.
+    ///
+    /// # Errors
+    /// As [`Caster::for_effects`].
+    #[doc(hidden)]
+    pub async fn for_effects_async(
+        &self,
+        effects: &Effects,
+    ) -> Result<Arc<OpenCaster>, CastError> {
+        if let Some(caster) = self.opened(effects) {
+            return Ok(caster);
         }
         let request = AdapterRequest::Named(self.name.clone());
-        let caster = Arc::new(OpenCaster::open(&request, effects)?);
-        opened.insert(0, Arc::clone(&caster));
-        opened.truncate(MOST_OPEN);
-        Ok(caster)
+        let caster = OpenCaster::open_async(&request, effects).await?;
+        // Another thread may have opened one meanwhile.
+        Ok(self.opened(effects).unwrap_or_else(|| {
+            let caster = Arc::new(caster);
+            let mut opened = self.opened.lock().unwrap_or_else(PoisonError::into_inner);
+            opened.insert(0, Arc::clone(&caster));
+            opened.truncate(MOST_OPEN);
+            caster
+        }))
+    }
+
+    /// The caster that models `effects`, if it is open. The CPU's always is.
+    fn opened(&self, effects: &Effects) -> Option<Arc<OpenCaster>> {
+        let opened = self.opened.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(caster) = opened.iter().find(|caster| caster.effects() == effects) {
+            return Some(Arc::clone(caster));
+        }
+        let is_cpu = opened.iter().any(|caster| matches!(**caster, OpenCaster::Cpu(_)));
+        is_cpu.then(|| Arc::new(OpenCaster::Cpu(effects.clone())))
     }
 
     fn of(caster: OpenCaster) -> Self {

@@ -4,7 +4,7 @@ use super::Error;
 use crate::bvh::Builder;
 use crate::mesh::frame::{Normalize, Unit, Up, WorldMesh, to_world, z_up};
 use crate::mesh::unit_frame::bounding_box;
-use crate::mesh::{LoadedMesh, TriangleMesh, check, flat, load};
+use crate::mesh::{LoadedMesh, TriangleMesh, check, flat, load, load_bytes};
 use crate::target::{Surface, Target};
 use glam::{DAffine3, DVec3};
 use std::path::Path;
@@ -57,6 +57,23 @@ impl Mesh {
     /// The file cannot be read, or is not what its extension says: with the file and the line.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, Error> {
         Self::read_in(path.as_ref(), None, Unit::Metre)
+    }
+
+    /// As [`Mesh::read`], from the bytes of a file of this name, whose extension is that of its format.
+    /// The file needs no other: a glTF file has its buffers inside.
+    ///
+    /// ```
+    /// # use sim_gpu::Mesh;
+    /// let error = Mesh::from_bytes("a.off", b"OFF\n3 1 0\n0 0 zero\n").unwrap_err();
+    /// assert_eq!(error.to_string(), "a.off:3: expected a finite coordinate, found \"zero\"");
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Mesh::read`].
+    pub fn from_bytes(name: &str, bytes: &[u8]) -> Result<Self, Error> {
+        let name = Path::new(name);
+        let LoadedMesh { mesh, format, warnings, .. } = load_bytes(name, bytes)?;
+        Ok(Self::upright(mesh, format.default_up()).with_warnings(name, &warnings))
     }
 
     /// As [`Mesh::read`], of a file whose upward axis or unit may be another.

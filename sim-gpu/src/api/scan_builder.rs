@@ -6,7 +6,7 @@ use crate::config::{InvalidValue, within};
 use crate::effects::{Effects, Intensity};
 use crate::job::Culling;
 use crate::pose::{Pose, Trajectory};
-use crate::scan::{PlacedTarget, ScanRequest, Scanned, scan_objects};
+use crate::scan::{PlacedTarget, ScanRequest, Scanned, scan_objects_async};
 use crate::scene::{check_motion, check_object, check_start};
 use crate::sensor::BeamPattern;
 use formats::rng::StreamKey;
@@ -148,11 +148,19 @@ impl<'a> ScanBuilder<'a> {
     /// An effect, an instance, a pose or a time is out of its bounds; the sensor's profile lacks a value
     /// that an effect needs; a trajectory does not cover the scan; the adapter failed.
     pub fn run(self) -> Result<Scan, Error> {
+        pollster::block_on(self.run_async())
+    }
+
+    /// As [`ScanBuilder::run`], in a browser too, where nothing may wait for an adapter.
+    ///
+    /// # Errors
+    /// As [`ScanBuilder::run`].
+    pub async fn run_async(self) -> Result<Scan, Error> {
         check_pose(|| "pose".to_owned(), self.pose)?;
-        let Prepared { effects, caster, rays } = self.prepare()?;
+        let Prepared { effects, caster, rays } = self.prepare_async().await?;
         let (request, placed) = (self.request(&rays), self.placed(|_| None));
         let Scanned { mut scan, tally, cast_on_cpu, .. } =
-            scan_objects(&caster, &placed, &request)?;
+            scan_objects_async(&caster, &placed, &request).await?;
         let pose = self.motion.as_ref().map_or(self.pose, |motion| motion.at(self.start_s));
         scan.pose = (pose != Pose::IDENTITY).then(|| pose.matrix());
         Ok(Scan::new(scan, tally, cast_on_cpu, self.sensor.clone(), effects))
@@ -160,6 +168,10 @@ impl<'a> ScanBuilder<'a> {
 
     /// Checks everything but the pose of the sensor.
     pub(super) fn prepare(&self) -> Result<Prepared, Error> {
+        pollster::block_on(self.prepare_async())
+    }
+
+    async fn prepare_async(&self) -> Result<Prepared, Error> {
         let mut effects = self.effects.clone();
         if self.attributes.contains(&Attribute::Intensity) {
             effects.intensity.get_or_insert(Intensity);
@@ -168,7 +180,7 @@ impl<'a> ScanBuilder<'a> {
         effects.for_sensor(self.sensor.profile())?;
         self.check_instances()?;
         let cpu = Caster::cpu();
-        let caster = self.caster.unwrap_or(&cpu).for_effects(&effects)?;
+        let caster = self.caster.unwrap_or(&cpu).for_effects_async(&effects).await?;
         let rays = self.sensor.rays(&effects)?;
         check_start("start_s", self.start_s)?;
         if let Some(motion) = &self.motion {

@@ -49,12 +49,12 @@ pub struct AdapterSummary {
 /// All adapters, best first.
 #[must_use]
 pub fn list_adapters() -> Vec<AdapterSummary> {
-    adapters().iter().map(summary).collect()
+    pollster::block_on(adapters()).iter().map(summary).collect()
 }
 
 /// The best adapter whose name contains `wanted`.
-pub(crate) fn find_adapter(wanted: &str) -> Result<wgpu::Adapter, CastError> {
-    let mut adapters = adapters();
+pub(crate) async fn find_adapter(wanted: &str) -> Result<wgpu::Adapter, CastError> {
+    let mut adapters = adapters().await;
     let holds =
         |a: &wgpu::Adapter| a.get_info().name.to_lowercase().contains(&wanted.to_lowercase());
     match adapters.iter().position(holds) {
@@ -77,16 +77,14 @@ pub(crate) fn summary(adapter: &wgpu::Adapter) -> AdapterSummary {
     }
 }
 
-/// All adapters that can compute, best first.
-pub(crate) fn adapters() -> Vec<wgpu::Adapter> {
+/// All adapters that can compute, best first. A browser shows one at most, which it chooses.
+pub(crate) async fn adapters() -> Vec<wgpu::Adapter> {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
-    let mut adapters: Vec<_> =
-        pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY))
-            .into_iter()
-            .filter(|a| {
-                a.get_downlevel_capabilities().flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS)
-            })
-            .collect();
+    let mut adapters = instance.enumerate_adapters(wgpu::Backends::PRIMARY).await;
+    adapters.retain(|adapter| {
+        let flags = adapter.get_downlevel_capabilities().flags;
+        flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS)
+    });
     adapters.sort_by_key(kind);
     adapters
 }

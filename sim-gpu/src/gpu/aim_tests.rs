@@ -23,7 +23,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
 
 /// The rays that the shader makes on the best adapter.
 fn made(views: &[View], beams: &[[i32; 4]]) -> Result<Vec<TraceRay>, String> {
-    let adapter = test_support::adapter(adapters().into_iter().next())?;
+    let adapter = test_support::adapter(pollster::block_on(adapters()).into_iter().next())?;
     let (device, queue) = pollster::block_on(adapter.request_device(&Default::default())).unwrap();
     let wgsl = [&constants(), shaders::RAY, shaders::AIM, MAIN].concat();
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {

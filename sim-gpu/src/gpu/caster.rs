@@ -43,21 +43,17 @@ pub struct Pending {
 
 impl GpuCaster {
     /// Opens `adapter` and compiles the shader variant that models `effects`.
-    pub fn open(adapter: &wgpu::Adapter, effects: &Effects) -> Result<Self, CastError> {
+    pub async fn open(adapter: &wgpu::Adapter, effects: &Effects) -> Result<Self, CastError> {
         let summary = adapter::summary(adapter);
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("edgepuck"),
-            // The numbers of rays and views are immediate data, which wgpu always supports on
-            // Vulkan, Metal and Direct3D 12. Timestamps are optional.
-            required_features: wgpu::Features::IMMEDIATES
-                | adapter.features() & wgpu::Features::TIMESTAMP_QUERY,
+            required_features: adapter.features() & wgpu::Features::TIMESTAMP_QUERY,
             required_limits: adapter.limits(),
             ..Default::default()
         };
-        let (device, queue) =
-            pollster::block_on(adapter.request_device(&descriptor)).map_err(|cause| {
-                CastError::Open { name: summary.name.clone(), cause: cause.to_string() }
-            })?;
+        let (device, queue) = adapter.request_device(&descriptor).await.map_err(|cause| {
+            CastError::Open { name: summary.name.clone(), cause: cause.to_string() }
+        })?;
         let failure = Arc::new(Mutex::new(None));
         let first = Arc::clone(&failure);
         device.on_uncaptured_error(Arc::new(move |error| {
@@ -104,7 +100,7 @@ impl GpuCaster {
     /// Casts `jobs`, waits, and returns the seconds that tracing took by the adapter's own clock,
     /// without upload and read-back; `None` if the adapter has no timestamps.
     pub fn cast_timed(&self, jobs: &[CastJob]) -> Result<(Vec<Cast>, Option<f64>), CastError> {
-        self.start(jobs, true)?.collect()
+        pollster::block_on(self.start(jobs, true)?.collect())
     }
 
     fn start(&self, jobs: &[CastJob], timed: bool) -> Result<Pending, CastError> {
@@ -169,17 +165,17 @@ impl Pending {
     }
 
     /// The answers, one per job, in order.
-    pub fn wait(self) -> Result<Vec<Cast>, CastError> {
-        Ok(self.collect()?.0)
+    pub async fn answers(self) -> Result<Vec<Cast>, CastError> {
+        Ok(self.collect().await?.0)
     }
 
     /// The answers, and the seconds of all dispatches if each has them.
-    fn collect(self) -> Result<(Vec<Cast>, Option<f64>), CastError> {
+    async fn collect(self) -> Result<(Vec<Cast>, Option<f64>), CastError> {
         let per_ray = self.core.pipeline.effects.outputs_per_ray();
         let mut casts = vec![Cast::default(); self.jobs];
         let mut total = Some(0.0);
-        for (slot, parts) in self.dispatches {
-            let answer = slot.wait(&self.core.pipeline);
+        for (mut slot, parts) in self.dispatches {
+            let answer = slot.answer(&self.core.pipeline).await;
             // The error that the device reported is more specific than a failed wait.
             self.core.check()?;
             let Answer { codes, outputs, seconds } =
@@ -239,8 +235,13 @@ mod tests {
             intensity: Some(Intensity),
             ..Effects::default()
         };
-        let best = test_support::adapter(adapter::adapters().into_iter().next())?;
-        Ok(GpuCaster::open(&best, &effects).unwrap())
+        let adapters = pollster::block_on(adapter::adapters());
+        let best = test_support::adapter(adapters.into_iter().next())?;
+        Ok(pollster::block_on(GpuCaster::open(&best, &effects)).unwrap())
+    }
+
+    fn wait(pending: Pending) -> Vec<Cast> {
+        pollster::block_on(pending.answers()).unwrap()
     }
 
     /// Pyramids of different sizes, each from its own side. The rays of every other one are
@@ -269,7 +270,7 @@ mod tests {
     fn rays_cut_into_many_dispatches_answer_as_in_one() {
         let mut caster = need!(caster());
         let jobs = jobs();
-        let whole = caster.submit(&jobs).unwrap().wait().unwrap();
+        let whole = wait(caster.submit(&jobs).unwrap());
         assert_eq!(whole.iter().map(|cast| cast.codes.len()).sum::<usize>(), 50_000);
         for (job, cast) in jobs.iter().zip(&whole) {
             let by_cpu = cpu::trace::trace(&job.target.bvh.wide, job.rays());
@@ -283,7 +284,7 @@ mod tests {
             Arc::get_mut(&mut caster.core).unwrap().limits.rays = rays;
             let pending = caster.submit(&jobs).unwrap();
             assert!(pending.dispatches.len() >= 50_000 / rays);
-            assert_eq!(pending.wait().unwrap(), whole, "{rays} rays a dispatch");
+            assert_eq!(wait(pending), whole, "{rays} rays a dispatch");
         }
     }
 
@@ -291,12 +292,12 @@ mod tests {
     fn targets_that_fill_a_binding_are_parted() {
         let mut caster = need!(caster());
         let jobs = jobs();
-        let whole = caster.submit(&jobs).unwrap().wait().unwrap();
+        let whole = wait(caster.submit(&jobs).unwrap());
         // Four triangles of 48 bytes each: room for two targets.
         Arc::get_mut(&mut caster.core).unwrap().limits.binding_bytes = 2 * 4 * 48;
         let pending = caster.submit(&jobs).unwrap();
         assert_eq!(pending.dispatches.len(), 3);
-        assert_eq!(pending.wait().unwrap(), whole);
+        assert_eq!(wait(pending), whole);
     }
 
     #[test]

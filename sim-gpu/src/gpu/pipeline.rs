@@ -22,7 +22,8 @@ impl Pipeline {
                 entries,
             })
         };
-        let trace = [0, 1, 2, 3, 4, 5].map(|binding| storage(binding, binding != CODES));
+        let buffers = [0, 1, 2, 3, 4, 5].map(|binding| storage(binding, binding != CODES));
+        let trace: Vec<_> = buffers.into_iter().chain([uniform(COUNTS)]).collect();
         let trace_layout = layout("trace", &trace);
         let effects_layout = effects.per_ray().next().map(|_| {
             let mut entries = vec![storage(0, false)];
@@ -39,8 +40,7 @@ impl Pipeline {
             layout: Some(&device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
                 label: Some("trace"),
                 bind_group_layouts: &groups,
-                // The numbers of rays and views.
-                immediate_size: size_of::<[u32; 2]>() as u32,
+                immediate_size: 0,
             })),
             module: &device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some("trace"),
@@ -62,15 +62,23 @@ impl Pipeline {
 /// The binding of group 0 that the shader writes to.
 const CODES: u32 = 3;
 
+/// The binding of group 0 with the numbers of rays and views. It is no immediate data, which browsers
+/// lack.
+const COUNTS: u32 = 6;
+
 fn storage(binding: u32, read_only: bool) -> wgpu::BindGroupLayoutEntry {
+    entry(binding, wgpu::BufferBindingType::Storage { read_only })
+}
+
+fn uniform(binding: u32) -> wgpu::BindGroupLayoutEntry {
+    entry(binding, wgpu::BufferBindingType::Uniform)
+}
+
+fn entry(binding: u32, ty: wgpu::BufferBindingType) -> wgpu::BindGroupLayoutEntry {
     wgpu::BindGroupLayoutEntry {
         binding,
         visibility: wgpu::ShaderStages::COMPUTE,
-        ty: wgpu::BindingType::Buffer {
-            ty: wgpu::BufferBindingType::Storage { read_only },
-            has_dynamic_offset: false,
-            min_binding_size: None,
-        },
+        ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None },
         count: None,
     }
 }

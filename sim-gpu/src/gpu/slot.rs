@@ -8,10 +8,11 @@ use super::pipeline::Pipeline;
 use crate::bvh::Bvh;
 use crate::fixed_frame::fixed_direction;
 use crate::sensor::Directions;
-use std::sync::mpsc::{Receiver, Sender, channel};
+use futures_channel::mpsc::{UnboundedReceiver, UnboundedSender, unbounded};
 use std::sync::{Arc, Weak};
 
 const INPUT: wgpu::BufferUsages = wgpu::BufferUsages::STORAGE.union(wgpu::BufferUsages::COPY_DST);
+const UNIFORM: wgpu::BufferUsages = wgpu::BufferUsages::UNIFORM.union(wgpu::BufferUsages::COPY_DST);
 const OUTPUT: wgpu::BufferUsages = wgpu::BufferUsages::STORAGE.union(wgpu::BufferUsages::COPY_SRC);
 const READBACK: wgpu::BufferUsages =
     wgpu::BufferUsages::MAP_READ.union(wgpu::BufferUsages::COPY_DST);
@@ -69,6 +70,7 @@ pub(super) struct Slot {
     rays: Growing,
     views: Growing,
     directions: Growing,
+    counts: Growing,
     codes: Growing,
     outputs: Growing,
     streams: Growing,
@@ -82,8 +84,11 @@ pub(super) struct Slot {
     clock: Option<Clock>,
     answer: AnswerBytes,
     submission: Option<wgpu::SubmissionIndex>,
-    mapped: Option<Receiver<Result<(), wgpu::BufferAsyncError>>>,
+    mapped: Option<UnboundedReceiver<Mapped>>,
 }
+
+/// Whether a buffer can be read.
+type Mapped = Result<(), wgpu::BufferAsyncError>;
 
 /// Bytes of each buffer that is read back; 0 for those that are not.
 #[derive(Clone, Copy, Default)]
@@ -109,6 +114,7 @@ impl Slot {
             rays: Growing::new("rays", INPUT),
             views: Growing::new("views", INPUT),
             directions: Growing::new("directions", INPUT),
+            counts: Growing::new("counts", UNIFORM),
             codes: Growing::new("codes", OUTPUT),
             outputs: Growing::new("effect outputs", OUTPUT),
             streams: Growing::new("streams", INPUT),
@@ -143,9 +149,6 @@ impl Slot {
         if let Some(effects) = effects {
             pass.set_bind_group(1, effects, &[]);
         }
-        // At most 2^22 rays, and a view for each.
-        let counts = [batch.n_rays as u32, batch.views.len() as u32];
-        pass.set_immediates(0, bytemuck::bytes_of(&counts));
         let [x, y] = workgroups(batch.n_rays, &device.limits());
         pass.dispatch_workgroups(x, y, 1);
         drop(pass);
@@ -162,6 +165,9 @@ impl Slot {
         grown |= self.rays.upload(pipeline, bytemuck::cast_slice(&batch.rays));
         grown |= self.views.upload(pipeline, bytemuck::cast_slice(&batch.views));
         grown |= self.upload_directions(pipeline, &batch.directions);
+        // At most 2^22 rays, and a view for each.
+        let counts = [batch.n_rays as u32, batch.views.len() as u32];
+        grown |= self.counts.upload(pipeline, bytemuck::bytes_of(&counts));
         grown |= self.codes.reserve(device, self.answer.codes);
         if self.answer.outputs > 0 {
             grown |= self.outputs.reserve(device, self.answer.outputs);
@@ -213,8 +219,8 @@ impl Slot {
             })
         };
         let inputs = [&self.nodes, &self.triangles, &self.rays];
-        let trace = inputs.into_iter().chain([&self.codes, &self.views, &self.directions]);
-        let trace: Vec<_> = (0..).zip(trace).collect();
+        let others = [&self.codes, &self.views, &self.directions, &self.counts];
+        let trace: Vec<_> = (0..).zip(inputs.into_iter().chain(others)).collect();
         let effects = &pipeline.effects;
         let mut read_by_effects = vec![(0, &self.outputs)];
         read_by_effects.extend(reads_random_bits(effects).then_some((1, &self.streams)));
@@ -228,7 +234,7 @@ impl Slot {
     }
 
     fn read_back(&mut self, pipeline: &Pipeline, mut encoder: wgpu::CommandEncoder) {
-        let (send, receive) = channel();
+        let (send, receive) = unbounded();
         let mut copy = |from: &Growing, to: &mut Growing, bytes| {
             if bytes > 0 {
                 to.reserve(&pipeline.device, bytes);
@@ -248,14 +254,15 @@ impl Slot {
         self.mapped = Some(receive);
     }
 
-    pub(super) fn wait(&self, pipeline: &Pipeline) -> Result<Answer, String> {
-        let mapped = self.mapped.as_ref().ok_or("nothing was dispatched")?;
-        // Waits for this batch alone: the next may be in flight already.
+    /// The answer of the batch that was started last.
+    pub(super) async fn answer(&mut self, pipeline: &Pipeline) -> Result<Answer, String> {
+        let mapped = self.mapped.as_mut().ok_or("nothing was dispatched")?;
+        // Waits for this batch alone: the next may be in flight already. A browser does not wait here.
         let submission_index = self.submission.clone();
         let poll = wgpu::PollType::Wait { submission_index, timeout: None };
         pipeline.device.poll(poll).map_err(|e| e.to_string())?;
-        // Another thread may run the callbacks: this waits until all senders are dropped.
-        for result in mapped {
+        // Another thread, or the browser, may run the callbacks: this ends once all senders are dropped.
+        while let Ok(result) = mapped.recv().await {
             result.map_err(|error| error.to_string())?;
         }
         let ticks = copy_out(self.clock.as_ref().map(Clock::readback), self.answer.clock)?;
@@ -267,16 +274,12 @@ impl Slot {
     }
 }
 
-fn map(
-    buffer: Option<&wgpu::Buffer>,
-    bytes: u64,
-    done: &Sender<Result<(), wgpu::BufferAsyncError>>,
-) {
+fn map(buffer: Option<&wgpu::Buffer>, bytes: u64, done: &UnboundedSender<Mapped>) {
     let Some(buffer) = buffer.filter(|_| bytes > 0) else { return };
     let done = done.clone();
     buffer.slice(..bytes).map_async(wgpu::MapMode::Read, move |mapped| {
         // Sending fails only if the waiter is gone.
-        let _ = done.send(mapped);
+        let _ = done.unbounded_send(mapped);
     });
 }
 

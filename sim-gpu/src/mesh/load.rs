@@ -38,13 +38,22 @@ pub fn load_hashed(
     path: &Path,
     hashing: Hashing,
 ) -> Result<(LoadedMesh, Option<FileHash>), MeshError> {
-    let format =
-        MeshFormat::from_path(path).ok_or_else(|| MeshError::UnknownFormat { path: path.into() });
     let bytes = read(path)?;
-    let format = format?;
-    let parsed = parse_in(&bytes, format, path.parent());
+    Ok((loaded(path, &bytes, path.parent())?, hashing.of_bytes(&bytes)))
+}
+
+/// As [`load`], from the bytes of a file called `name`, which needs no other file.
+pub fn load_bytes(name: &Path, bytes: &[u8]) -> Result<LoadedMesh, MeshError> {
+    loaded(name, bytes, None)
+}
+
+/// The mesh of the file at `path` from its `bytes`; files that it names are in `folder`.
+fn loaded(path: &Path, bytes: &[u8], folder: Option<&Path>) -> Result<LoadedMesh, MeshError> {
+    let format = MeshFormat::from_path(path)
+        .ok_or_else(|| MeshError::UnknownFormat { path: path.into() })?;
+    let parsed = parse_in(bytes, format, folder);
     let Parsed { mesh, dropped_faces, warnings, .. } = parsed.map_err(|error| error.of(path))?;
-    Ok((LoadedMesh { mesh, format, dropped_faces, warnings }, hashing.of_bytes(&bytes)))
+    Ok(LoadedMesh { mesh, format, dropped_faces, warnings })
 }
 
 /// Reads the nodes of the glTF file at `path` and their animation; `world_from_file` stands above its

@@ -27,6 +27,7 @@ pub use error::{Malformed, MeshError, ParseError};
 pub(crate) use file::read;
 pub use format::{MeshFormat, mesh_extensions};
 pub use load::{
-    LoadedMesh, NO_AREA, check, flat, load, load_assembly, load_hashed, parse, parse_assembly,
+    LoadedMesh, NO_AREA, check, flat, load, load_assembly, load_bytes, load_hashed, parse,
+    parse_assembly,
 };
 pub use triangle_mesh::{Parsed, TriangleMesh};

@@ -71,8 +71,17 @@ pub fn scan(
 /// The scan that `request` asks for of several objects: each beam returns from the nearest one.
 pub fn scan_objects(
     caster: &OpenCaster,
-    objects: &[PlacedTarget],
-    request: &ScanRequest,
+    objects: &[PlacedTarget<'_>],
+    request: &ScanRequest<'_>,
+) -> Result<Scanned, ScanError> {
+    pollster::block_on(scan_objects_async(caster, objects, request))
+}
+
+/// As [`scan_objects`], in a browser too, where nothing may wait for an adapter.
+pub async fn scan_objects_async(
+    caster: &OpenCaster,
+    objects: &[PlacedTarget<'_>],
+    request: &ScanRequest<'_>,
 ) -> Result<Scanned, ScanError> {
     let request = &request.in_motion(caster.effects());
     let fits = objects.iter().all(|object| caster.fits(object.target));
@@ -81,7 +90,7 @@ pub fn scan_objects(
         return finish(caster, objects, request, &jobs, hits, !fits);
     }
     let jobs = aimed(objects, request);
-    let casts = caster.cast(&jobs)?;
+    let casts = caster.cast_async(&jobs).await?;
     let hits = resolved(&jobs, &casts, request, caster.effects());
     finish(caster, objects, request, &jobs, hits, false)
 }

@@ -1,22 +1,29 @@
-//! Checks for other targets: the Raspberry Pi, and systems with Metal and with Direct3D 12.
+//! Checks for other targets: the Raspberry Pi, systems with Metal and with Direct3D 12, and WebAssembly.
 
 use super::meanwhile::{Meanwhile, nice};
 use super::{go_without, lints, lints::by_clippy, test_programs};
 use crate::summary::{Counts, Summary, check};
 use anyhow::ensure;
 use std::{env::current_exe, process::Command};
-use xtask::{build_pi, pi_target, workspace::cargo, workspace::standard_library};
+use xtask::workspace::{cargo, root, standard_library};
+use xtask::{build_pi, pi_target};
 
 /// A check: it is given its name, and whether it fails where it cannot run.
 type Check = fn(&mut Summary, &str, bool) -> anyhow::Result<Counts>;
 
 const METAL: &str = "aarch64-apple-darwin";
 const DX12: &str = "x86_64-pc-windows-msvc";
+/// A browser's page.
+const PAGE: &str = "wasm32-unknown-unknown";
+/// WebAssembly of which Node runs a test program.
+const NODE: &str = "wasm32-wasip1";
 
 /// The target whose standard library each check needs, the name of the check, and the check.
-const CHECKS: [(&str, &str, Check); 5] = [
+const CHECKS: [(&str, &str, Check); 7] = [
     (METAL, "Metal lints", |_, name, _| lint_sim_gpu(name, METAL)),
     (DX12, "Direct3D 12 lints", |_, name, _| lint_sim_gpu(name, DX12)),
+    (PAGE, "WebAssembly lints", |_, name, _| lint("edgepuck-web", name, PAGE)),
+    (NODE, "WebAssembly tests", test_on_node),
     (pi_target::TRIPLE, "Raspberry Pi lints", |_, name, _| {
         lints::check(name, &mut nice(pi_tests().arg("--no-run")))
     }),
@@ -48,8 +55,23 @@ pub fn run(summary: &mut Summary, required: bool) {
 
 /// Lints the ray-casting library for a system whose part of wgpu no other step compiles.
 fn lint_sim_gpu(name: &str, target: &str) -> anyhow::Result<Counts> {
-    let lints = ["clippy", "--package", "sim-gpu", "--target", target, "--", "--deny", "warnings"];
+    lint("sim-gpu", name, target)
+}
+
+fn lint(package: &str, name: &str, target: &str) -> anyhow::Result<Counts> {
+    let lints = ["clippy", "--package", package, "--target", target, "--", "--deny", "warnings"];
     check(name, &mut nice(&cargo(&lints)))
+}
+
+/// Runs the classifier's unit tests, which include those of every kernel, as WebAssembly in Node.
+fn test_on_node(summary: &mut Summary, name: &str, _: bool) -> anyhow::Result<Counts> {
+    if Command::new("node").arg("--version").output().is_err() {
+        return Ok(summary.skip(name, 1, "there is no node"));
+    }
+    let mut tests = cargo(&["test", "--package", "infer-cpu", "--no-default-features", "--lib"]);
+    let runner = format!("node --no-warnings {}", root().join("web/test/wasi.mjs").display());
+    tests.args(["--target", NODE, "kernel::"]).env("CARGO_TARGET_WASM32_WASIP1_RUNNER", runner);
+    test_programs::run(summary, &mut nice(&tests))
 }
 
 fn pi_tests() -> Command {

@@ -1,5 +1,5 @@
-//! The loops of the AVX2 and AVX-512 kernels, generic over the vector. Everything here is inlined
-//! into functions that enable the instructions, in [`super::avx2`] and [`super::avx512`].
+//! The loops of the AVX2, AVX-512 and WebAssembly kernels, generic over the vector. Everything here is
+//! inlined into functions that enable the instructions, in `avx2`, `avx512` and `simd128`.
 
 mod lanes;
 mod products;
@@ -20,12 +20,12 @@ pub(super) const V: usize = 2;
 macro_rules! declare {
     (
         $name:ident, $lanes:ty, $features:literal,
-        runs_here: $runs_here:expr, prefilters: $prefilters:literal
+        runs_here: $runs_here:expr, fused: $fused:literal, prefilters: $prefilters:literal
     ) => {
         use std::ops::Range;
 
         use $crate::edge_conv::{EdgeConv, EdgeScratch, Neighborhood};
-        use $crate::kernel::x86::{self, Byte, Half, Single, Tile, Weight};
+        use $crate::kernel::loops::{self, Byte, Half, Single, Tile, Weight};
         use $crate::kernel::{
             Candidate, GEMV_NR, Gemm, LevelSums, Panels, PrefilterKernels, Rows, Soa,
         };
@@ -46,9 +46,9 @@ macro_rules! declare {
         });
 
         const fn gemm<T: Tile<$lanes>>()
-        -> Gemm<T::Activation, T::Weight, <T::Sums as x86::Vector>::Element> {
+        -> Gemm<T::Activation, T::Weight, <T::Sums as loops::Vector>::Element> {
             Gemm {
-                nr: x86::V * <$lanes as x86::Lanes>::N,
+                nr: loops::V * <$lanes as loops::Lanes>::N,
                 k_step: T::STEP,
                 rows: rows::<T>,
                 max: max::<T>,
@@ -56,70 +56,70 @@ macro_rules! declare {
             }
         }
 
-        $crate::kernel::x86::enable! { $features;
+        $crate::kernel::loops::enable! { $features;
             fn rows<T: Tile<$lanes>>(
                 rows: &Rows<'_, T::Activation>,
                 weights: &Panels<T::Weight>,
                 panels: Range<usize>,
                 out: &mut [f32],
                 stride: usize,
-            ) = x86::rows::<$lanes, T>;
+            ) = loops::rows::<$lanes, T>;
 
             fn max<T: Tile<$lanes>>(
                 rows: &Rows<'_, T::Activation>,
                 weights: &Panels<T::Weight>,
                 panels: Range<usize>,
-                maxima: &mut [<T::Sums as x86::Vector>::Element],
-            ) = x86::max::<$lanes, T>;
+                maxima: &mut [<T::Sums as loops::Vector>::Element],
+            ) = loops::max::<$lanes, T>;
 
             fn argmax<T: Tile<$lanes>>(
                 rows: &Rows<'_, T::Activation>,
                 weights: &Panels<T::Weight>,
                 panels: Range<usize>,
                 first_row: u32,
-                maxima: &mut [<T::Sums as x86::Vector>::Element],
+                maxima: &mut [<T::Sums as loops::Vector>::Element],
                 winners: &mut [u32],
-            ) = x86::argmax::<$lanes, T>;
+            ) = loops::argmax::<$lanes, T>;
 
             fn gemv<W: Weight>(
                 nonzero: &[(u32, f32)],
                 weights: &Panels<W>,
                 panels: Range<usize>,
                 out: &mut [f32],
-            ) = x86::gemv::<$lanes, W, { GEMV_NR / <$lanes as x86::Lanes>::N }>;
+            ) = loops::gemv::<$lanes, W, { GEMV_NR / <$lanes as loops::Lanes>::N }>;
 
-            fn narrow_f16(values: &[f32], out: &mut [f16]) -> f32 = x86::narrow_f16::<$lanes>;
+            fn narrow_f16(values: &[f32], out: &mut [f16]) -> f32 = loops::narrow_f16::<$lanes>;
 
             fn narrow_i8(values: &[f32], per_unit: f32, out: &mut [u8]) -> u64 =
-                x86::narrow_i8::<$lanes>;
+                loops::narrow_i8::<$lanes>;
 
             fn levels(row: &[f32], per_unit: f32, out: &mut [u8]) -> LevelSums =
-                x86::levels::<$lanes>;
+                loops::levels::<$lanes>;
 
-            fn peaks(values: &[f32], peaks: &mut [f32], rows: &mut [u32]) = x86::peaks::<$lanes>;
+            fn peaks(values: &[f32], peaks: &mut [f32], rows: &mut [u32]) = loops::peaks::<$lanes>;
 
             fn above_floors(
                 values: &[f32],
                 floors: &[f32],
                 found: &mut [Candidate],
-            ) -> Option<usize> = x86::above_floors::<$lanes>;
+            ) -> Option<usize> = loops::above_floors::<$lanes>;
 
             fn dots(
                 rows: &Rows<'_, f32>,
                 weights: &[f32],
                 candidates: &[Candidate],
                 out: &mut [f32],
-            ) = x86::dots::<$lanes>;
+            ) = loops::dots::<$lanes>;
 
             fn fps_step(cloud: Soa<'_>, pick: [f32; 3], distance: &mut [f32]) -> usize =
-                x86::fps_step::<$lanes>;
+                loops::fps_step::<$lanes>;
 
             fn edge_features(
                 edges: &EdgeConv,
                 rows: (&mut [f32], usize),
                 cloud: &Neighborhood,
                 scratch: &mut EdgeScratch,
-            ) = EdgeConv::features::<true>;
+            ) = EdgeConv::features::<$fused>;
         }
     };
 }

@@ -43,7 +43,7 @@ pub(in crate::kernel) trait Lanes: Vector<Element = f32, Float = Self> {
     unsafe fn store_f16(self, to: *mut f16);
     /// Stores integers in 0..=127 as bytes.
     unsafe fn store_u8(self, to: *mut u8);
-    /// `self * factor + term`, rounded once.
+    /// `self * factor + term`, rounded once where the instruction set can.
     unsafe fn fma(self, factor: Self, term: Self) -> Self;
     unsafe fn mul(self, other: Self) -> Self;
     unsafe fn sub(self, other: Self) -> Self;

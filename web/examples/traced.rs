@@ -1,0 +1,75 @@
+//! Writes what the native caster finds on the meshes of the tests, for web/test/browser.mjs to compare a
+//! browser with: `traced FOLDER`.
+
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context, anyhow};
+use edgepuck_shapes::write_off;
+use edgepuck_web::Simulator;
+use harness::meshes::{cube, icosphere, soup, torus};
+
+/// Settings of scans: from outside, from near, from inside, from far.
+const PLACES: [(f64, f64, f64); 4] =
+    [(5.0, 6.0, 0.0), (1.75, 44.0, 42.0), (0.23, 12.0, -63.0), (30.0, 3.0, 200.0)];
+
+fn main() -> anyhow::Result<()> {
+    let folder = std::env::args().nth(1).context("expected a folder")?;
+    let folder = Path::new(&folder);
+    fs::create_dir_all(folder)?;
+    let meshes = [
+        ("sphere", icosphere(4)),
+        ("cube", cube()),
+        ("torus", torus(71)),
+        ("soup", soup(2000, 0.2)),
+        ("crossing", soup(20, 1.0)),
+    ];
+    for (name, mesh) in meshes {
+        write_off(&mesh, &folder.join(format!("{name}.off")))?;
+    }
+    let bundled = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/meshes");
+    for entry in fs::read_dir(bundled)?.flat_map(|class| fs::read_dir(class?.path())).flatten() {
+        let file = entry?;
+        fs::copy(file.path(), folder.join(file.file_name()))?;
+    }
+    let mut cases = Vec::new();
+    let mut files =
+        fs::read_dir(folder)?.map(|file| Ok(file?.path())).collect::<anyhow::Result<Vec<_>>>()?;
+    files.retain(|file| {
+        file.extension().is_some_and(|extension| extension == "off" || extension == "obj")
+    });
+    files.sort();
+    let mut simulator =
+        pollster::block_on(Simulator::open("cpu")).map_err(|cause| anyhow!(cause))?;
+    for file in files {
+        let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        simulator.take_file(&name, &fs::read(&file)?).map_err(|cause| anyhow!(cause))?;
+        for sensor in ["vlp32c", "generic-static"] {
+            for (distance_m, elevation_deg, azimuth_deg) in PLACES {
+                let settings = serde_json::json!({
+                    "sensor": sensor, "distance_m": distance_m, "elevation_deg": elevation_deg,
+                    "azimuth_deg": azimuth_deg, "noise_m": 0.0, "rain_mm_h": 0.0, "fog_m": 0.0,
+                    "returns": null,
+                });
+                let traced = pollster::block_on(simulator.trace(&settings.to_string()));
+                let traced = traced.map_err(|cause| anyhow!(cause))?;
+                let case = format!("{}", cases.len());
+                fs::write(
+                    folder.join(format!("{case}.codes")),
+                    le(&traced.codes, |code| code.to_le_bytes()),
+                )?;
+                fs::write(
+                    folder.join(format!("{case}.ranges")),
+                    le(&traced.ranges, |range| range.to_le_bytes()),
+                )?;
+                cases.push(serde_json::json!({ "case": case, "file": name, "settings": settings }));
+            }
+        }
+    }
+    fs::write(folder.join("cases.json"), serde_json::to_string(&cases)?)?;
+    Ok(())
+}
+
+fn le<T: Copy, const N: usize>(numbers: &[T], bytes: impl Fn(T) -> [u8; N]) -> Vec<u8> {
+    numbers.iter().flat_map(|&number| bytes(number)).collect()
+}

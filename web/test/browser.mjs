@@ -1,0 +1,179 @@
+// Tests the page in a browser: `node test/browser.mjs PAGE TRACED`, the folders that web/build.sh and the
+// example `traced` write. Screenshots of it are in PAGE/../pictures afterwards.
+import assert from "node:assert/strict";
+import { mkdir, readFile } from "node:fs/promises";
+import { join } from "node:path";
+import { open } from "./chromium.mjs";
+import { serve } from "./server.mjs";
+
+const [page, traced] = process.argv.slice(2);
+const pictures = join(page, "../pictures");
+await mkdir(pictures, { recursive: true });
+const address = await serve({ page, traced });
+const browser = await open();
+
+const failures = [];
+async function test(name, check) {
+  try {
+    const said = await check();
+    console.log(`ok: ${name}${said ? `: ${said}` : ""}`);
+  } catch (error) {
+    failures.push(name);
+    console.log(`FAILED: ${name}: ${error.stack ?? error}`);
+  }
+}
+
+/** A page of the browser that fails on errors in its console, and on requests to elsewhere. */
+async function tab(settings = {}) {
+  const context = await browser.newContext(settings);
+  const opened = await context.newPage();
+  const faults = [];
+  opened.on("console", (message) => message.type() === "error" && faults.push(message.text()));
+  opened.on("pageerror", (error) => faults.push(`${error}`));
+  opened.on("request", (request) => {
+    if (!/^(http:\/\/localhost:|blob:|data:)/.test(request.url())) faults.push(request.url());
+  });
+  return { opened, done: () => context.close().then(() => assert.deepEqual(faults, [])) };
+}
+
+async function show(link, settings) {
+  const { opened, done } = await tab(settings);
+  await opened.goto(`${address}/page/index.html${link}`);
+  await opened.waitForFunction(() => document.body.dataset.firstPictureMs);
+  return { opened, done };
+}
+
+const idle = (opened) => opened.waitForFunction(() => document.body.dataset.state === "idle");
+const text = (opened, id) => opened.locator(`#${id}`).textContent();
+
+/** Runs in the browser: compares what WebAssembly and WebGPU find with what the native caster found. */
+async function compare() {
+  const { default: init, Simulator } = await import("/page/edgepuck_web.js");
+  await init();
+  const [AMBIGUOUS, MISS] = [0x80000000, 0xffffffff];
+  const bytes = async (name) => new Uint8Array(await (await fetch(`/traced/${name}`)).arrayBuffer());
+  const cases = await (await fetch("/traced/cases.json")).json();
+  const [cpu, gpu] = [await Simulator.open("cpu"), await Simulator.open("")];
+  const found = { rays: 0, hits: 0, guesses: 0, rounded: 0, roundedAsF32: 0, worst: 0, differ: [] };
+  const differing = (a, b) => (a.length === b.length ? a.filter((x, i) => x !== b[i]).length : "the length");
+  // Of a ray that f64 decides, the triangle is a guess: WGSL leaves the rounding of divisions open.
+  const decided = (code) => (code >= AMBIGUOUS && code !== MISS ? AMBIGUOUS : code);
+  const bits = ({ buffer, byteOffset, length }) => new BigUint64Array(buffer, byteOffset, length);
+  let file;
+  for (const { case: number, file: name, settings } of cases) {
+    if (file !== name) for (const simulator of [cpu, gpu]) simulator.take_file(name, await bytes(name));
+    file = name;
+    const [byCpu, byGpu] = [await cpu.trace(JSON.stringify(settings)), await gpu.trace(JSON.stringify(settings))];
+    const native = new Uint32Array((await bytes(`${number}.codes`)).buffer);
+    const metres = new Float64Array((await bytes(`${number}.ranges`)).buffer);
+    const ranges = byCpu.ranges;
+    const differ = {
+      "codes of WebAssembly": differing(native, byCpu.codes),
+      "codes of WebGPU": differing(native.map(decided), byGpu.codes.map(decided)),
+      "ranges of WebGPU and WebAssembly": differing(bits(ranges), bits(byGpu.ranges)),
+      "number of ranges": ranges.length - metres.length,
+    };
+    if (Object.values(differ).some(Boolean)) found.differ.push({ name, settings, ...differ });
+    found.guesses += differing(native, byGpu.codes);
+    found.rays += native.length;
+    found.hits += metres.length;
+    metres.forEach((range, i) => {
+      found.rounded += Number(range !== ranges[i]);
+      found.roundedAsF32 += Number(Math.fround(range) !== Math.fround(ranges[i]));
+      found.worst = Math.max(found.worst, Math.abs(range - ranges[i]) / range);
+    });
+  }
+  return found;
+}
+
+// Native sines are those of the C library, WebAssembly's those of Rust's libm: their last bits differ, and with them
+// those of directions. Ranges amplify this by the tangent of the incidence, as tests/parity.rs derives.
+await test("WebAssembly and WebGPU find the triangles of the native caster, bit for bit, and its ranges", async () => {
+  const { opened, done } = await tab();
+  await opened.goto(`${address}/page/page.css`);
+  const { rays, hits, guesses, rounded, roundedAsF32, worst, differ } = await opened.evaluate(compare);
+  assert.ok(hits > 100_000, `${hits} hits`);
+  assert.deepEqual(differ, []);
+  assert.ok(worst < 1e-10, `ranges differ by ${worst}`);
+  await done();
+  const shares = `${rounded} ranges differ in f64 and ${roundedAsF32} in f32`;
+  const left = `WebGPU guesses another triangle for ${guesses} of the rays that f64 decides`;
+  return `${rays} rays, ${hits} hits; ${left}; ${shares}, by a share of ${worst.toExponential(1)} at most`;
+});
+
+await test("the page names the chair that it begins with, and the link holds the settings", async () => {
+  const { opened, done } = await show("");
+  assert.match(await text(opened, "class"), /^\S+ \d+ %$/);
+  assert.match(
+    await text(opened, "facts"),
+    /^[\d,]+ points · cast in .* on CPU \(no GPU here\) · named in .* on the CPU$/,
+  );
+  await opened.screenshot({ path: join(pictures, "desktop.png") });
+  await opened.locator("#distance").focus();
+  await opened.keyboard.press("ArrowRight");
+  await idle(opened);
+  assert.equal(new URL(opened.url()).hash, "#distance=3.1");
+  await done();
+});
+
+await test("WebGPU casts where it is asked for, and is named", async () => {
+  const { opened, done } = await show("#run=webgpu&mesh=airplane&noise=0.01");
+  assert.match(await text(opened, "facts"), /on WebGPU \(google swiftshader\)/);
+  await done();
+  return text(opened, "facts").catch(() => "");
+});
+
+/** Drops a file of this name and content on the page, as a user would. */
+async function drop(opened, name, content) {
+  const transfer = await opened.evaluateHandle(
+    ([name, content]) => {
+      const dropped = new DataTransfer();
+      dropped.items.add(new File([content], name));
+      return dropped;
+    },
+    [name, content],
+  );
+  await opened.dispatchEvent("#drop", "drop", { dataTransfer: transfer });
+  await opened.waitForTimeout(100);
+  await idle(opened);
+}
+
+await test("a file that is dropped is scanned and named, and one that is no mesh is told with its line", async () => {
+  const { opened, done } = await show("#mesh=bowl&elevation=35");
+  const chair = await readFile(join(traced, "chair_0046.obj"), "utf8");
+  await drop(opened, "chair_0046.obj", chair);
+  assert.match(await text(opened, "class"), /^chair \d+ %$/);
+  await drop(opened, "bad.off", "OFF\n3 1 0\n0 0 0\n1 0 zero\n");
+  assert.equal(await text(opened, "error"), 'bad.off:4: expected a finite coordinate, found "zero"');
+  await opened.screenshot({ path: join(pictures, "error.png") });
+  await drop(opened, "chair_0046.obj", chair);
+  assert.ok(await opened.locator("#error").isHidden());
+  await done();
+});
+
+await test("a street is scanned, in the dark", async () => {
+  const { opened, done } = await show("#mesh=street&rain=20", { colorScheme: "dark" });
+  assert.equal(await text(opened, "class"), "street");
+  assert.ok(await opened.locator("#distance").isHidden());
+  await opened.screenshot({ path: join(pictures, "dark.png") });
+  await done();
+});
+
+await test("a sensor that lacks what an effect needs is told in words", async () => {
+  const { opened, done } = await show("#sensor=generic-static&returns=dual");
+  assert.match(await text(opened, "error"), /footprint/);
+  await done();
+});
+
+await test("a phone shows all of the page", async () => {
+  const settings = { viewport: { width: 390, height: 844 }, deviceScaleFactor: 2, isMobile: true, hasTouch: true };
+  const { opened, done } = await show("#mesh=car", settings);
+  const width = await opened.evaluate(() => document.documentElement.scrollWidth);
+  assert.equal(width, 390);
+  await opened.screenshot({ path: join(pictures, "phone.png"), fullPage: true });
+  await done();
+});
+
+await browser.close();
+console.log(failures.length ? `${failures.length} failed` : "all passed");
+process.exitCode = failures.length ? 1 : 0;

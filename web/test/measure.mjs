@@ -1,0 +1,78 @@
+// Measures the page in Chromium: `node test/measure.mjs PAGE`, the folder that web/build.sh wrote. Times are
+// medians of 21, on one thread.
+import { readdir, readFile } from "node:fs/promises";
+import { join } from "node:path";
+import { brotliCompressSync, constants } from "node:zlib";
+import { open } from "./chromium.mjs";
+import { serve } from "./server.mjs";
+
+const [page] = process.argv.slice(2);
+const address = await serve({ page });
+const browser = await open();
+
+/** Runs in the browser: the milliseconds of a scan and of a classification. */
+async function times([adapter, mesh]) {
+  const { default: init, Simulator } = await import("/page/edgepuck_web.js");
+  await init();
+  const simulator = await Simulator.open(adapter);
+  simulator.take_built_in(mesh);
+  const model = await (await fetch("/page/edge-64.safetensors")).arrayBuffer();
+  simulator.take_model(new Uint8Array(model));
+  const settings = JSON.stringify({
+    ...{ sensor: "vlp32c", distance_m: 3, elevation_deg: 20, azimuth_deg: 215 },
+    ...{ noise_m: 0, rain_mm_h: 0, fog_m: 0, returns: null },
+  });
+  const median = async (work) => {
+    const found = [];
+    for (let i = 0; i < 21; i++) {
+      const start = performance.now();
+      await work();
+      found.push(performance.now() - start);
+    }
+    return found.sort((a, b) => a - b)[10];
+  };
+  let scanned = await simulator.scan(settings);
+  const castMs = await median(async () => {
+    scanned.free();
+    scanned = await simulator.scan(settings);
+  });
+  const classMs = await median(() => simulator.classify(scanned)?.free());
+  return { castMs, classMs, points: scanned.range.length };
+}
+
+for (const [adapter, mesh] of [
+  ["cpu", "chair"],
+  ["cpu", "street"],
+  ["", "chair"],
+  ["", "street"],
+]) {
+  const tab = await browser.newPage();
+  await tab.goto(`${address}/page/page.css`);
+  const { castMs, classMs, points } = await tab.evaluate(times, [adapter, mesh]);
+  const named = mesh === "street" ? "" : `, edge-64 names it in ${classMs.toFixed(2)} ms`;
+  const place = adapter ? "CPU in WebAssembly" : "WebGPU (SwiftShader)";
+  console.log(`${mesh}, a VLP-32C's turn, ${place}: ${castMs.toFixed(1)} ms, ${points} points${named}`);
+  await tab.close();
+}
+
+const pictures = [];
+for (let i = 0; i < 5; i++) {
+  const context = await browser.newContext();
+  const tab = await context.newPage();
+  await tab.goto(`${address}/page/index.html`);
+  await tab.waitForFunction(() => document.body.dataset.firstPictureMs);
+  pictures.push(await tab.evaluate(() => Number(document.body.dataset.firstPictureMs)));
+  await context.close();
+}
+console.log(`first picture after ${(pictures.sort((a, b) => a - b)[2] / 1000).toFixed(2)} s, the median of 5`);
+await browser.close();
+
+const settings = { params: { [constants.BROTLI_PARAM_QUALITY]: 11 } };
+const sizes = [];
+for (const file of await readdir(page)) {
+  if (file.endsWith("rotational-64.safetensors")) continue;
+  sizes.push([file, brotliCompressSync(await readFile(join(page, file)), settings).length]);
+}
+for (const [file, bytes] of sizes) console.log(`${file}: ${bytes} bytes by brotli -q 11`);
+const total = sizes.reduce((sum, [, bytes]) => sum + bytes, 0);
+console.log(`in all: ${(total / 1e6).toFixed(2)} MB`);
