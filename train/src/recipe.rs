@@ -15,7 +15,7 @@ use crate::cluster_variation::ClusterVariation;
 use crate::cpl::Cpl;
 use crate::error::Error;
 use crate::limits::{Check, layers, non_negative, positive, share, share_below_1, widths};
-use crate::shape::{Edge, Shape};
+use crate::shape::{Abstraction, Edge, Shape};
 
 /// The settings of a training.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -78,6 +78,13 @@ pub struct Recipe {
     pub orthogonality: f64,
     /// Share of the target that is distributed over all classes.
     pub label_smoothing: f64,
+    /// Decay of the running mean of the weights over the steps, such as 0.999. The model has the mean
+    /// weights. With 0, it has those of the last step.
+    #[serde(skip_serializing_if = "is_default")]
+    pub average: f64,
+    /// Models from which the network learns, beside the labels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub distillation: Option<Distillation>,
     /// The optimiser.
     pub adam: Adam,
     /// The schedule of the learning rate; by default `step`, every 20 epochs by a factor of 0.7.
@@ -112,6 +119,8 @@ impl Default for Recipe {
             dropout: 0.4,
             orthogonality: 0.001,
             label_smoothing: 0.0,
+            average: 0.0,
+            distillation: None,
             adam: Adam::default(),
             schedule: Schedule::default(),
             augment: Augment::default(),
@@ -209,6 +218,27 @@ impl Schedule {
     }
 }
 
+/// Knowledge distillation: the network also learns the answers of trained models, its teachers, to
+/// the clouds of the training set as they are, without augmentation. They are computed once, when
+/// a run begins or goes on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Distillation {
+    /// Model files, or names of bundled models, of the data's classes. The mean of their
+    /// probabilities counts.
+    pub teachers: Vec<PathBuf>,
+    /// The temperature of the probabilities of teachers and network.
+    pub temperature: f64,
+    /// The weight of the teachers in the loss; the labels have the rest.
+    pub weight: f64,
+}
+
+impl Default for Distillation {
+    fn default() -> Self {
+        Self { teachers: Vec::new(), temperature: 4.0, weight: 0.7 }
+    }
+}
+
 /// The augmentation of clouds in training. A value of 0 disables its step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -241,6 +271,15 @@ pub struct Augment {
     /// Share of clouds in which a part is replaced by points of another cloud (PointCutMix-R: Zhang
     /// et al. 2022).
     pub cut_mix: f64,
+    /// Share of clouds in which a ball is replaced by the points of another cloud that are nearest to
+    /// its centre (after PointCutMix-K), before the choice of points: neighborhoods are those of
+    /// the mixed cloud.
+    #[serde(skip_serializing_if = "is_default")]
+    pub ball_mix: f64,
+    /// Largest local scaling, turn (radians) and shift (half as far) about each of four anchors,
+    /// smoothly blended (after PointWOLF: Kim et al. 2021).
+    #[serde(skip_serializing_if = "is_default")]
+    pub warp: f64,
 }
 
 /// A coordinate axis.
@@ -267,6 +306,8 @@ impl Default for Augment {
             up: Axis::Z,
             stretch: 0.0,
             cut_mix: 0.0,
+            ball_mix: 0.0,
+            warp: 0.0,
         }
     }
 }
@@ -346,7 +387,21 @@ impl Recipe {
                 "augment.cut_mix",
                 "expected 0 with edges, because a mixed cloud has no neighborhood",
             ),
+            share_below_1("average", self.average),
         ];
+        checks.extend(self.abstraction_checks());
+        if let Some(Distillation { teachers, temperature, weight }) = &self.distillation {
+            checks.extend([
+                (!teachers.is_empty(), "distillation.teachers", "expected 1 model or more"),
+                positive("distillation.temperature", *temperature),
+                share("distillation.weight", *weight),
+                (
+                    self.negatives <= 0.0,
+                    "distillation",
+                    "expected no `negatives`, of which teachers say nothing",
+                ),
+            ]);
+        }
         if let Some(cpl) = &self.cpl {
             checks.extend([
                 layers("cpl.front", cpl.front.len(), 2),
@@ -412,6 +467,13 @@ impl Recipe {
             non_negative("augment.sensor_noise", augment.sensor_noise),
             share_below_1("augment.stretch", augment.stretch),
             share("augment.cut_mix", augment.cut_mix),
+            share("augment.ball_mix", augment.ball_mix),
+            share_below_1("augment.warp", augment.warp),
+            (
+                augment.warp <= 0.0 || !is_metric,
+                "augment.warp",
+                "expected 0 with `normalization` metric, because its reach is that of unit spheres",
+            ),
             (
                 (0.0..=180.0).contains(&augment.rotate_degrees),
                 "augment.rotate_degrees",
@@ -423,5 +485,36 @@ impl Recipe {
             Some((_, key, cause)) => Err(Error::Recipe { key, cause: cause.to_owned() }),
             None => Ok(()),
         }
+    }
+
+    fn abstraction_checks(&self) -> Vec<Check> {
+        let Shape { abstractions, edges, input_transform, feature_transform, .. } = &self.network;
+        if abstractions.is_empty() {
+            return Vec::new();
+        }
+        let counts = abstractions.iter().map(|abstraction| abstraction.centres);
+        let radius = |a: &Abstraction| a.radius.is_normal() && a.radius > 0.0;
+        vec![
+            (
+                counts.clone().all(|n| n > 0) && counts.rev().is_sorted(),
+                "network.abstractions.centres",
+                "expected 1 or more, and no more than in the abstraction before",
+            ),
+            (
+                abstractions.iter().all(radius),
+                "network.abstractions.radius",
+                "expected a finite number above 0",
+            ),
+            (
+                abstractions.iter().all(|abstraction| !abstraction.widths.is_empty()),
+                "network.abstractions.widths",
+                "expected 1 layer or more",
+            ),
+            (
+                !input_transform && !feature_transform && edges.is_empty() && self.cpl.is_none(),
+                "network.abstractions",
+                "expected no T-Nets, edges or `cpl` beside abstractions",
+            ),
+        ]
     }
 }
