@@ -44,19 +44,13 @@ pub fn augment(
     let mut draws = Draws::new(stream.key(recipe.seed));
     let mut cloud = varied(clouds, i, recipe, &mut draws);
     let (mut other, mut replaced) = (i, 0.0);
-    if recipe.augment.ball_mix > 0.0 && draws.unit() < recipe.augment.ball_mix {
+    if recipe.augment.cut_mix > 0.0 && draws.unit() < recipe.augment.cut_mix {
         other = draws.below(clouds.len());
         let other_cloud = varied(clouds, other, recipe, &mut draws);
         replaced = mix_ball(cloud.to_mut(), &other_cloud, &mut draws);
     }
     let ChosenPoints { mut points, mut neighborhood, mut places } =
         choose(cloud, recipe, &mut draws);
-    if recipe.augment.cut_mix > 0.0 && draws.unit() < recipe.augment.cut_mix {
-        other = draws.below(clouds.len());
-        let other_cloud = varied(clouds, other, recipe, &mut draws);
-        let other_points = choose(other_cloud, recipe, &mut draws).points;
-        replaced = mix(&mut points, &other_points, &mut draws);
-    }
     let n_classes = clouds.classes.len();
     let mut target = one_hot(clouds.set.labels[i], n_classes);
     for (share, other) in target.iter_mut().zip(one_hot(clouds.set.labels[other], n_classes)) {
@@ -156,18 +150,6 @@ fn choose(cloud: Cow<'_, [[f32; 3]]>, recipe: &Recipe, draws: &mut Draws) -> Cho
         neighborhood: if has_edges { candidates.into_owned() } else { Vec::new() },
         places,
     }
-}
-
-/// Replaces a random part of `points` by points of `other`. Returns the replaced share.
-fn mix(points: &mut [[f32; 3]], other: &[[f32; 3]], draws: &mut Draws) -> f32 {
-    let n = (draws.unit() * points.len().min(other.len()) as f64) as usize;
-    let all = points.len();
-    for (i, from) in other.iter().enumerate().take(n) {
-        let at = i + draws.below(all - i);
-        points.swap(i, at);
-        points[i] = *from;
-    }
-    n as f32 / all as f32
 }
 
 /// Replaces the points of `cloud` in a ball about one of them, a random number, by as many points of

@@ -268,14 +268,10 @@ pub struct Augment {
     pub up: Axis,
     /// Largest difference from 1 of the uniform factor that stretches each axis.
     pub stretch: f64,
-    /// Share of clouds in which a part is replaced by points of another cloud (PointCutMix-R: Zhang
-    /// et al. 2022).
+    /// Share of clouds in which a ball is replaced by points of another cloud, those nearest to the
+    /// ball's centre (after PointCutMix-K: Zhang et al. 2022). The choice of points follows, so that
+    /// neighborhoods are those of the mixed cloud.
     pub cut_mix: f64,
-    /// Share of clouds in which a ball is replaced by the points of another cloud that are nearest to
-    /// its centre (after PointCutMix-K), before the choice of points: neighborhoods are those of
-    /// the mixed cloud.
-    #[serde(skip_serializing_if = "is_default")]
-    pub ball_mix: f64,
     /// Largest local scaling, turn (radians) and shift (half as far) about each of four anchors,
     /// smoothly blended (after PointWOLF: Kim et al. 2021).
     #[serde(skip_serializing_if = "is_default")]
@@ -306,7 +302,6 @@ impl Default for Augment {
             up: Axis::Z,
             stretch: 0.0,
             cut_mix: 0.0,
-            ball_mix: 0.0,
             warp: 0.0,
         }
     }
@@ -382,14 +377,26 @@ impl Recipe {
                 "network.edges.radius",
                 "expected a finite number above 0",
             ),
-            (
-                network.edges.is_empty() || augment.cut_mix <= 0.0,
-                "augment.cut_mix",
-                "expected 0 with edges, because a mixed cloud has no neighborhood",
-            ),
             share_below_1("average", self.average),
         ];
-        checks.extend(self.abstraction_checks());
+        let (abstractions, edges) = (&network.abstractions, &network.edges);
+        let has_t_nets = network.input_transform || network.feature_transform;
+        let is_sound = |a: &Abstraction| {
+            a.centres > 0 && a.radius.is_normal() && a.radius > 0.0 && !a.widths.is_empty()
+        };
+        checks.extend([
+            (
+                abstractions.iter().all(is_sound)
+                    && abstractions.is_sorted_by(|a, b| a.centres >= b.centres),
+                "network.abstractions",
+                "expected 1 centre or more, no more than before, a radius above 0, 1 layer or more",
+            ),
+            (
+                abstractions.is_empty() || !has_t_nets && edges.is_empty() && self.cpl.is_none(),
+                "network.abstractions",
+                "expected none beside T-Nets, edges or a Critical Points Layer",
+            ),
+        ]);
         if let Some(Distillation { teachers, temperature, weight }) = &self.distillation {
             checks.extend([
                 (!teachers.is_empty(), "distillation.teachers", "expected 1 model or more"),
@@ -467,7 +474,6 @@ impl Recipe {
             non_negative("augment.sensor_noise", augment.sensor_noise),
             share_below_1("augment.stretch", augment.stretch),
             share("augment.cut_mix", augment.cut_mix),
-            share("augment.ball_mix", augment.ball_mix),
             share_below_1("augment.warp", augment.warp),
             (
                 augment.warp <= 0.0 || !is_metric,
@@ -485,36 +491,5 @@ impl Recipe {
             Some((_, key, cause)) => Err(Error::Recipe { key, cause: cause.to_owned() }),
             None => Ok(()),
         }
-    }
-
-    fn abstraction_checks(&self) -> Vec<Check> {
-        let Shape { abstractions, edges, input_transform, feature_transform, .. } = &self.network;
-        if abstractions.is_empty() {
-            return Vec::new();
-        }
-        let counts = abstractions.iter().map(|abstraction| abstraction.centres);
-        let radius = |a: &Abstraction| a.radius.is_normal() && a.radius > 0.0;
-        vec![
-            (
-                counts.clone().all(|n| n > 0) && counts.rev().is_sorted(),
-                "network.abstractions.centres",
-                "expected 1 or more, and no more than in the abstraction before",
-            ),
-            (
-                abstractions.iter().all(radius),
-                "network.abstractions.radius",
-                "expected a finite number above 0",
-            ),
-            (
-                abstractions.iter().all(|abstraction| !abstraction.widths.is_empty()),
-                "network.abstractions.widths",
-                "expected 1 layer or more",
-            ),
-            (
-                !input_transform && !feature_transform && edges.is_empty() && self.cpl.is_none(),
-                "network.abstractions",
-                "expected no T-Nets, edges or `cpl` beside abstractions",
-            ),
-        ]
     }
 }

@@ -64,14 +64,13 @@ impl SetNetwork {
     /// As [`crate::network::PointNet::learn`].
     pub fn learn(&mut self, batch: &Batch, kept: Option<Matrix>, rates: Rates) -> Loss {
         self.forward(batch, rates.momentum);
-        let n = self.levels.len();
-        let (pooled, winners) = pool(self.features(n, batch));
+        let (pooled, winners) = pool(features(&self.points, &self.levels, batch));
         let logits = self.head.forward(pooled.view(), kept, rates.momentum);
         let (loss, dlogits) = loss::of_batch(logits, batch);
         let dpooled = self.head.backward(pooled.view(), dlogits.view());
-        let last = self.features(n, batch);
+        let last = features(&self.points, &self.levels, batch);
         let mut dy = unpool(&dpooled, &winners, last.starts);
-        for i in (0..n).rev() {
+        for i in (0..self.levels.len()).rev() {
             let (before, level) = self.levels.split_at_mut(i);
             let u = features(&self.points, before, batch);
             let level = &mut level[0];
@@ -100,11 +99,6 @@ impl SetNetwork {
             let x = level.pool.base.output();
             level.layers.forward(x, level.centres.rows(), None, momentum);
         }
-    }
-
-    /// The output of the first `n` levels.
-    fn features<'a>(&'a self, n: usize, batch: &'a Batch) -> Features<'a> {
-        features(&self.points, &self.levels[..n], batch)
     }
 
     /// The width of the dropout mask.

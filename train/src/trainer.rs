@@ -88,14 +88,14 @@ impl Trainer {
         self.averages.clone()
     }
 
-    /// Moves the running means towards the tensors after the current step. The first steps count as
-    /// in a plain mean, so that the random weights of the beginning are soon forgotten.
+    /// Moves the running means towards the tensors after the current step. The first steps count
+    /// more, so that the random weights of the beginning are soon forgotten.
     fn average(&mut self) {
         if self.recipe.average <= 0.0 {
             return;
         }
         let n = self.step as f64;
-        let share = (1.0 - self.recipe.average).max(1.0 / n) as f32;
+        let share = (1.0 - self.recipe.average).max(10.0 / (n + 9.0)) as f32;
         for (name, tensor) in model_file::tensors(&mut self.model) {
             let Some(average) = self.averages.get_mut(&name) else {
                 self.averages.insert(name, tensor);

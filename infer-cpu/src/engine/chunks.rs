@@ -19,7 +19,7 @@ impl<T: Format> Work for Engine<T> {
         match task {
             Task::Hidden { pass, run } => self.hidden(thread, pass, run, chunk),
             Task::Pool { pass, run } => self.pool_group(thread, pass, run, chunk),
-            Task::Set { level, run } => self.set_chunk(thread, level, run, chunk),
+            Task::Set { level, run } => self.set_block(thread, level, run, chunk),
             Task::Vector { head, layer } => self.vector_chunk(head, layer, chunk),
         }
     }

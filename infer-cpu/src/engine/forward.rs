@@ -81,7 +81,7 @@ impl<T: Format> Forward for Team<Engine<T>> {
             write(&engine.cloud).reserve(n);
         }
         if !engine.layers.abstractions.is_empty() {
-            engine.sets.reserve(n);
+            engine.sets.reserve(n, engine.kernels);
         }
     }
 

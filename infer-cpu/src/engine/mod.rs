@@ -81,8 +81,7 @@ enum Task {
     Hidden { pass: Pass, run: Run },
     /// Compute the last layer of these blocks and pool it.
     Pool { pass: Pass, run: Run },
-    /// Compute the features of blocks of points, or of the centres of an abstraction; before the
-    /// first points, choose the centres.
+    /// Compute the features of blocks of points, or of the centres of an abstraction.
     Set { level: usize, run: Run },
     /// Compute one vector layer.
     Vector { head: Head, layer: usize },
@@ -265,7 +264,7 @@ impl<T: Format> Engine<T> {
             write(&self.cloud).set(cloud);
         }
         if is_set {
-            self.sets.take(points);
+            self.sets.take(points, self.kernels);
         }
         self.clipped.store(0, Ordering::Relaxed);
         self.overflow.store(false, Ordering::Relaxed);

@@ -11,23 +11,27 @@ use super::{
 use crate::edge_conv::{LANES, Lanes, Neighborhood, TILE};
 use crate::kernel::{Kernels, Rows};
 use crate::layers::{Conv, Layers};
+use crate::network::SetAbstraction;
 use crate::precision::Format;
 use crate::sampler::{FarthestPoints, FpsStart};
 use crate::set_abstraction::{NeighborPool, PoolStep};
 use crate::team::Team;
 
 /// The working memory of all levels; empty for other networks.
+#[derive(Default)]
 pub(super) struct Sets {
-    /// The pooling of each level but the first, with the points that it pools.
+    /// The number of centres of each level but the first.
+    counts: Vec<usize>,
+    /// The input of the pooling of each of these levels.
     inputs: Vec<PoolInput>,
-    sampler: Mutex<CentreSampler>,
-    /// The centres of all levels: the first so many are those of a level.
+    farthest: Mutex<(FarthestPoints, Vec<u32>)>,
+    /// The centres of all levels: the first ones are those of a level.
     centres: RwLock<Vec<[f32; 3]>>,
     /// The features of the last level's centres.
     outputs: Mutex<Vec<f32>>,
 }
 
-/// The input of a pooling.
+/// The points that a level pools.
 struct PoolInput {
     pool: NeighborPool,
     cloud: RwLock<Neighborhood>,
@@ -35,37 +39,24 @@ struct PoolInput {
     tiles: RwLock<Vec<RwLock<Vec<[Lanes; TILE]>>>>,
 }
 
-#[derive(Default)]
-struct CentreSampler {
-    points: Vec<[f32; 3]>,
-    farthest: FarthestPoints,
-    picked: Vec<u32>,
-    most: usize,
-}
-
 impl Sets {
     pub fn new<T: Format>(layers: &Layers<T>) -> Self {
-        let levels = &layers.abstractions;
-        let most = levels.first().map_or(0, |first| first.centres);
-        let inputs: Vec<PoolInput> = levels
-            .iter()
-            .map(|level| PoolInput {
-                pool: NeighborPool::new(level.radius, &level.pool.first().dense),
-                cloud: RwLock::default(),
-                tiles: RwLock::default(),
-            })
-            .collect();
-        for (input, before) in inputs.iter().skip(1).zip(levels) {
-            input.reserve(before.centres);
-        }
-        let width = |convs: &[Conv<T>]| convs.last().map_or(0, Conv::width);
-        let last = levels.last().map_or(0, |last| last.centres * width(&last.convs));
-        let picked = Vec::with_capacity(most);
+        let Some(last) = layers.abstractions.last() else { return Self::default() };
+        let input = |level: &SetAbstraction<Conv<T>>| PoolInput {
+            pool: NeighborPool::new(level.radius, &level.pool.first().dense),
+            cloud: RwLock::default(),
+            tiles: RwLock::default(),
+        };
+        let counts: Vec<usize> = layers.abstractions.iter().map(|level| level.centres).collect();
+        let inputs: Vec<PoolInput> = layers.abstractions.iter().map(input).collect();
+        inputs[1..].iter().zip(&counts).for_each(|(input, &n)| input.reserve(n));
+        let width = last.convs.last().map_or(0, Conv::width);
         Self {
+            farthest: Mutex::new((FarthestPoints::default(), Vec::with_capacity(counts[0]))),
+            centres: RwLock::new(Vec::with_capacity(counts[0])),
+            outputs: Mutex::new(vec![0.0; last.centres * width]),
+            counts,
             inputs,
-            sampler: Mutex::new(CentreSampler { picked, most, ..CentreSampler::default() }),
-            centres: RwLock::new(Vec::with_capacity(most)),
-            outputs: Mutex::new(vec![0.0; last]),
         }
     }
 
@@ -75,39 +66,34 @@ impl Sets {
     }
 
     /// Allocates memory for clouds of `n` points.
-    pub fn reserve(&self, n: usize) {
-        let mut sampler = lock(&self.sampler);
-        sampler.farthest.reserve(n);
-        let missing = n.saturating_sub(sampler.points.len());
-        sampler.points.reserve(missing);
+    pub fn reserve(&self, n: usize, kernels: &Kernels) {
+        let (farthest, picked) = &mut *lock(&self.farthest);
+        farthest.select(&vec![[0.0; 3]; n], 1, FpsStart::First, kernels, picked);
         self.inputs[0].reserve(n);
     }
 
-    pub fn take(&self, points: &[[f32; 3]]) {
-        let mut sampler = lock(&self.sampler);
-        sampler.points.clear();
-        sampler.points.extend_from_slice(points);
-        self.inputs[0].set(points);
-    }
-
-    fn choose_centres(&self, kernels: &Kernels) {
-        let mut sampler = lock(&self.sampler);
-        let CentreSampler { points, farthest, picked, most } = &mut *sampler;
+    /// Stores `points`, and chooses the centres of all levels.
+    pub fn take(&self, points: &[[f32; 3]], kernels: &Kernels) {
+        let (farthest, picked) = &mut *lock(&self.farthest);
         // The choice does not depend on the order of the points.
-        farthest.select(points, *most, FpsStart::Farthest, kernels, picked);
+        farthest.select(points, self.counts[0], FpsStart::Farthest, kernels, picked);
         let mut centres = write(&self.centres);
         centres.clear();
         centres.extend(picked.iter().map(|&i| points[i as usize]));
+        self.inputs[0].set(points);
+        for (input, &n) in self.inputs[1..].iter().zip(&self.counts) {
+            input.set(&centres[..n.min(centres.len())]);
+        }
     }
 }
 
 impl PoolInput {
     fn reserve(&self, n: usize) {
         write(&self.cloud).reserve(n);
+        let tile = || RwLock::new(vec![[[0.0; LANES]; TILE]; self.pool.n_lanes()]);
         let mut tiles = write(&self.tiles);
-        while tiles.len() < n.div_ceil(TILE) {
-            tiles.push(RwLock::new(vec![[[0.0; LANES]; TILE]; self.pool.n_lanes()]));
-        }
+        let most = n.div_ceil(TILE).max(tiles.len());
+        tiles.resize_with(most, tile);
     }
 
     fn set(&self, points: &[[f32; 3]]) {
@@ -172,12 +158,7 @@ impl<T: Format> Engine<T> {
                 let n_blocks = RUN_BLOCKS.min(n_blocks - first_block);
                 let run = Run { block, first_block, n_blocks, winners: false };
                 engine.begin(Task::Set { level, run });
-                team.run(n_blocks + usize::from(run.chooses_centres(level)));
-            }
-            // Centres of this level are points of the next.
-            if let Some(input) = engine.sets.inputs.get(level + 1) {
-                let n = engine.n_of_level(level + 1);
-                input.set(&read(&engine.sets.centres)[..n]);
+                team.run(n_blocks);
             }
         }
         engine.pool_centres(&mut scratch.values);
@@ -187,20 +168,12 @@ impl<T: Format> Engine<T> {
     fn n_of_level(&self, level: usize) -> usize {
         match level.checked_sub(1) {
             None => read(&self.points).len() / 4,
-            Some(i) => self.layers.abstractions[i].centres.min(read(&self.sets.centres).len()),
-        }
-    }
-
-    pub(super) fn set_chunk(&self, thread: usize, level: usize, run: Run, chunk: usize) {
-        match (run.chooses_centres(level), chunk) {
-            (true, 0) => self.sets.choose_centres(self.kernels),
-            (true, _) => self.set_block(thread, level, run, chunk - 1),
-            (false, _) => self.set_block(thread, level, run, chunk),
+            Some(i) => self.sets.counts[i].min(read(&self.sets.centres).len()),
         }
     }
 
     /// Computes the features of block `slot` of a run, and passes them on to the next level.
-    fn set_block(&self, thread: usize, level: usize, run: Run, slot: usize) {
+    pub(super) fn set_block(&self, thread: usize, level: usize, run: Run, slot: usize) {
         let (layers, sets) = (&self.layers, &self.sets);
         let mut scratch = lock(&self.threads[thread]);
         let ThreadScratch { wide, narrow: [narrow, _], set_maxima, .. } = &mut *scratch;
@@ -261,12 +234,5 @@ impl<T: Format> Engine<T> {
             }
         }
         means.iter_mut().for_each(|mean| *mean /= n as f32);
-    }
-}
-
-impl Run {
-    /// Whether the first chunk of this run chooses the centres.
-    fn chooses_centres(self, level: usize) -> bool {
-        level == 0 && self.first_block == 0
     }
 }

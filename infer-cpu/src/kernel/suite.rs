@@ -14,9 +14,10 @@ use half::f16;
 use super::scalar::{F16_BLOCK, F16_CHUNK};
 use super::{Candidate, Gemm, Gemv, I8_LARGEST, Kernels, Panels, Rows, Soa, Sum, WIDTH_STEP};
 use crate::dense::Dense;
-use crate::edge_conv::{EdgeConv, Neighborhood};
+use crate::edge_conv::{EdgeConv, LANES, Neighborhood, TILE};
 pub use crate::precision::{F16, F32, I8};
 use crate::precision::{Format, Weight};
+use crate::set_abstraction::{NeighborPool, PoolStep};
 
 /// Numbers of rows: none, and around every tile height in use (4, 6, 8, 12).
 const ROWS: [usize; 12] = [0, 1, 3, 5, 6, 7, 8, 9, 10, 12, 13, 29];

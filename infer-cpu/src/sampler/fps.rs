@@ -15,13 +15,6 @@ pub struct FarthestPoints {
 }
 
 impl FarthestPoints {
-    /// Allocates memory for clouds of `n` points.
-    pub fn reserve(&mut self, n: usize) {
-        for column in [&mut self.x, &mut self.y, &mut self.z, &mut self.distance] {
-            column.reserve(n.saturating_sub(column.len()));
-        }
-    }
-
     /// Writes the indices of up to `m` points to `out`, in the order of choice.
     ///
     /// The sampling is exact: every comparison includes all points. Distances are squared, in f32.

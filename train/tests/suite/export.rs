@@ -242,7 +242,7 @@ fn a_teacher_s_answers_are_its_softened_probabilities() {
     let teachers = vec![path.clone(), path.clone()];
     let distillation = Distillation { teachers, ..Distillation::default() };
     let teachers = Teachers::of(&distillation, &clouds).unwrap();
-    let augment = Augment { ball_mix: 1.0, ..Augment::default() };
+    let augment = Augment { cut_mix: 1.0, ..Augment::default() };
     let drawn =
         augment::augment(&clouds, 7, (0, 0), &Recipe { points: 32, augment, ..Recipe::default() });
     let mut classifier = Classifier::load(&path, &Options::default()).unwrap();

@@ -164,15 +164,14 @@ impl Reference<'_> {
             let mut z = Table::new();
             for cloud in &levels {
                 for (p, _) in cloud.iter().take(abstraction.centres) {
+                    let near = || cloud.iter().filter(|(q, _)| distance(p, q) <= radius);
                     let pooled = |c: usize| {
-                        let products =
-                            cloud.iter().filter(|(q, _)| distance(p, q) <= radius).map(|(q, u)| {
-                                let along =
-                                    |k: usize| weight[4 * c + 1 + k] * (q[k] - p[k]) / radius;
-                                scale[c].signum()
-                                    * (weight[4 * c] * u[c] + (0..3).map(along).sum::<f64>())
-                            });
-                        scale[c].signum() * products.fold(f64::MIN, f64::max) + bias[c]
+                        let (w, sign) = (&weight[4 * c..][..4], scale[c].signum());
+                        let along = |q: &[f64], k: usize| w[1 + k] * (q[k] - p[k]) / radius;
+                        let products = near().map(|(q, u)| {
+                            sign * (w[0] * u[c] + (0..3).map(|k| along(q, k)).sum::<f64>())
+                        });
+                        sign * products.fold(f64::MIN, f64::max) + bias[c]
                     };
                     z.push((0..scale.len()).map(pooled).collect());
                 }
