@@ -180,7 +180,7 @@ impl<C, F> Reader<'_, C, F> {
         for (&(centres, radius), number) in card.abstractions.iter().zip(1..) {
             let before =
                 abstractions.last().map_or(usize::MAX, |before: &SetAbstraction<C>| before.centres);
-            if !(1..=before).contains(&centres) || !(radius.is_normal() && radius > 0.0) {
+            if !((1..=before).contains(&centres) && radius.is_normal() && radius > 0.0) {
                 let cause = format!(
                     "expected 1 centre or more, no more than before, and a radius above 0, found \
                      {centres} and {radius}"

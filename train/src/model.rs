@@ -21,9 +21,9 @@ pub struct Model {
 #[derive(Clone, Debug)]
 pub enum Network {
     /// One pooling over the whole cloud.
-    PointNet(PointNet),
+    PointNet(Box<PointNet>),
     /// Set abstractions.
-    Sets(SetNetwork),
+    Sets(Box<SetNetwork>),
 }
 
 impl Network {

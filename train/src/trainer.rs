@@ -59,7 +59,8 @@ impl Trainer {
     pub fn new(recipe: Recipe, n_classes: usize) -> Result<Self, Error> {
         let refuse = |cause| Error::Recipe { key: "cpl.resize", cause };
         if !recipe.network.abstractions.is_empty() {
-            let network = Network::Sets(SetNetwork::new(&recipe.network, n_classes, recipe.seed));
+            let network = SetNetwork::new(&recipe.network, n_classes, recipe.seed);
+            let network = Network::Sets(Box::new(network));
             return Ok(Self::of(recipe, Model { encoder: None, network }));
         }
         let mut network = PointNet::new(&recipe.network, n_classes, recipe.seed);
@@ -72,7 +73,7 @@ impl Trainer {
             Some(cpl) => Some(PointEncoder::new(cpl, n_classes, recipe.seed).map_err(refuse)?),
             None => None,
         };
-        Ok(Self::of(recipe, Model { encoder, network: Network::PointNet(network) }))
+        Ok(Self::of(recipe, Model { encoder, network: Network::PointNet(Box::new(network)) }))
     }
 
     fn of(recipe: Recipe, model: Model) -> Self {

@@ -577,7 +577,7 @@ pub fn neighbor_pooling_is_near_the_definition(kernels: &Kernels) {
             // In units u = EPSILON / 2: weights over the radius are at most 2 and off by 2u,
             // products of three at most 6 and off by 30u, with the feature's at most 7 and off by
             // 38u; the difference is at most 13, the sum with the bias 14, each rounded once.
-            let bound = f64::from(38.0 + 30.0 + 13.0 + 14.0) * f64::from(f32::EPSILON) / 2.0;
+            let bound = (38.0 + 30.0 + 13.0 + 14.0) * f64::from(f32::EPSILON) / 2.0;
             assert!((f64::from(out[c]) - expected).abs() <= bound, "{}, {expected}", out[c]);
         }
         assert!(out[channels..].iter().all(|padding| *padding == 0.0));

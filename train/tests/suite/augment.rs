@@ -133,7 +133,7 @@ fn a_ball_of_points_is_mixed_in() {
         // Some point is the centre of a ball that holds exactly what is gone.
         let is_centre = |c: &[f32; 3]| {
             let far = |p: &[f32; 3]| (0..3).map(|k| (p[k] - c[k]).powi(2)).sum::<f32>();
-            let nearest = kept.iter().map(|p| far(p)).fold(f32::MAX, f32::min);
+            let nearest = kept.iter().map(&far).fold(f32::MAX, f32::min);
             gone.iter().all(|p| far(p) <= nearest)
         };
         assert!(whole.iter().any(is_centre), "{epoch}");
