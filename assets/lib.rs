@@ -39,8 +39,9 @@ pub const SCENE_RECIPES: [(&str, &str); 3] = [
 ];
 
 /// The recipes of bundled models, for `edgepuck train`: a recipe's name and its TOML.
-pub const TRAINING_RECIPES: [(&str, &str); 3] = [
+pub const TRAINING_RECIPES: [(&str, &str); 4] = [
     ("edge-64", include_str!("recipes/edge-64.toml")),
+    ("set-64", include_str!("recipes/set-64.toml")),
     ("street-128", include_str!("recipes/street-128.toml")),
     ("lidar-64", include_str!("recipes/lidar-64.toml")),
 ];

@@ -11,6 +11,7 @@
 //! | `transform_after` | number of layers of the trunk before the feature transform | `1` |
 //! | `pooled` | `relu` if the trunk's last layer has a ReLU, else `linear` | `linear` |
 //! | `edge_radii` | JSON list: the radius of the neighbourhoods of each layer `edge.conv1…` | none |
+//! | `abstractions` | JSON list: the number of centres and the radius of each set abstraction `sa1…` | none |
 //! | `activation_ranges` | JSON object: layer to its largest activation, for int8 | calibrated at load |
 //! | `unknown_classes` | JSON list of the classes that are answered as `unknown` | none |
 //! | `unknown_energy` | energy above which a cloud is answered as `unknown` | infinity |
@@ -53,6 +54,8 @@ pub struct ModelCard {
     pub pooled_relu: bool,
     /// The radius of the neighbourhoods of each EdgeConv layer, in units of the normalised cloud.
     pub edge_radii: Vec<f32>,
+    /// The number of centres of each set abstraction, and the radius of their neighbourhoods.
+    pub abstractions: Vec<(usize, f32)>,
     /// The largest activation of each layer, by the layer's name.
     pub activation_ranges: BTreeMap<String, f32>,
     /// The classes that are not objects of interest, such as trees or walls, and are answered as
@@ -111,6 +114,7 @@ impl Default for ModelCard {
             transform_after: 1,
             pooled_relu: false,
             edge_radii: Vec::new(),
+            abstractions: Vec::new(),
             activation_ranges: BTreeMap::new(),
             unknown_classes: Vec::new(),
             unknown_energy: None,
@@ -161,6 +165,7 @@ impl ModelCard {
             transform_after: entries.get("transform_after", count, default.transform_after)?,
             pooled_relu: entries.get("pooled", either("linear", "relu"), default.pooled_relu)?,
             edge_radii: entries.get("edge_radii", json, default.edge_radii)?,
+            abstractions: entries.get("abstractions", json, default.abstractions)?,
             activation_ranges: entries.get("activation_ranges", json, BTreeMap::new())?,
             unknown_classes,
             unknown_energy: entries.get("unknown_energy", |word| finite(word).map(Some), None)?,
@@ -177,6 +182,8 @@ impl ModelCard {
     pub fn to_metadata(&self) -> BTreeMap<String, String> {
         let ranges = self.activation_ranges.iter();
         let ranges: BTreeMap<_, _> = ranges.map(|(layer, &r)| (layer, f64::from(r))).collect();
+        let pair = |(n, radius): &(usize, f32)| format!("[{n}, {radius:?}]");
+        let abstractions = self.abstractions.iter().map(pair).collect::<Vec<_>>().join(", ");
         let entries = [
             ("classes", (!self.classes.is_empty()).then(|| json!(self.classes).to_string())),
             ("normalization", Some(self.normalization.name().to_owned())),
@@ -187,6 +194,7 @@ impl ModelCard {
             ("transform_after", Some(self.transform_after.to_string())),
             ("pooled", Some(if self.pooled_relu { "relu" } else { "linear" }.to_owned())),
             ("edge_radii", (!self.edge_radii.is_empty()).then(|| format!("{:?}", self.edge_radii))),
+            ("abstractions", (!abstractions.is_empty()).then(|| format!("[{abstractions}]"))),
             ("activation_ranges", (!ranges.is_empty()).then(|| json!(ranges).to_string())),
             (
                 "unknown_classes",
@@ -273,6 +281,7 @@ mod tests {
             transform_after: 2,
             pooled_relu: true,
             edge_radii: vec![0.1, 0.4],
+            abstractions: vec![(256, 0.2), (64, 0.4)],
             activation_ranges: BTreeMap::from([("feat.conv1".into(), 1.1)]),
             unknown_classes: vec!["cup".into()],
             unknown_energy: Some(-3.25),
@@ -298,6 +307,7 @@ mod tests {
             "transform_after",
             "pooled",
             "edge_radii",
+            "abstractions",
             "unknown_classes",
             "temperature",
             "trained",

@@ -21,12 +21,12 @@ use std::ops::Range;
 use crate::dense::Dense;
 
 /// Points of a tile.
-const TILE: usize = 64;
+pub const TILE: usize = 64;
 /// Channels whose maxima stay in registers during the loop over neighbours. Layers are padded to
 /// multiples of it.
-const LANES: usize = 32;
+pub const LANES: usize = 32;
 
-type Lanes = [f32; LANES];
+pub type Lanes = [f32; LANES];
 
 /// The layers of all radii.
 #[derive(Clone, Debug, Default)]
@@ -64,12 +64,30 @@ pub struct EdgeScratch {
 }
 
 impl Neighborhood {
+    /// The neighborhood of `points`.
+    #[must_use]
+    pub fn of(points: &[[f32; 3]]) -> Self {
+        let mut neighborhood = Self::default();
+        neighborhood.set(points);
+        neighborhood
+    }
+
+    /// The points within `radius` of `p`, with their indices.
+    pub fn within(&self, p: [f32; 3], radius: f32) -> impl Iterator<Item = (usize, [f32; 3])> {
+        self.tiles().enumerate().flat_map(move |(number, tile)| {
+            let near = within(&tile.squared_distances(p), radius * radius);
+            bits(near).map(move |i| (number * TILE + i, [tile.x[i], tile.y[i], tile.z[i]]))
+        })
+    }
+
+    /// Allocates memory for `n` points.
     pub fn reserve(&mut self, n: usize) {
         for axis in &mut self.axes {
             axis.reserve(n.next_multiple_of(TILE).saturating_sub(axis.len()));
         }
     }
 
+    /// Replaces the points.
     pub fn set(&mut self, points: &[[f32; 3]]) {
         for (k, axis) in self.axes.iter_mut().enumerate() {
             axis.clear();
@@ -78,9 +96,15 @@ impl Neighborhood {
         }
     }
 
+    /// Tile `number` of the points.
+    pub(crate) fn tile(&self, number: usize) -> Tile<'_> {
+        let [x, y, z] = self.axes.each_ref().map(|axis| &axis.as_chunks().0[number]);
+        Tile { x, y, z }
+    }
+
     /// The points, a tile at a time.
     #[inline(always)]
-    fn tiles(&self) -> impl Iterator<Item = Tile<'_>> {
+    pub(crate) fn tiles(&self) -> impl Iterator<Item = Tile<'_>> {
         let [xs, ys, zs] = self.axes.each_ref().map(|axis| axis.as_chunks().0.iter());
         xs.zip(ys).zip(zs).map(|((x, y), z)| Tile { x, y, z })
     }
@@ -219,15 +243,16 @@ impl EdgeConv {
 }
 
 /// Points of a cloud that are processed together.
-struct Tile<'a> {
-    x: &'a [f32; TILE],
-    y: &'a [f32; TILE],
-    z: &'a [f32; TILE],
+#[derive(Clone, Copy)]
+pub(crate) struct Tile<'a> {
+    pub x: &'a [f32; TILE],
+    pub y: &'a [f32; TILE],
+    pub z: &'a [f32; TILE],
 }
 
 impl Tile<'_> {
     #[inline(always)]
-    fn squared_distances(&self, [x, y, z]: [f32; 3]) -> [f32; TILE] {
+    pub fn squared_distances(&self, [x, y, z]: [f32; 3]) -> [f32; TILE] {
         let mut squared = [0.0; TILE];
         for (i, squared) in squared.iter_mut().enumerate() {
             let (x, y, z) = (self.x[i] - x, self.y[i] - y, self.z[i] - z);
@@ -240,7 +265,7 @@ impl Tile<'_> {
 /// The products of a point and the weights of `N` channels. `FUSED` is for processors with a fused
 /// multiply-add; without it, `mul_add` would be a slow library call.
 #[inline(always)]
-fn product<const FUSED: bool, const N: usize>(
+pub(crate) fn product<const FUSED: bool, const N: usize>(
     [wx, wy, wz]: [&[f32; N]; 3],
     [x, y, z]: [f32; 3],
 ) -> [f32; N] {
@@ -257,7 +282,7 @@ fn product<const FUSED: bool, const N: usize>(
 
 /// The points of a tile within a radius, one bit each.
 #[inline(always)]
-fn within(squared: &[f32; TILE], squared_radius: f32) -> u64 {
+pub(crate) fn within(squared: &[f32; TILE], squared_radius: f32) -> u64 {
     /// Moves the lowest bit of byte i to bit 56 + i: the factor has the bits 56 - 7 i.
     const GATHER: u64 = 0x0102_0408_1020_4080;
     let mut is_near = [0; TILE];
@@ -281,7 +306,7 @@ fn bits(mut of: u64) -> impl Iterator<Item = usize> {
 
 /// Raises the maxima to the products of the points whose bits are set in `near`.
 #[inline(always)]
-fn raise(maxima: &mut Lanes, products: &[Lanes; TILE], near: u64) {
+pub(crate) fn raise(maxima: &mut Lanes, products: &[Lanes; TILE], near: u64) {
     let mut most = *maxima;
     for i in bits(near) {
         for (most, &product) in most.iter_mut().zip(&products[i]) {

@@ -60,6 +60,7 @@ mod prefilter;
 pub mod rule;
 pub mod sampler;
 mod selection;
+mod set_abstraction;
 mod source;
 mod summary;
 mod team;
@@ -80,7 +81,7 @@ pub mod sharing {
 #[doc(hidden)]
 pub mod model_file {
     pub use crate::dense::Dense;
-    pub use crate::network::{Network, TNet, open, read};
+    pub use crate::network::{Network, SetAbstraction, TNet, open, read};
 }
 
 pub use calibrate::on_clouds as activation_ranges;

@@ -5,7 +5,9 @@
 //! and `feat.bn1…` are the trunk, `feat.stn.*` and `feat.fstn.*` the T-Nets (with `conv`, `fc`, and
 //! `bn` numbered through both), `fc1…` and `bn1…` the head. The front end is `cpl.conv1…` and
 //! `cpl.bn1…`. `edge.conv1…` computes features of a point's neighborhood, one layer for each of the
-//! card's `edge_radii`. If no layer has a batch norm, all are folded in already.
+//! card's `edge_radii`. `sa1.conv1…`, `sa2.conv1…` are set abstractions, one for each of the card's
+//! `abstractions`; `conv1` is the pooling, whose inputs are a point's own feature and its offset. If
+//! no layer has a batch norm, all are folded in already.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -25,6 +27,8 @@ pub struct Network<C, F> {
     pub edges: Vec<(f32, Dense)>,
     /// The layers from coordinates and EdgeConv features to the pooled features.
     pub trunk: Vec<C>,
+    /// The set abstractions after the trunk. Without any, the trunk's outputs are pooled.
+    pub abstractions: Vec<SetAbstraction<C>>,
     /// The T-Net of the features.
     pub fstn: Option<TNet<C, F>>,
     /// The number of layers of the trunk before the feature transform.
@@ -41,13 +45,31 @@ pub struct Parts {
     pub stn: bool,
     pub fstn: bool,
     pub front: bool,
+    pub abstractions: bool,
 }
 
 impl<C, F> Network<C, F> {
     pub(crate) fn parts(&self) -> Parts {
-        let Self { stn, fstn, front, .. } = self;
-        Parts { stn: stn.is_some(), fstn: fstn.is_some(), front: front.is_some() }
+        let Self { stn, fstn, front, abstractions, .. } = self;
+        Parts {
+            stn: stn.is_some(),
+            fstn: fstn.is_some(),
+            front: front.is_some(),
+            abstractions: !abstractions.is_empty(),
+        }
     }
+}
+
+/// A level of a network: features of the neighborhoods of some of its points.
+pub struct SetAbstraction<C> {
+    /// The number of centres, the first farthest points.
+    pub centres: usize,
+    /// The radius of a neighborhood.
+    pub radius: f32,
+    /// The pooling over neighborhoods. Its inputs are the feature of the same channel, x, y and z.
+    pub pool: C,
+    /// The layers after the pooling.
+    pub convs: Vec<C>,
 }
 
 /// A network that predicts a `k` x `k` matrix, row by row. Its last biases include the identity.
@@ -124,6 +146,9 @@ impl<C, F> Reader<'_, C, F> {
         let inputs = 3 + edges.iter().map(|(_, dense)| dense.outputs).sum::<usize>();
         let transform_after = card.transform_after;
         let turned = self.has("feat.fstn.").then_some(transform_after);
+        if self.has("sa") || !card.abstractions.is_empty() {
+            return self.set_network(card);
+        }
         let (trunk, widths) =
             self.point_layers("feat", inputs, Role::First, turned, card.pooled_relu)?;
         let n_trunk = trunk.len();
@@ -144,7 +169,63 @@ impl<C, F> Reader<'_, C, F> {
             .then(|| self.point_layers("cpl", 3, Role::First, None, true))
             .transpose()?
             .map(|(layers, _)| layers);
-        Ok(Network { stn, edges, trunk, fstn, transform_after, head, front })
+        let abstractions = Vec::new();
+        Ok(Network { stn, edges, trunk, abstractions, fstn, transform_after, head, front })
+    }
+
+    /// A network of set abstractions.
+    fn set_network(&mut self, card: &ModelCard) -> Result<Network<C, F>, FormatError> {
+        let (trunk, mut width) = self.hidden_layers("feat", 1, 3, Role::First)?;
+        let mut abstractions = Vec::new();
+        for (&(centres, radius), number) in card.abstractions.iter().zip(1..) {
+            let before =
+                abstractions.last().map_or(usize::MAX, |before: &SetAbstraction<C>| before.centres);
+            if !((1..=before).contains(&centres) && radius.is_normal() && radius > 0.0) {
+                let cause = format!(
+                    "expected 1 centre or more, no more than before, and a radius above 0, found \
+                     {centres} and {radius}"
+                );
+                return Err(self.file_error("metadata `abstractions`", cause));
+            }
+            let prefix = format!("sa{number}");
+            let pool = self.dense(&prefix, ("conv", 1), Some(1), 4, true)?;
+            if pool.outputs != width {
+                let cause = format!("expected shape [{width}, 4], found [{}, 4]", pool.outputs);
+                return Err(self.error(&format!("{prefix}.conv1.weight"), cause));
+            }
+            let pool = (self.conv)(pool, Role::First);
+            let (convs, after) = self.hidden_layers(&prefix, 2, width, Role::Inner)?;
+            width = after;
+            abstractions.push(SetAbstraction { centres, radius, pool, convs });
+        }
+        if abstractions.is_empty() {
+            let cause = "missing, although the file has set abstractions".to_owned();
+            return Err(self.file_error("metadata `abstractions`", cause));
+        }
+        let head = self.vector_layers("", 0, 2 * width, None)?;
+        self.check_class_names(card, head.len())?;
+        let (edges, transform_after) = (Vec::new(), card.transform_after);
+        let (stn, fstn, front) = (None, None, None);
+        Ok(Network { stn, edges, trunk, abstractions, fstn, transform_after, head, front })
+    }
+
+    /// Point-wise layers with ReLU from number `first` on, whose outputs are stored, and the last
+    /// width. The first of them has the role `role`.
+    fn hidden_layers(
+        &mut self,
+        prefix: &str,
+        first: usize,
+        mut width: usize,
+        role: Role,
+    ) -> Result<(Vec<C>, usize), FormatError> {
+        let n = self.count(&format!("{prefix}.conv")).max(first);
+        let mut layers = Vec::new();
+        for i in first..=n {
+            let dense = self.dense(prefix, ("conv", i), Some(i), width, true)?;
+            width = dense.outputs;
+            layers.push((self.conv)(dense, if i == first { role } else { Role::Inner }));
+        }
+        Ok((layers, width))
     }
 
     fn check_class_names(&self, card: &ModelCard, n_layers: usize) -> Result<(), FormatError> {

@@ -157,6 +157,9 @@ pub fn front_pass(choice: FrontChoice, parts: &Parts) -> Result<Pass, Error> {
     match choice {
         FrontChoice::Own if parts.front => Ok(Pass::Front),
         FrontChoice::Stn if parts.stn => Ok(Pass::Stn),
+        _ if parts.abstractions => {
+            lacks("set abstractions, which a Critical Points Layer cannot pool")
+        }
         FrontChoice::Trunk if !parts.stn && !parts.fstn => Ok(Pass::Trunk),
         FrontChoice::Auto if parts.front => Ok(Pass::Front),
         FrontChoice::Auto if parts.stn => Ok(Pass::Stn),

@@ -6,7 +6,7 @@ use formats::model_card::ModelCard;
 
 use crate::dense::Dense;
 use crate::error::Error;
-use crate::network::{Network, TNet, open, read_network};
+use crate::network::{Network, SetAbstraction, TNet, open, read_network};
 use crate::precision::Precision;
 
 /// The network of a model file, layer by layer.
@@ -21,6 +21,8 @@ pub struct Summary {
     pub fstn: Option<NetShape>,
     /// The EdgeConv layers, each with its radius.
     pub edges: Vec<(f32, LayerShape)>,
+    /// The set abstractions, with the numbers of their centres. The first layer of each pools.
+    pub abstractions: Vec<(usize, Vec<LayerShape>)>,
     /// The trunk, and the layers from the pooled vector to the logits.
     pub trunk: NetShape,
     /// The front end for a Critical Points Layer, if the file has one.
@@ -57,13 +59,17 @@ pub fn inspect(path: &Path) -> Result<Summary, Error> {
     let (mut file, card) = open(path)?;
     let n_stored = file.shapes().values().map(|shape| shape.iter().product::<usize>()).sum();
     let network = read_network(&mut file, &card, |dense, _| shape_of(dense), shape_of)?;
-    let Network { stn, edges, trunk, fstn, head, front, .. } = network;
+    let Network { stn, edges, trunk, abstractions, fstn, head, front, .. } = network;
+    let layers = |SetAbstraction { centres, pool, convs, .. }| {
+        (centres, std::iter::once(pool).chain(convs).collect())
+    };
     let t_net = |TNet { convs, fcs, .. }| NetShape { convs, fcs };
     Ok(Summary {
         card,
         stn: stn.map(t_net),
         fstn: fstn.map(t_net),
         edges: edges.into_iter().map(|(radius, dense)| (radius, shape_of(dense))).collect(),
+        abstractions: abstractions.into_iter().map(layers).collect(),
         trunk: NetShape { convs: trunk, fcs: head },
         front,
         n_stored,
@@ -105,10 +111,16 @@ impl Summary {
         self.nets().flat_map(|net| &net.convs).map(LayerShape::macs).sum::<usize>() + transforms
     }
 
-    /// The number of further multiplications for each cloud.
+    /// The number of further multiplications for each cloud, which has all centres of the
+    /// abstractions.
     #[must_use]
     pub fn macs_per_cloud(&self) -> usize {
-        self.nets().flat_map(|net| &net.fcs).map(LayerShape::macs).sum()
+        let centres = self.abstractions.iter().map(|(centres, layers)| {
+            // The pooling multiplies once for each point of the level before, not here.
+            centres * layers[1..].iter().map(LayerShape::macs).sum::<usize>()
+        });
+        let vectors = self.nets().flat_map(|net| &net.fcs).map(LayerShape::macs);
+        centres.chain(vectors).sum()
     }
 
     /// The number of multiplications of the front end for each point of the cloud.
@@ -123,7 +135,8 @@ impl Summary {
         let layers = self.nets().flat_map(|net| net.convs.iter().chain(&net.fcs));
         let edges = self.edges.iter().map(|(_, layer)| layer);
         let front = self.front.iter().flatten();
-        layers.chain(edges).chain(front).map(LayerShape::parameters).sum()
+        let abstractions = self.abstractions.iter().flat_map(|(_, layers)| layers);
+        layers.chain(edges).chain(front).chain(abstractions).map(LayerShape::parameters).sum()
     }
 
     /// The bytes of weights, biases (fp32) and scales (fp32, for int8) in `precision`, without
@@ -150,7 +163,8 @@ impl Summary {
         let nets = [self.stn.as_ref(), Some(&self.trunk)].into_iter().flatten();
         let convs = nets.map(|net| outer(&net.convs)).sum::<usize>()
             + self.fstn.as_ref().map_or(0, |fstn| inner(&fstn.convs))
-            + self.edges.iter().map(|(_, edge)| 4 * edge.parameters()).sum::<usize>();
+            + self.edges.iter().map(|(_, edge)| 4 * edge.parameters()).sum::<usize>()
+            + self.abstractions.iter().map(|(_, layers)| outer(layers)).sum::<usize>();
         let front = self.front.as_deref().map_or(0, outer);
         let fcs = self.nets().flat_map(|net| &net.fcs).map(|fc| layer(fc, vector_bytes));
         convs + fcs.sum::<usize>() + front

@@ -93,6 +93,15 @@ fn main() {
             }
         }
     }
+    let (card, tensors) = tiny_model::sets(4);
+    let sets = tiny_model::write(&folder.path().join("sets.safetensors"), &tensors, &card);
+    for precision in Precision::ALL {
+        let options = Options { precision, threads: 3, capacity: CAPACITY, ..Options::default() };
+        let n = allocations(&sets, &options, &clouds, ROUNDS * clouds.len());
+        if n > 0 {
+            found.push(format!("set abstractions in {precision}: {n}"));
+        }
+    }
     let filter = Options { outlier_filter: Some(true), capacity: CAPACITY, ..Options::default() };
     let n = allocations(&model, &filter, &clouds, ROUNDS * clouds.len());
     if n > 0 {

@@ -3,6 +3,10 @@
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+#[path = "support/tiny_model.rs"]
+#[allow(dead_code, reason = "other tests use all of it")]
+mod tiny_model;
+
 use std::path::Path;
 
 use formats::model_card::Normalization;
@@ -108,7 +112,15 @@ fn narrow_networks_give_pytorch_s_logits_with_and_without_t_nets() {
 /// Logits are equal to the bit for any number of threads.
 #[test]
 fn threads_change_nothing() {
-    let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/tiny.safetensors");
+    let tiny = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden/tiny.safetensors");
+    let folder = tempfile::tempdir().unwrap();
+    let (card, tensors) = tiny_model::sets(4);
+    let sets = tiny_model::write(&folder.path().join("sets.safetensors"), &tensors, &card);
+    threads_change_nothing_of(&tiny);
+    threads_change_nothing_of(&sets);
+}
+
+fn threads_change_nothing_of(model: &Path) {
     // The division of work does not depend on the processor, so that an emulator tests fewer teams.
     let teams: &[usize] = if IS_EMULATED { &[1, 3] } else { &[1, 2, 3, 8] };
     for precision in Precision::ALL {
@@ -116,11 +128,47 @@ fn threads_change_nothing() {
             let cloud: Vec<_> = (0..n).map(golden_point).collect();
             let logits = teams.iter().map(|&threads| {
                 let options = Options { precision, threads, ..Options::default() };
-                let mut classifier = Classifier::load(&model, &options).unwrap();
+                let mut classifier = Classifier::load(model, &options).unwrap();
                 classifier.classify(&cloud).unwrap().logits.clone()
             });
             let logits: Vec<_> = logits.collect();
             assert!(logits.iter().all(|other| *other == logits[0]), "{precision} {n}");
+        }
+    }
+}
+
+/// Set abstractions in each precision and by each kernel, against those of the reference in fp32,
+/// for clouds in either order.
+#[test]
+fn set_abstractions_agree_in_all_precisions() {
+    let folder = tempfile::tempdir().unwrap();
+    let (card, tensors) = tiny_model::sets(4);
+    let model = tiny_model::write(&folder.path().join("sets.safetensors"), &tensors, &card);
+    let logits = |kernel, precision, cloud: &[[f32; 3]]| {
+        let options = Options { kernel: Some(kernel), precision, ..Options::default() };
+        let mut classifier = Classifier::load(&model, &options).ok()?;
+        Some(classifier.classify(cloud).unwrap().logits.clone())
+    };
+    for n in [1, 70, 1024] {
+        let mut cloud: Vec<_> = (0..n).map(golden_point).collect();
+        let expected = logits(KernelName::Scalar, Precision::F32, &cloud).unwrap();
+        let largest = expected.iter().fold(0.0f32, |most, x| most.max(x.abs()));
+        cloud.reverse();
+        for kernel in kernel::available().map(|kernels| kernels.name) {
+            for (precision, tolerance) in [
+                // Eight layers of sums of up to 180 products, each rounded to 6e-8.
+                (Precision::F32, 1e-5),
+                (Precision::F32Fc16, 2e-3),
+                (Precision::F16, 1e-2),
+                // Seven bits an activation, calibrated on other shapes than one point.
+                (Precision::I8, 0.25),
+            ] {
+                let Some(found) = logits(kernel, precision, &cloud) else { continue };
+                for (found, expected) in found.iter().zip(&expected) {
+                    let error = (found - expected).abs() / largest;
+                    assert!(error < tolerance, "{kernel} {precision} {n}: {error}");
+                }
+            }
         }
     }
 }

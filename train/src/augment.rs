@@ -25,6 +25,8 @@ pub struct TrainingCloud {
     pub first_weight: f32,
     /// The target share of each class.
     pub target: Vec<f32>,
+    /// The clouds of which it consists, with their shares: its own, and one that is mixed in.
+    pub parts: [(usize, f32); 2],
 }
 
 /// Augments cloud `i` of `clouds` for its draw number `turn`, counted from 0, in `epoch`.
@@ -40,17 +42,19 @@ pub fn augment(
         _ => Stream::AugmentAgain { cloud: i, turn, epoch },
     };
     let mut draws = Draws::new(stream.key(recipe.seed));
+    let mut cloud = varied(clouds, i, recipe, &mut draws);
+    let (mut other, mut replaced) = (i, 0.0);
+    if recipe.augment.cut_mix > 0.0 && draws.unit() < recipe.augment.cut_mix {
+        other = draws.below(clouds.len());
+        let other_cloud = varied(clouds, other, recipe, &mut draws);
+        replaced = mix_ball(cloud.to_mut(), &other_cloud, &mut draws);
+    }
     let ChosenPoints { mut points, mut neighborhood, mut places } =
-        choose(clouds, i, recipe, &mut draws);
+        choose(cloud, recipe, &mut draws);
     let n_classes = clouds.classes.len();
     let mut target = one_hot(clouds.set.labels[i], n_classes);
-    if recipe.augment.cut_mix > 0.0 && draws.unit() < recipe.augment.cut_mix {
-        let other = draws.below(clouds.len());
-        let other_points = choose(clouds, other, recipe, &mut draws).points;
-        let replaced = mix(&mut points, &other_points, &mut draws);
-        for (share, other) in target.iter_mut().zip(one_hot(clouds.set.labels[other], n_classes)) {
-            *share += replaced * (other - *share);
-        }
+    for (share, other) in target.iter_mut().zip(one_hot(clouds.set.labels[other], n_classes)) {
+        *share += replaced * (other - *share);
     }
     let smoothing = recipe.label_smoothing as f32;
     for share in &mut target {
@@ -72,7 +76,8 @@ pub fn augment(
         points = places.iter().map(|&place| neighborhood[place]).collect();
     }
     let first_weight = (n - points.len() + 1) as f32;
-    TrainingCloud { points, neighborhood, first_weight, target }
+    let parts = [(i, 1.0 - replaced), (other, replaced)];
+    TrainingCloud { points, neighborhood, first_weight, target, parts }
 }
 
 /// The validation clouds `held`, followed by a copy of each, varied and turned as in training, so
@@ -103,16 +108,25 @@ fn one_hot(label: usize, n_classes: usize) -> Vec<f32> {
     (0..n_classes).map(|class| f32::from(u8::from(class == label))).collect()
 }
 
-/// Chooses the points of cloud `i` for the network, after varying and centring a cluster in metres.
-fn choose(clouds: &Clouds, i: usize, recipe: &Recipe, draws: &mut Draws) -> ChosenPoints {
+/// Cloud `i`, varied, and centred if it is a cluster in metres.
+fn varied<'a>(
+    clouds: &'a Clouds,
+    i: usize,
+    recipe: &Recipe,
+    draws: &mut Draws,
+) -> Cow<'a, [[f32; 3]]> {
     let cloud = clouds.set.cloud(i);
-    let cloud: Cow<'_, [[f32; 3]]> = if recipe.normalization.is_metric() {
+    if recipe.normalization.is_metric() {
         cluster::varied(cloud, clouds.set.ground_z(i), recipe, draws).into()
     } else if recipe.varies_objects() {
         cluster::varied_object(cloud, recipe, draws).into()
     } else {
         cloud.into()
-    };
+    }
+}
+
+/// Chooses the points of `cloud` for the network.
+fn choose(cloud: Cow<'_, [[f32; 3]]>, recipe: &Recipe, draws: &mut Draws) -> ChosenPoints {
     let n = recipe.points.min(cloud.len());
     let (candidates, places): (Cow<'_, [[f32; 3]]>, Vec<usize>) = match recipe.sampling {
         Sampling::First => (cloud, (0..n).collect()),
@@ -138,16 +152,52 @@ fn choose(clouds: &Clouds, i: usize, recipe: &Recipe, draws: &mut Draws) -> Chos
     }
 }
 
-/// Replaces a random part of `points` by points of `other`. Returns the replaced share.
-fn mix(points: &mut [[f32; 3]], other: &[[f32; 3]], draws: &mut Draws) -> f32 {
-    let n = (draws.unit() * points.len().min(other.len()) as f64) as usize;
-    let all = points.len();
-    for (i, from) in other.iter().enumerate().take(n) {
-        let at = i + draws.below(all - i);
-        points.swap(i, at);
-        points[i] = *from;
+/// Replaces the points of `cloud` in a ball about one of them, a random number, by as many points of
+/// `other` that are nearest to the same place. Returns the replaced share.
+fn mix_ball(cloud: &mut [[f32; 3]], other: &[[f32; 3]], draws: &mut Draws) -> f32 {
+    let n = (draws.unit() * cloud.len().min(other.len()) as f64) as usize;
+    let centre = cloud[draws.below(cloud.len())];
+    let squared = |p: &[f32; 3]| (0..3).map(|k| (p[k] - centre[k]) * (p[k] - centre[k])).sum();
+    let by_distance = |points: &[[f32; 3]]| {
+        let mut order: Vec<(f32, usize)> = points.iter().map(squared).zip(0..).collect();
+        // Distances come with their place, so that the order is the same everywhere.
+        order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        order
+    };
+    let nearest = by_distance(cloud).into_iter().zip(by_distance(other));
+    for ((_, own), (_, from)) in nearest.take(n) {
+        cloud[own] = other[from];
     }
-    n as f32 / all as f32
+    n as f32 / cloud.len() as f32
+}
+
+/// Scales, turns and shifts the surroundings of four random points of the cloud, each in its own
+/// way. Every point moves by the mean of the four, weighted by its distance to their centres.
+fn warp(points: &mut [[f32; 3]], most: f64, draws: &mut Draws) {
+    /// The standard deviation of the weights: half the radius of a cloud.
+    const REACH: f64 = 0.5;
+    let anchors = [(); 4].map(|()| {
+        let mut three = |most: f64| [(); 3].map(|()| draws.between(-most, most));
+        let (scale, turn, shift) = (three(most), three(most), three(0.5 * most));
+        (points[draws.below(points.len())].map(f64::from), scale, turn, shift)
+    });
+    for point in points {
+        let p = point.map(f64::from);
+        let (mut moved, mut total) = ([0.0; 3], 0.0);
+        for (anchor, scale, turn, shift) in &anchors {
+            let mut q = [0, 1, 2].map(|k| p[k] - anchor[k]);
+            let weight = (-q.iter().map(|x| x * x).sum::<f64>() / (2.0 * REACH * REACH)).exp();
+            q = [0, 1, 2].map(|k| q[k] * (1.0 + scale[k]));
+            for (axis, angle) in turn.iter().enumerate() {
+                let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
+                let (sin, cos) = angle.sin_cos();
+                (q[a], q[b]) = (cos * q[a] - sin * q[b], sin * q[a] + cos * q[b]);
+            }
+            (0..3).for_each(|k| moved[k] += weight * (q[k] + anchor[k] + shift[k]));
+            total += weight;
+        }
+        *point = moved.map(|x| (x / total) as f32);
+    }
 }
 
 /// Drops points at random. The chance is the same for all points of a cloud, and uniform from 0 to
@@ -163,6 +213,9 @@ fn drop_points<T>(points: &mut Vec<T>, most: f64, draws: &mut Draws) {
 }
 
 fn transform(points: &mut [[f32; 3]], augment: &Augment, draws: &mut Draws) {
+    if augment.warp > 0.0 {
+        warp(points, augment.warp, draws);
+    }
     let Augment { scale: [low, high], shift, stretch, rotate_degrees, .. } = *augment;
     let scale = draws.between(low, high);
     let shifts = [(); 3].map(|()| draws.between(-shift, shift));

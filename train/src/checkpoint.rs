@@ -15,6 +15,7 @@ use crate::trainer::Trainer;
 
 const MEAN: &str = ".adam_mean";
 const SQUARE: &str = ".adam_square";
+const AVERAGE: &str = ".average";
 
 /// Writes the state of `trainer`, its data's `digest` and `notes` to `path`, atomically.
 pub fn write(path: &Path, trainer: &mut Trainer, digest: &str, notes: &str) -> Result<(), Error> {
@@ -25,6 +26,8 @@ pub fn write(path: &Path, trainer: &mut Trainer, digest: &str, notes: &str) -> R
             tensors.insert(format!("{}{suffix}", parameter.name), tensor);
         }
     }
+    let averages = trainer.averages.iter();
+    tensors.extend(averages.map(|(name, tensor)| (format!("{name}{AVERAGE}"), tensor.clone())));
     let metadata = [
         ("recipe", trainer.recipe.to_toml()?),
         ("step", trainer.step.to_string()),
@@ -65,6 +68,12 @@ pub fn read(path: &Path, trainer: &mut Trainer, digest: &str) -> Result<String, 
     }
     for (name, values) in trainer.model.statistics() {
         model_file::read_into(&mut file, &name, values)?;
+    }
+    if trainer.recipe.average > 0.0 {
+        for name in model_file::tensors(&mut trainer.model).into_keys() {
+            let average = file.read(&format!("{name}{AVERAGE}"))?;
+            trainer.averages.insert(name, average);
+        }
     }
     trainer.step = number("step")?;
     trainer.epoch = epoch;

@@ -63,11 +63,12 @@ fn check_card(path: &Path, wanted: &ModelCard, found: &ModelCard) -> Result<(), 
     Ok(())
 }
 
-fn facts(card: &ModelCard) -> [(&'static str, String); 5] {
+fn facts(card: &ModelCard) -> [(&'static str, String); 6] {
     [
         ("normalization", card.normalization.to_string()),
         ("points", card.points.unwrap_or_default().to_string()),
         ("edge_radii", format!("{:?}", card.edge_radii)),
+        ("abstractions", format!("{:?}", card.abstractions)),
         ("transform_after", card.transform_after.to_string()),
         ("pooled", if card.pooled_relu { "relu" } else { "linear" }.to_owned()),
     ]
@@ -160,7 +161,7 @@ impl Reader<'_> {
 /// the inputs of a layer depend on the batch norms before it.
 fn unfold(model: &mut Model, recipe: &Recipe, clouds: &Clouds) {
     let drawn = Recipe { batch: CLOUDS, clouds_per_epoch: Some(CLOUDS), ..recipe.clone() };
-    let batch = std::thread::scope(|scope| batches::start(scope, clouds, &drawn, 0).recv());
+    let batch = std::thread::scope(|scope| batches::start(scope, clouds, None, &drawn, 0).recv());
     let batch = batch.expect("invariant: an epoch of one batch");
     let rates = Rates { momentum: 1.0, orthogonality: 0.0, step: 0 };
     for place in 0..model.layers().len() {

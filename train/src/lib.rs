@@ -44,9 +44,11 @@ pub mod recipe;
 pub mod rows;
 pub mod run;
 pub mod selector;
+pub mod set_network;
 pub mod shape;
 mod svg;
 mod t_net;
+pub mod teachers;
 pub mod trainer;
 
 /// Compiles the example of the README.

@@ -8,9 +8,26 @@ use crate::rows::Rows;
 
 /// Hidden layers in sequence.
 #[derive(Clone, Debug)]
-struct Stack(Vec<HiddenLayer>);
+pub struct Stack(Vec<HiddenLayer>);
 
 impl Stack {
+    /// Layers of these `widths`, beginning with the inputs. Their numbers begin with `first`.
+    pub fn new(prefix: &str, widths: &[usize], first: usize, seed: u64) -> Self {
+        let layer = |(pair, i): (&[usize], usize)| {
+            let [linear, norm] = ["conv", "bn"].map(|part| format!("{prefix}{part}{i}"));
+            HiddenLayer::new(&linear, &norm, (pair[0], pair[1]), seed)
+        };
+        Self(widths.windows(2).zip(first..).map(layer).collect())
+    }
+
+    /// The output of the last layer in the last forward pass.
+    ///
+    /// # Panics
+    /// If there is no layer.
+    pub fn output(&self) -> ArrayView2<'_, f32> {
+        self.0[self.0.len() - 1].base.output()
+    }
+
     /// The input of layer `i`; that of the first layer is `x`.
     fn input<'a>(&'a self, i: usize, x: ArrayView2<'a, f32>) -> ArrayView2<'a, f32> {
         if i == 0 { x } else { self.0[i - 1].base.output() }
@@ -18,7 +35,7 @@ impl Stack {
 
     /// Applies all layers to `x` and returns the output of the last. `kept` is the dropout mask of
     /// the last layer.
-    fn forward<'a>(
+    pub fn forward<'a>(
         &'a mut self,
         x: ArrayView2<'a, f32>,
         rows: Rows<'_>,
@@ -35,7 +52,7 @@ impl Stack {
     }
 
     /// Propagates the gradient of the output. Returns the gradient of `x` if `wants_input`.
-    fn backward(
+    pub fn backward(
         &mut self,
         x: ArrayView2<'_, f32>,
         mut dy: Matrix,
@@ -54,7 +71,7 @@ impl Stack {
         Some(dy)
     }
 
-    fn layers(&mut self) -> impl Iterator<Item = LayerMut<'_>> {
+    pub fn layers(&mut self) -> impl Iterator<Item = LayerMut<'_>> {
         self.0.iter_mut().map(|layer| layer.base.layer())
     }
 }
@@ -70,13 +87,10 @@ impl SharedMlp {
     /// Layers of these `widths`, beginning with the inputs. Their numbers begin with `first`.
     pub fn new(prefix: &str, widths: &[usize], first: usize, relu: bool, seed: u64) -> Self {
         let n = widths.len() - 1;
-        let size = |i: usize| (widths[i], widths[i + 1]);
-        let name = |part: &str, i: usize| format!("{prefix}{part}{}", first + i);
-        let hidden = |i| HiddenLayer::new(&name("conv", i), &name("bn", i), size(i), seed);
-        let (linear, norm) = (name("conv", n - 1), name("bn", n - 1));
+        let [linear, norm] = ["conv", "bn"].map(|part| format!("{prefix}{part}{}", first + n - 1));
         Self {
-            hidden: Stack((0..n - 1).map(hidden).collect()),
-            pooled: PooledLayer::new(&linear, &norm, size(n - 1), relu, seed),
+            hidden: Stack::new(prefix, &widths[..n], first, seed),
+            pooled: PooledLayer::new(&linear, &norm, (widths[n - 1], widths[n]), relu, seed),
         }
     }
 

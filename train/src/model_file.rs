@@ -27,7 +27,15 @@ pub fn tensors(network: &mut dyn Module) -> BTreeMap<String, Tensor> {
 
 /// Writes the weights and batch norms of `network` to `path` in f32, atomically.
 pub fn write(path: &Path, network: &mut dyn Module, card: &ModelCard) -> Result<(), Error> {
-    let mut tensors = tensors(network);
+    write_tensors(path, tensors(network), card)
+}
+
+/// Does the same for the `tensors` of a network.
+pub fn write_tensors(
+    path: &Path,
+    mut tensors: BTreeMap<String, Tensor>,
+    card: &ModelCard,
+) -> Result<(), Error> {
     tensors.retain(|name, _| !name.starts_with(TRAINING_ONLY));
     Ok(write_weights(path, &tensors, &card.to_metadata())?)
 }

@@ -15,7 +15,7 @@ use crate::cluster_variation::ClusterVariation;
 use crate::cpl::Cpl;
 use crate::error::Error;
 use crate::limits::{Check, layers, non_negative, positive, share, share_below_1, widths};
-use crate::shape::{Edge, Shape};
+use crate::shape::{Abstraction, Edge, Shape};
 
 /// The settings of a training.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -78,6 +78,13 @@ pub struct Recipe {
     pub orthogonality: f64,
     /// Share of the target that is distributed over all classes.
     pub label_smoothing: f64,
+    /// Decay of the running mean of the weights over the steps, such as 0.999. The model has the mean
+    /// weights. With 0, it has those of the last step.
+    #[serde(skip_serializing_if = "is_default")]
+    pub average: f64,
+    /// Models from which the network learns, beside the labels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub distillation: Option<Distillation>,
     /// The optimiser.
     pub adam: Adam,
     /// The schedule of the learning rate; by default `step`, every 20 epochs by a factor of 0.7.
@@ -112,6 +119,8 @@ impl Default for Recipe {
             dropout: 0.4,
             orthogonality: 0.001,
             label_smoothing: 0.0,
+            average: 0.0,
+            distillation: None,
             adam: Adam::default(),
             schedule: Schedule::default(),
             augment: Augment::default(),
@@ -209,6 +218,27 @@ impl Schedule {
     }
 }
 
+/// Knowledge distillation: the network also learns the answers of trained models, its teachers, to
+/// the clouds of the training set as they are, without augmentation. They are computed once, when
+/// a run begins or goes on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Distillation {
+    /// Model files, or names of bundled models, of the data's classes. The mean of their
+    /// probabilities counts.
+    pub teachers: Vec<PathBuf>,
+    /// The temperature of the probabilities of teachers and network.
+    pub temperature: f64,
+    /// The weight of the teachers in the loss; the labels have the rest.
+    pub weight: f64,
+}
+
+impl Default for Distillation {
+    fn default() -> Self {
+        Self { teachers: Vec::new(), temperature: 4.0, weight: 0.7 }
+    }
+}
+
 /// The augmentation of clouds in training. A value of 0 disables its step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -238,9 +268,14 @@ pub struct Augment {
     pub up: Axis,
     /// Largest difference from 1 of the uniform factor that stretches each axis.
     pub stretch: f64,
-    /// Share of clouds in which a part is replaced by points of another cloud (PointCutMix-R: Zhang
-    /// et al. 2022).
+    /// Share of clouds in which a ball is replaced by points of another cloud, those nearest to the
+    /// ball's centre (after PointCutMix-K: Zhang et al. 2022). The choice of points follows, so that
+    /// neighborhoods are those of the mixed cloud.
     pub cut_mix: f64,
+    /// Largest local scaling, turn (radians) and shift (half as far) about each of four anchors,
+    /// smoothly blended (after PointWOLF: Kim et al. 2021).
+    #[serde(skip_serializing_if = "is_default")]
+    pub warp: f64,
 }
 
 /// A coordinate axis.
@@ -267,6 +302,7 @@ impl Default for Augment {
             up: Axis::Z,
             stretch: 0.0,
             cut_mix: 0.0,
+            warp: 0.0,
         }
     }
 }
@@ -341,12 +377,38 @@ impl Recipe {
                 "network.edges.radius",
                 "expected a finite number above 0",
             ),
-            (
-                network.edges.is_empty() || augment.cut_mix <= 0.0,
-                "augment.cut_mix",
-                "expected 0 with edges, because a mixed cloud has no neighborhood",
-            ),
+            share_below_1("average", self.average),
         ];
+        let (abstractions, edges) = (&network.abstractions, &network.edges);
+        let has_t_nets = network.input_transform || network.feature_transform;
+        let is_sound = |a: &Abstraction| {
+            a.centres > 0 && a.radius.is_normal() && a.radius > 0.0 && !a.widths.is_empty()
+        };
+        checks.extend([
+            (
+                abstractions.iter().all(is_sound)
+                    && abstractions.is_sorted_by(|a, b| a.centres >= b.centres),
+                "network.abstractions",
+                "expected 1 centre or more, no more than before, a radius above 0, 1 layer or more",
+            ),
+            (
+                abstractions.is_empty() || !has_t_nets && edges.is_empty() && self.cpl.is_none(),
+                "network.abstractions",
+                "expected none beside T-Nets, edges or a Critical Points Layer",
+            ),
+        ]);
+        if let Some(Distillation { teachers, temperature, weight }) = &self.distillation {
+            checks.extend([
+                (!teachers.is_empty(), "distillation.teachers", "expected 1 model or more"),
+                positive("distillation.temperature", *temperature),
+                share("distillation.weight", *weight),
+                (
+                    self.negatives <= 0.0,
+                    "distillation",
+                    "expected no `negatives`, of which teachers say nothing",
+                ),
+            ]);
+        }
         if let Some(cpl) = &self.cpl {
             checks.extend([
                 layers("cpl.front", cpl.front.len(), 2),
@@ -412,6 +474,12 @@ impl Recipe {
             non_negative("augment.sensor_noise", augment.sensor_noise),
             share_below_1("augment.stretch", augment.stretch),
             share("augment.cut_mix", augment.cut_mix),
+            share_below_1("augment.warp", augment.warp),
+            (
+                augment.warp <= 0.0 || !is_metric,
+                "augment.warp",
+                "expected 0 with `normalization` metric, because its reach is that of unit spheres",
+            ),
             (
                 (0.0..=180.0).contains(&augment.rotate_degrees),
                 "augment.rotate_degrees",

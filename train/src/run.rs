@@ -15,6 +15,7 @@ use crate::error::Error;
 use crate::evaluate::{confusion, predictions};
 use crate::metrics::{Epoch, Metrics};
 use crate::recipe::{Recipe, Sampling};
+use crate::teachers::Teachers;
 use crate::trainer::{EpochSummary, Trainer};
 use crate::{accuracy_report, batches, checkpoint, init, model_file, negatives};
 
@@ -106,6 +107,9 @@ impl Job<'_> {
         fs::create_dir_all(&folder).map_err(|source| FormatError::io(&folder, source))?;
         atomic::sweep_leftovers(&folder)?;
         let mut run = Run::open(folder, &self, &clouds, report)?;
+        if let Some(distillation) = &recipe.distillation {
+            run.trainer.teachers = Some(Teachers::of(distillation, &clouds)?);
+        }
         while run.trainer.epoch < run.trainer.recipe.epochs {
             run.epoch(&clouds, &held)?;
         }
@@ -233,7 +237,8 @@ impl<'a> Run<'a> {
         let learnt = self.learn(clouds)?;
         let current = self.folder.join("current.safetensors");
         let card = self.card(None);
-        model_file::write(&current, &mut self.trainer.model, &card)?;
+        let tensors = self.trainer.tensors();
+        model_file::write_tensors(&current, tensors.clone(), &card)?;
         let validated = if held.is_empty() {
             None
         } else {
@@ -245,7 +250,7 @@ impl<'a> Run<'a> {
         // Without a validation set, the last epoch is taken.
         if validated.is_none() || self.metrics.is_best(epoch, self.trainer.recipe.balance > 0.0) {
             let best = self.folder.join("best.safetensors");
-            model_file::write(&best, &mut self.trainer.model, &card)?;
+            model_file::write_tensors(&best, tensors, &card)?;
         }
         self.metrics.write(&self.folder)?;
         let notes = self.metrics.to_notes();
@@ -297,6 +302,12 @@ impl<'a> Run<'a> {
             outlier_filter: recipe.outlier_filter,
             sampler: Some(sampler.to_owned()),
             points: Some(points),
+            abstractions: recipe
+                .network
+                .abstractions
+                .iter()
+                .map(|abstraction| (abstraction.centres, abstraction.radius))
+                .collect(),
             edge_radii: recipe.network.edges.iter().map(|edge| edge.radius).collect(),
             training_set: Some(self.training_set.clone()),
             accuracy,

@@ -1,19 +1,24 @@
 //! A network in training, and one epoch of training.
 
+use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
 use formats::streams::Stream;
+use formats::weights::Tensor;
 
 use crate::batches;
 use crate::clouds::Clouds;
 use crate::error::Error;
 use crate::layer::Module;
 use crate::matrix::Matrix;
-use crate::model::Model;
+use crate::model::{Model, Network};
+use crate::model_file;
 use crate::network::{PointNet, Rates};
 use crate::point_encoder::PointEncoder;
 use crate::recipe::Recipe;
 use crate::selector::CriticalPointSelector;
+use crate::set_network::SetNetwork;
+use crate::teachers::Teachers;
 
 /// The share of a batch in running statistics: PyTorch's default.
 const MOMENTUM: f32 = 0.1;
@@ -29,6 +34,11 @@ pub struct Trainer {
     pub step: u64,
     /// The number of finished epochs.
     pub epoch: u32,
+    /// The running means of weights and statistics, by name. Empty before the first step, and if the
+    /// recipe averages nothing.
+    pub averages: BTreeMap<String, Tensor>,
+    /// What teachers say of the clouds.
+    pub teachers: Option<Teachers>,
 }
 
 /// The results of an epoch so far.
@@ -48,6 +58,11 @@ impl Trainer {
     /// A network with random weights for `n_classes` classes.
     pub fn new(recipe: Recipe, n_classes: usize) -> Result<Self, Error> {
         let refuse = |cause| Error::Recipe { key: "cpl.resize", cause };
+        if !recipe.network.abstractions.is_empty() {
+            let network = SetNetwork::new(&recipe.network, n_classes, recipe.seed);
+            let network = Network::Sets(Box::new(network));
+            return Ok(Self::of(recipe, Model { encoder: None, network }));
+        }
         let mut network = PointNet::new(&recipe.network, n_classes, recipe.seed);
         let encoder = match &recipe.cpl {
             Some(cpl) if cpl.shared => {
@@ -58,7 +73,39 @@ impl Trainer {
             Some(cpl) => Some(PointEncoder::new(cpl, n_classes, recipe.seed).map_err(refuse)?),
             None => None,
         };
-        Ok(Self { recipe, model: Model { encoder, network }, step: 0, epoch: 0 })
+        Ok(Self::of(recipe, Model { encoder, network: Network::PointNet(Box::new(network)) }))
+    }
+
+    fn of(recipe: Recipe, model: Model) -> Self {
+        Self { recipe, model, step: 0, epoch: 0, averages: BTreeMap::new(), teachers: None }
+    }
+
+    /// The tensors to save: the running means, or the last step's if the recipe averages nothing.
+    #[must_use]
+    pub fn tensors(&mut self) -> BTreeMap<String, Tensor> {
+        if self.averages.is_empty() {
+            return model_file::tensors(&mut self.model);
+        }
+        self.averages.clone()
+    }
+
+    /// Moves the running means towards the tensors after the current step. The first steps count
+    /// more, so that the random weights of the beginning are soon forgotten.
+    fn average(&mut self) {
+        if self.recipe.average <= 0.0 {
+            return;
+        }
+        let n = self.step as f64;
+        let share = (1.0 - self.recipe.average).max(10.0 / (n + 9.0)) as f32;
+        for (name, tensor) in model_file::tensors(&mut self.model) {
+            let Some(average) = self.averages.get_mut(&name) else {
+                self.averages.insert(name, tensor);
+                continue;
+            };
+            for (average, value) in average.values.iter_mut().zip(&tensor.values) {
+                *average += share * (value - *average);
+            }
+        }
     }
 
     /// Trains on the clouds of one epoch, except those of an incomplete last batch. Calls `report`
@@ -69,11 +116,11 @@ impl Trainer {
         mut report: impl FnMut(&EpochSummary),
     ) -> Result<EpochSummary, Error> {
         let begun = Instant::now();
-        let recipe = self.recipe.clone();
+        let (recipe, teachers) = (self.recipe.clone(), self.teachers.take());
         let steps = batches::count(clouds.len(), &recipe);
         let (mut loss, mut correct, mut summary) = (0.0, 0, EpochSummary::default());
         std::thread::scope(|scope| {
-            let batches = batches::start(scope, clouds, &recipe, self.epoch);
+            let batches = batches::start(scope, clouds, teachers.as_ref(), &recipe, self.epoch);
             for (batch, step) in batches.iter().zip(1..) {
                 let orthogonality = recipe.orthogonality as f32;
                 let rates = Rates { momentum: MOMENTUM, orthogonality, step: self.step };
@@ -86,6 +133,7 @@ impl Trainer {
                 let progress = f64::from(self.epoch) + (step - 1) as f64 / steps as f64;
                 let factor = recipe.schedule.factor(progress, recipe.epochs);
                 recipe.adam.step(&mut self.model, self.step, recipe.adam.rate * factor);
+                self.average();
                 loss += cost.total;
                 correct += cost.correct;
                 let clouds = step * recipe.batch;
@@ -99,6 +147,7 @@ impl Trainer {
             }
             Ok(())
         })?;
+        self.teachers = teachers;
         self.epoch += 1;
         Ok(summary)
     }

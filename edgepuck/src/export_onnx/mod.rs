@@ -110,6 +110,9 @@ fn kept_points(args: &ExportOnnxArgs, path: &Path, card: &ModelCard) -> anyhow::
 /// The ONNX model of `net`, with a Critical Points Layer of `n_points` points before it if given.
 fn export(net: &Net, card: &ModelCard, n_points: Option<usize>) -> anyhow::Result<ModelProto> {
     const BATCH: Size<'_> = Size::Named("batch");
+    if !net.abstractions.is_empty() {
+        bail!("expected a network without set abstractions, which have no graph yet");
+    }
     let mut graph = Graph::default();
     let mut input = |name, n| graph.input(name, &[BATCH, Size::Named(n), Size::Fixed(3)]);
     let inputs = match n_points {

@@ -79,6 +79,13 @@ fn as_json(path: &Path, summary: &Summary, sampler: &SamplerSpec) -> Value {
             "radius": radius,
             "channels": layer.outputs,
         })).collect::<Vec<_>>(),
+        "abstractions": summary.abstractions.iter().zip(&card.abstractions).map(
+            |((centres, convs), (_, radius))| json!({
+                "centres": centres,
+                "radius": radius,
+                "layers": layers(convs),
+            })
+        ).collect::<Vec<_>>(),
         "trunk": layers(&summary.trunk.convs),
         "pooled": if card.pooled_relu { "relu" } else { "linear" },
         "head": layers(&summary.trunk.fcs),
@@ -131,8 +138,15 @@ fn as_text(
         let edges = edges.map(|(radius, layer)| format!("{} within {radius}", layer.outputs));
         row("surroundings", edges.collect::<Vec<_>>().join(", "))?;
     }
-    let pooled = if card.pooled_relu { ", ReLU" } else { "" };
-    row("trunk", format!("{}{pooled}, max", chain(&summary.trunk.convs)))?;
+    if summary.abstractions.is_empty() {
+        let pooled = if card.pooled_relu { ", ReLU" } else { "" };
+        row("trunk", format!("{}{pooled}, max", chain(&summary.trunk.convs)))?;
+    } else {
+        row("trunk", chain(&summary.trunk.convs))?;
+    }
+    for ((centres, layers), (_, radius)) in summary.abstractions.iter().zip(&card.abstractions) {
+        row("abstraction", format!("{centres} centres within {radius}, {}", chain(&layers[1..])))?;
+    }
     row("head", chain(&summary.trunk.fcs))?;
     row(
         "front end",

@@ -19,6 +19,7 @@ impl<T: Format> Work for Engine<T> {
         match task {
             Task::Hidden { pass, run } => self.hidden(thread, pass, run, chunk),
             Task::Pool { pass, run } => self.pool_group(thread, pass, run, chunk),
+            Task::Set { level, run } => self.set_block(thread, level, run, chunk),
             Task::Vector { head, layer } => self.vector_chunk(head, layer, chunk),
         }
     }
@@ -95,7 +96,13 @@ impl<T: Format> Engine<T> {
     }
 
     /// Rounds a layer's outputs to the input format of the layer `next`, and records range events.
-    fn round(&self, wide: &[f32], range: f32, next: Option<&Packed<T>>, out: &mut [T::Activation]) {
+    pub(super) fn round(
+        &self,
+        wide: &[f32],
+        range: f32,
+        next: Option<&Packed<T>>,
+        out: &mut [T::Activation],
+    ) {
         let met = T::narrow(self.kernels, wide, range, &mut out[..wide.len()]);
         if met.clipped > 0 {
             // Relaxed suffices: `Team::run` synchronises before `events` reads the counters.
@@ -240,7 +247,7 @@ fn n_channels<T: Format>(last: &Packed<T>, group: usize) -> usize {
 }
 
 /// The rows of block `block` of `points`; every block has `size` rows, the last one may have fewer.
-fn block_rows(points: &[f32], size: usize, block: usize) -> Rows<'_, f32> {
+pub(super) fn block_rows(points: &[f32], size: usize, block: usize) -> Rows<'_, f32> {
     let n = size.min(points.len() / 4 - block * size);
     Rows::new(&points[block * size * 4..][..n * 4], 4, n)
 }

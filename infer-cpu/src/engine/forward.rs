@@ -80,6 +80,9 @@ impl<T: Format> Forward for Team<Engine<T>> {
         if !engine.edges.is_empty() {
             write(&engine.cloud).reserve(n);
         }
+        if !engine.layers.abstractions.is_empty() {
+            engine.sets.reserve(n, engine.kernels);
+        }
     }
 
     fn run(&self, input: &Input<'_>, scratch: &mut Scratch) {
@@ -150,7 +153,11 @@ impl<T: Format> Engine<T> {
             engine.note_overflow(&scratch.values);
             engine.set_feature_transform(scratch, n_points);
         }
-        Self::pool(team, Pass::Trunk, false, scratch);
+        if engine.layers.abstractions.is_empty() {
+            Self::pool(team, Pass::Trunk, false, scratch);
+        } else {
+            Self::abstract_sets(team, scratch);
+        }
         Self::vectors(team, Head::Class, &mut scratch.values);
     }
 

@@ -20,6 +20,11 @@ impl Interleave {
         Self { n, step }
     }
 
+    /// The order of the points themselves.
+    pub fn none(n: usize) -> Self {
+        Self { n: n as u64, step: 1 }
+    }
+
     pub fn point(self, row: usize) -> usize {
         (row as u64 * self.step % self.n.max(1)) as usize
     }

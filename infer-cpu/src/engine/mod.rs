@@ -13,7 +13,7 @@
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 
-use crate::edge_conv::{EdgeConv, EdgeScratch, Neighborhood};
+use crate::edge_conv::{EdgeConv, EdgeScratch, LANES, Lanes, Neighborhood};
 use crate::kernel::{GEMV_NR, Kernels, Panels};
 use crate::layers::{Conv, Layers, Packed, Vector};
 use crate::precision::Format;
@@ -24,10 +24,12 @@ mod chunks;
 mod forward;
 mod interleave;
 mod route;
+mod sets;
 
 pub use forward::{Forward, Input, Scratch, folding_pays};
 use interleave::Interleave;
 use route::stacks;
+use sets::Sets;
 
 /// The most points of a block: whole tiles of every kernel, and few enough that their features stay
 /// in a first-level cache.
@@ -79,6 +81,8 @@ enum Task {
     Hidden { pass: Pass, run: Run },
     /// Compute the last layer of these blocks and pool it.
     Pool { pass: Pass, run: Run },
+    /// Compute the features of blocks of points, or of the centres of an abstraction.
+    Set { level: usize, run: Run },
     /// Compute one vector layer.
     Vector { head: Head, layer: usize },
 }
@@ -109,6 +113,7 @@ pub struct Engine<T: Format> {
     edges: EdgeConv,
     /// All points in which `edges` searches for neighbours.
     cloud: RwLock<Neighborhood>,
+    sets: Sets,
     blocks: Vec<RwLock<Block<T>>>,
     groups: Vec<Mutex<Group<T::Sum>>>,
     threads: Vec<Mutex<ThreadScratch<T>>>,
@@ -141,6 +146,8 @@ struct ThreadScratch<T: Format> {
     /// Points with their EdgeConv features.
     edged: Vec<f32>,
     edge_scratch: EdgeScratch,
+    /// The maxima of a block's centres over their neighbours.
+    set_maxima: Vec<Lanes>,
     wide: Vec<f32>,
     narrow: [Vec<T::Activation>; 2],
     prefilter_scratch: PrefilterScratch,
@@ -195,9 +202,11 @@ impl<T: Format> Engine<T> {
         // Without EdgeConv layers, rows are the points themselves.
         let edged = if edges.is_empty() { 0 } else { BLOCK * trunk_first.panels.padded_inputs() };
         let edge_scratch = edges.scratch(BLOCK);
+        let sets = Sets::new(&layers);
         let thread = || ThreadScratch {
             edged: vec![0.0; edged],
             edge_scratch: edge_scratch.clone(),
+            set_maxima: vec![[0.0; LANES]; BLOCK * sets.most_lanes()],
             wide: vec![0.0; BLOCK * hidden],
             narrow: [(); 2].map(|()| vec![T::Activation::default(); BLOCK * hidden]),
             prefilter_scratch: PrefilterScratch::new(if prefilters { BLOCK } else { 0 }),
@@ -224,10 +233,11 @@ impl<T: Format> Engine<T> {
             points: RwLock::new(Vec::new()),
             edges,
             cloud: RwLock::default(),
+            threads: (0..n_threads.max(1)).map(|_| Mutex::new(thread())).collect(),
+            sets,
             blocks: (0..RUN_BLOCKS).map(|_| block()).collect(),
             // Enough for the widest pass; the others use the first ones.
             groups: (0..pooled.div_ceil(GROUP)).map(|_| Mutex::new(group())).collect(),
-            threads: (0..n_threads.max(1)).map(|_| Mutex::new(thread())).collect(),
             vector: RwLock::new(Vec::with_capacity(vector)),
             vector_out: (0..vector.div_ceil(VECTOR_CHUNK * VECTOR_BLOCK))
                 .map(|_| chunk())
@@ -244,12 +254,17 @@ impl<T: Format> Engine<T> {
         let Input { points, cloud, .. } = *input;
         let mut rows = write(&self.points);
         rows.clear();
-        let interleave = Interleave::new(points.len());
+        let is_set = !self.layers.abstractions.is_empty();
+        let interleave =
+            if is_set { Interleave::none(points.len()) } else { Interleave::new(points.len()) };
         // The order does not change a maximum, only how early the prefilter finds it.
         let in_order = (0..points.len()).map(|row| points[interleave.point(row)]);
         rows.extend(in_order.flat_map(|[x, y, z]| [x, y, z, 0.0]));
         if !self.edges.is_empty() {
             write(&self.cloud).set(cloud);
+        }
+        if is_set {
+            self.sets.take(points, self.kernels);
         }
         self.clipped.store(0, Ordering::Relaxed);
         self.overflow.store(false, Ordering::Relaxed);
@@ -264,8 +279,10 @@ impl<T: Format> Engine<T> {
 
     /// The largest activation of each layer that was observed, by its name.
     pub fn observed(&self) -> Vec<(String, f32)> {
+        let pools = self.layers.abstractions.iter().map(|abstraction| &abstraction.pool);
         let mut seen: Vec<_> = stacks(&self.layers)
             .flatten()
+            .chain(pools)
             .map(|conv| match conv {
                 Conv::First(first) => (first.dense.name.clone(), first.seen.get()),
                 _ => (conv.packed().name.clone(), conv.packed().seen.get()),
@@ -310,7 +327,11 @@ impl Widths {
         let nets = [&layers.stn, &layers.fstn].into_iter().flatten();
         let fcs = nets.flat_map(|net| &net.fcs).chain(&layers.head);
         let columns = fcs.map(|layer| &layer.columns);
-        let hidden = stacks(layers).flat_map(|convs| &convs[..convs.len() - 1]).map(Conv::width);
+        // The outputs of set abstractions are all stored.
+        let pools = layers.abstractions.iter().map(|abstraction| &abstraction.pool);
+        let n_pooled = usize::from(layers.abstractions.is_empty());
+        let stored = stacks(layers).flat_map(|convs| &convs[..convs.len() - n_pooled]);
+        let hidden = stored.chain(pools).map(Conv::width);
         let pooled = pooled_layers(layers).map(Packed::width);
         Self {
             hidden: hidden.max().unwrap_or(0),
@@ -321,7 +342,8 @@ impl Widths {
 }
 
 fn pooled_layers<T: Format>(layers: &Layers<T>) -> impl Iterator<Item = &Packed<T>> {
-    stacks(layers).filter_map(<[_]>::last).map(Conv::packed)
+    let pools = layers.abstractions.is_empty();
+    stacks(layers).filter(move |_| pools).filter_map(<[_]>::last).map(Conv::packed)
 }
 
 /// Only a panic of another thread poisons a lock. It is a defect, which the caller must see.

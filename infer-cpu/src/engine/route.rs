@@ -19,7 +19,8 @@ fn front<T: Format>(layers: &Layers<T>) -> &[Conv<T>] {
 /// The point-wise layers of each part that the network has.
 pub(super) fn stacks<T: Format>(layers: &Layers<T>) -> impl Iterator<Item = &[Conv<T>]> {
     let stacks = [convs(&layers.stn), convs(&layers.fstn), &layers.trunk, front(layers)];
-    stacks.into_iter().filter(|convs| !convs.is_empty())
+    let abstractions = layers.abstractions.iter().map(|abstraction| &abstraction.convs[..]);
+    stacks.into_iter().chain(abstractions).filter(|convs| !convs.is_empty())
 }
 
 impl<T: Format> Engine<T> {

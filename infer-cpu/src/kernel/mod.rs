@@ -17,7 +17,10 @@ use std::ops::Range;
 
 use half::f16;
 
-use crate::edge_conv::{EdgeConv, EdgeScratch, Neighborhood};
+#[doc(hidden)]
+pub use crate::edge_conv::Neighborhood;
+use crate::edge_conv::{EdgeConv, EdgeScratch};
+use crate::set_abstraction::{NeighborPool, PoolStep};
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
@@ -229,6 +232,9 @@ pub(crate) type Dots =
 pub(crate) type EdgeFeatures =
     fn(&EdgeConv, rows: (&mut [f32], usize), &Neighborhood, &mut EdgeScratch);
 
+/// [`NeighborPool::run`].
+pub(crate) type PoolNeighbors = fn(&NeighborPool, PoolStep<'_>);
+
 /// The coordinates of a cloud as one array per axis, for sampling.
 #[derive(Clone, Copy)]
 pub(crate) struct Soa<'a> {
@@ -268,6 +274,8 @@ pub struct Kernels {
     pub(crate) fps_step: fn(Soa<'_>, pick: [f32; 3], distance: &mut [f32]) -> usize,
     /// [`EdgeConv::features`].
     pub(crate) edge_features: EdgeFeatures,
+    /// [`NeighborPool::run`].
+    pub(crate) pool_neighbors: PoolNeighbors,
 }
 
 formats::named! {

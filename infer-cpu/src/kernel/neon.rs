@@ -20,6 +20,7 @@ use std::arch::aarch64::*;
 
 use super::{KernelName, Kernels, declare_kernels};
 use crate::edge_conv::EdgeConv;
+use crate::set_abstraction::NeighborPool;
 
 mod fps;
 mod gemv;
@@ -49,6 +50,7 @@ pub(super) const NEON: Kernels = Kernels {
     narrow_i8: narrow::to_i8,
     fps_step: fps::step,
     edge_features: EdgeConv::features::<true>,
+    pool_neighbors: NeighborPool::run::<true>,
 };
 
 tile_8x8! {

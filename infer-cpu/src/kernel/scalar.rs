@@ -10,6 +10,7 @@ use super::{
     declare_kernels,
 };
 use crate::edge_conv::EdgeConv;
+use crate::set_abstraction::NeighborPool;
 
 /// Products of fp16 are summed in fp16 over this many inputs.
 pub(super) const F16_CHUNK: usize = 32;
@@ -35,6 +36,7 @@ declare_kernels!(Scalar, runs_here: true, {
     narrow_i8,
     fps_step,
     edge_features: EdgeConv::features::<false>,
+    pool_neighbors: NeighborPool::run::<false>,
 });
 
 /// An activation of one number format.

@@ -14,9 +14,10 @@ use half::f16;
 use super::scalar::{F16_BLOCK, F16_CHUNK};
 use super::{Candidate, Gemm, Gemv, I8_LARGEST, Kernels, Panels, Rows, Soa, Sum, WIDTH_STEP};
 use crate::dense::Dense;
-use crate::edge_conv::{EdgeConv, Neighborhood};
+use crate::edge_conv::{EdgeConv, LANES, Neighborhood, TILE};
 pub use crate::precision::{F16, F32, I8};
 use crate::precision::{Format, Weight};
+use crate::set_abstraction::{NeighborPool, PoolStep};
 
 /// Numbers of rows: none, and around every tile height in use (4, 6, 8, 12).
 const ROWS: [usize; 12] = [0, 1, 3, 5, 6, 7, 8, 9, 10, 12, 13, 29];
@@ -538,6 +539,51 @@ pub fn edge_features_are_near_the_reference(kernels: &Kernels) {
     assert!(features(kernels).iter().zip(&expected).all(near));
 }
 
+pub fn neighbor_pooling_is_near_the_definition(kernels: &Kernels) {
+    let mut draw = Draw::new("neighbor pooling");
+    let (n, channels, stride, radius) = (150, 40, 64, 0.5f32);
+    let mut signed = |n: usize| (0..n).map(|_| draw.signed()).collect::<Vec<f32>>();
+    let (name, weight, bias) = (String::new(), signed(4 * channels), signed(channels));
+    let dense = Dense { name, inputs: 4, outputs: channels, weight, bias, relu: true };
+    let features = signed(n * stride);
+    let points: Vec<[f32; 3]> = signed(3 * n).as_chunks().0.to_vec();
+    let (cloud, pool) = (Neighborhood::of(&points), NeighborPool::new(radius, &dense));
+    let centres = &points[60..67];
+    let mut maxima = vec![[f32::NEG_INFINITY; LANES]; centres.len() * pool.n_lanes()];
+    for (tile, first) in cloud.tiles().zip((0..).step_by(TILE)) {
+        let mut products = vec![[[0.0; LANES]; TILE]; pool.n_lanes()];
+        let features = (&features[first * stride..], stride);
+        let (points, products) = (0..TILE.min(n - first), &mut products[..]);
+        (kernels.pool_neighbors)(&pool, PoolStep::Lift { features, tile, points, products });
+        let maxima = &mut maxima[..];
+        (kernels.pool_neighbors)(&pool, PoolStep::Raise { tile, products, centres, maxima });
+    }
+    let (mut out, maxima) = (vec![f32::NAN; centres.len() * stride], &maxima[..]);
+    let finish = PoolStep::Finish { centres, maxima, out: (&mut out, stride) };
+    (kernels.pool_neighbors)(&pool, finish);
+    for (p, out) in centres.iter().zip(out.chunks_exact(stride)) {
+        let near = |q: &&[f32; 3]| {
+            (0..3).map(|k| (q[k] - p[k]) * (q[k] - p[k])).sum::<f32>() <= radius * radius
+        };
+        for c in 0..channels {
+            let at = |k: usize| f64::from(dense.at(k, c));
+            let feature = |(q, u): (&[f32; 3], &[f32])| {
+                let offset = |k: usize| f64::from(q[k] - p[k]) / f64::from(radius);
+                let along = (0..3).map(|k| at(k + 1) * offset(k)).sum::<f64>();
+                at(0) * f64::from(u[c]) + along + f64::from(dense.bias[c])
+            };
+            let rows = points.iter().zip(features.chunks_exact(stride));
+            let expected = rows.filter(|(q, _)| near(q)).map(feature).fold(0.0, f64::max);
+            // In units u = EPSILON / 2: weights over the radius are at most 2 and off by 2u,
+            // products of three at most 6 and off by 30u, with the feature's at most 7 and off by
+            // 38u; the difference is at most 13, the sum with the bias 14, each rounded once.
+            let bound = (38.0 + 30.0 + 13.0 + 14.0) * f64::from(f32::EPSILON) / 2.0;
+            assert!((f64::from(out[c]) - expected).abs() <= bound, "{}, {expected}", out[c]);
+        }
+        assert!(out[channels..].iter().all(|padding| *padding == 0.0));
+    }
+}
+
 pub fn panics_with<T>(words: &str, work: impl FnOnce() -> T) {
     // A panic ends the process: WebAssembly.
     if cfg!(panic = "abort") {
@@ -618,6 +664,7 @@ macro_rules! suite {
             must::narrowing_is_the_reference(kernels);
             must::fps_is_the_reference(kernels);
             must::edge_features_are_near_the_reference(kernels);
+            must::neighbor_pooling_is_near_the_definition(kernels);
         }
 
         #[test]

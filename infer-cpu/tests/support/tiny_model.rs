@@ -31,6 +31,18 @@ pub fn tensors(n_classes: usize) -> BTreeMap<String, Tensor> {
     tensors
 }
 
+/// The card and the tensors of a model of two set abstractions.
+#[allow(dead_code, reason = "some tests need only the other model")]
+pub fn sets(n_classes: usize) -> (ModelCard, BTreeMap<String, Tensor>) {
+    let mut tensors = BTreeMap::new();
+    add_layers(&mut tensors, "feat.conv", &[3, 8, 16]);
+    add_layers(&mut tensors, "sa1.conv", &[4, 16, 24]);
+    add_layers(&mut tensors, "sa2.conv", &[4, 24, 70, 90]);
+    add_layers(&mut tensors, "fc", &[180, HIDDEN[0], n_classes]);
+    let abstractions = vec![(100, 0.4), (33, 0.9)];
+    (ModelCard { abstractions, ..ModelCard::default() }, tensors)
+}
+
 pub fn scale(tensors: &mut BTreeMap<String, Tensor>, name: &str, factor: f32) {
     tensors.get_mut(name).unwrap().values.iter_mut().for_each(|value| *value *= factor);
 }

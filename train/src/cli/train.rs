@@ -23,7 +23,7 @@ pub struct TrainArgs {
     #[arg(long, value_name = "PATH")]
     test: Option<PathBuf>,
     /// Recipe, which the flags below override: a TOML file, or the name of a built-in one: edge-64,
-    /// street-128 or lidar-64 [default: the settings of the baseline]
+    /// set-64, street-128 or lidar-64 [default: the settings of the baseline]
     #[arg(long, value_name = "NAME|TOML")]
     recipe: Option<PathBuf>,
     /// Model file, or bundled model, from whose weights training starts. Its layers must be those of the recipe. The

@@ -2,6 +2,7 @@
 //! and the maximum over the neighbors, as infer-cpu's `edge_conv.rs` defines it. It is a pooled
 //! layer whose clouds are the neighborhoods.
 
+use infer_cpu::kernel::Neighborhood;
 use ndarray::ArrayView2;
 use ndarray::parallel::prelude::*;
 
@@ -68,8 +69,8 @@ impl Edges {
         let clouds: Vec<usize> = (0..batch.len()).collect();
         let offsets_of = |&cloud: &usize| {
             let centres = &batch.coordinates[batch.starts[cloud]..batch.starts[cloud + 1]];
-            let others = batch.neighborhood_of(cloud);
-            centres.iter().map(|p| neighbors(p, others, radius)).collect::<Vec<_>>()
+            let others = Neighborhood::of(batch.neighborhood_of(cloud));
+            centres.iter().map(|&p| neighbors(p, &others, radius)).collect::<Vec<_>>()
         };
         let offsets: Vec<Vec<[f32; 3]>> = clouds.par_iter().map(offsets_of).flatten().collect();
         let mut edges = Self { starts: vec![0], ..Self::default() };
@@ -91,14 +92,7 @@ impl Edges {
 
 /// The offsets from `p` to its neighbors within `radius`, divided by `radius`. The first neighbor
 /// is `p` itself; its copies in `others` are left out.
-fn neighbors(p: &[f32; 3], others: &[[f32; 3]], radius: f32) -> Vec<[f32; 3]> {
-    let mut offsets = vec![[0.0; 3]];
-    for q in others {
-        let offset = [q[0] - p[0], q[1] - p[1], q[2] - p[2]];
-        let squared = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2];
-        if squared <= radius * radius && squared > 0.0 {
-            offsets.push(offset.map(|x| x / radius));
-        }
-    }
-    offsets
+fn neighbors(p: [f32; 3], others: &Neighborhood, radius: f32) -> Vec<[f32; 3]> {
+    let near = others.within(p, radius).map(|(_, q)| [0, 1, 2].map(|k| (q[k] - p[k]) / radius));
+    std::iter::once([0.0; 3]).chain(near.filter(|offset| *offset != [0.0; 3])).collect()
 }

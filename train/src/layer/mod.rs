@@ -12,6 +12,7 @@
 mod edge;
 mod hidden;
 mod linear;
+mod neighbor_pool;
 mod norm;
 mod normed;
 mod pooled;
@@ -20,6 +21,7 @@ mod transform;
 pub use edge::EdgeLayer;
 pub use hidden::HiddenLayer;
 pub use linear::Linear;
+pub use neighbor_pool::{Centres, NeighborPool};
 pub use norm::{EPSILON, Norm};
 pub use normed::Normed;
 pub use pooled::PooledLayer;

@@ -141,11 +141,7 @@ impl Norm {
         saved: &Saved,
         Rows { weights, total, .. }: Rows<'_>,
     ) -> Matrix {
-        relu_gradient(&mut dy, y);
-        let ones = vec![1.0; dy.nrows()];
-        let sum = column_sums(&dy, &ones, |dy, _| dy, 1.0);
-        let product = &dy * &saved.normalised;
-        let with_normalised = column_sums(&product, &ones, |p, _| p, 1.0);
+        let [sum, with_normalised] = gradient_sums(&mut dy, y, &saved.normalised);
         let Saved { normalised, inverse } = saved;
         let scale = &self.scale.value;
         dy.axis_chunks_iter_mut(Axis(0), ROWS)
@@ -205,6 +201,40 @@ pub fn column_sums(
             sums
         })
         .collect();
-    let sum = |c: usize| chunk_sums.iter().map(|sums| f64::from(sums[c])).sum::<f64>();
-    (0..channels).map(|c| (sum(c) / f64::from(total)) as f32).collect()
+    (0..channels).map(|c| (total_of(&chunk_sums, c) / f64::from(total)) as f32).collect()
+}
+
+fn total_of(chunk_sums: &[Vec<f32>], channel: usize) -> f64 {
+    chunk_sums.iter().map(|sums| f64::from(sums[channel])).sum()
+}
+
+/// Applies the gradient of the ReLU to `dy`, and sums `dy` and its products with `normalised` over
+/// all rows, in one pass.
+fn gradient_sums(dy: &mut Matrix, y: &Matrix, normalised: &Matrix) -> [Vec<f32>; 2] {
+    let channels = dy.ncols();
+    let chunk_sums: Vec<Vec<f32>> = dy
+        .axis_chunks_iter_mut(Axis(0), ROWS)
+        .into_par_iter()
+        .zip(y.axis_chunks_iter(Axis(0), ROWS))
+        .zip(normalised.axis_chunks_iter(Axis(0), ROWS))
+        .map(|((mut dy, y), normalised)| {
+            let mut sums = vec![0.0f32; 2 * channels];
+            let (sum, product) = sums.split_at_mut(channels);
+            for ((mut dy, y), normalised) in
+                dy.rows_mut().into_iter().zip(y.rows()).zip(normalised.rows())
+            {
+                let dy = slice(&mut dy);
+                let y = y.to_slice().expect("invariant: rows are contiguous");
+                let normalised = normalised.to_slice().expect("invariant: rows are contiguous");
+                for c in 0..channels {
+                    dy[c] = if y[c] <= 0.0 { 0.0 } else { dy[c] };
+                    sum[c] += dy[c];
+                    product[c] += dy[c] * normalised[c];
+                }
+            }
+            sums
+        })
+        .collect();
+    [0, channels]
+        .map(|first| (first..first + channels).map(|c| total_of(&chunk_sums, c) as f32).collect())
 }

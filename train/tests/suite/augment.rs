@@ -65,21 +65,6 @@ fn a_turn_about_the_up_axis_keeps_heights_and_radii() {
 }
 
 #[test]
-fn a_mixed_cloud_has_a_mixed_target() {
-    let clouds = crate::clouds(6);
-    let augment = Augment { cut_mix: 1.0, ..plain().augment };
-    let recipe = Recipe { augment, ..plain() };
-    for epoch in 0..20 {
-        let drawn = augment::augment(&clouds, 0, (epoch, 0), &recipe);
-        let own = drawn.points.iter().filter(|p| clouds.set.cloud(0).contains(p)).count();
-        let share = drawn.target[0];
-        assert!((drawn.target.iter().sum::<f32>() - 1.0).abs() < 1e-6);
-        // Of class 0 are its own points, and perhaps those mixed in.
-        assert!(share >= own as f32 / 16.0 - 1e-6, "{share}, {own}");
-    }
-}
-
-#[test]
 fn a_sensor_s_noise_is_along_its_rays() {
     let clouds = crate::clouds(3);
     let noisy = Augment { sensor_noise: 0.01, ..plain().augment };
@@ -124,4 +109,50 @@ fn a_chosen_point_is_in_its_neighborhood() {
             assert!(drawn.neighborhood.len() >= 16 && drawn.points.len() <= 16);
         }
     }
+}
+
+#[test]
+fn a_ball_of_points_is_mixed_in() {
+    let clouds = crate::clouds(6);
+    let augment = Augment { cut_mix: 1.0, ..plain().augment };
+    let mut recipe = Recipe { points: 32, augment, ..plain() };
+    recipe.network.edges = vec![Edge { radius: 0.3, channels: 4 }];
+    for epoch in 0..20 {
+        let drawn = augment::augment(&clouds, 0, (epoch, 0), &recipe);
+        assert_eq!(drawn.points, drawn.neighborhood, "the surroundings are the mixed cloud's");
+        let whole = clouds.set.cloud(0);
+        let (kept, gone): (Vec<_>, Vec<_>) = whole.iter().partition(|p| drawn.points.contains(p));
+        let [own, (other, share)] = drawn.parts;
+        assert_eq!(own, (0, 1.0 - share));
+        assert!((drawn.target.iter().sum::<f32>() - 1.0).abs() < 1e-6);
+        if other % 3 != 0 {
+            assert_eq!(drawn.target[other % 3], share);
+            assert_eq!(gone.len() as f32 / 32.0, share);
+            assert_eq!(drawn.points.iter().filter(|p| !whole.contains(p)).count(), gone.len());
+        }
+        // Some point is the centre of a ball that holds exactly what is gone.
+        let is_centre = |c: &[f32; 3]| {
+            let far = |p: &[f32; 3]| (0..3).map(|k| (p[k] - c[k]).powi(2)).sum::<f32>();
+            let nearest = kept.iter().map(&far).fold(f32::MAX, f32::min);
+            gone.iter().all(|p| far(p) <= nearest)
+        };
+        assert!(whole.iter().any(is_centre), "{epoch}");
+    }
+}
+
+#[test]
+fn a_warped_cloud_stays_near() {
+    let clouds = crate::clouds(3);
+    let most = 0.1;
+    let recipe = Recipe { augment: Augment { warp: most, ..plain().augment }, ..plain() };
+    let drawn = augment::augment(&clouds, 0, (0, 0), &recipe);
+    let pairs = drawn.points.iter().zip(clouds.set.cloud(0));
+    let moves =
+        pairs.map(|(p, q)| f64::from((0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f32>().sqrt()));
+    let moves: Vec<f64> = moves.collect();
+    // A mean of moves of what is at most a cube's diagonal from an anchor: scaled, then turned about
+    // three axes, then shifted.
+    let diagonal = 12f64.sqrt();
+    let bound = most * diagonal + 3.0 * most * (1.0 + most) * diagonal + 0.5 * most * 3f64.sqrt();
+    assert!(moves.iter().all(|&by| by > 1e-4 && by < bound), "{moves:?}");
 }

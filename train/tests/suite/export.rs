@@ -3,11 +3,13 @@ use std::path::Path;
 use formats::model_card::ModelCard;
 use infer_cpu::sampler::{Resize, SamplerKind, SamplerSpec};
 use infer_cpu::{Classifier, Evaluation, Options};
+use train::augment;
 use train::clouds::Clouds;
 use train::cpl::Cpl;
 use train::model_file;
-use train::recipe::Recipe;
-use train::shape::Edge;
+use train::recipe::{Augment, Distillation, Recipe};
+use train::shape::{Abstraction, Edge};
+use train::teachers::Teachers;
 use train::trainer::Trainer;
 
 use crate::reference::{self, Reference};
@@ -24,10 +26,17 @@ fn recipe(input_transform: bool, feature_transform: bool) -> Recipe {
 fn logits_are_those_of_infer_cpu() {
     let clouds = crate::clouds(100);
     let edges = vec![Edge { radius: 0.25, channels: 12 }, Edge { radius: 0.6, channels: 7 }];
-    for (t_nets, edges) in [(true, vec![]), (false, vec![]), (false, edges.clone()), (true, edges)]
-    {
+    let abstraction = |centres, radius, widths| Abstraction { centres, radius, widths };
+    let sets = vec![abstraction(12, 0.4, vec![24, 70]), abstraction(5, 0.9, vec![48])];
+    for (t_nets, edges, sets) in [
+        (true, vec![], vec![]),
+        (false, vec![], vec![]),
+        (false, edges.clone(), vec![]),
+        (true, edges, vec![]),
+        (false, vec![], sets),
+    ] {
         let mut recipe = recipe(t_nets, t_nets);
-        recipe.network.edges = edges;
+        (recipe.network.edges, recipe.network.abstractions) = (edges, sets);
         let mut trainer = Trainer::new(recipe.clone(), clouds.classes.len()).unwrap();
         for _ in 0..recipe.epochs {
             trainer.learn(&clouds, |_| {}).unwrap();
@@ -35,8 +44,9 @@ fn logits_are_those_of_infer_cpu() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("model.safetensors");
         let edge_radii = recipe.network.edges.iter().map(|edge| edge.radius).collect();
-        let classes = clouds.classes.clone();
-        let card = ModelCard { classes, edge_radii, ..ModelCard::default() };
+        let sets = recipe.network.abstractions.iter().map(|set| (set.centres, set.radius));
+        let (classes, abstractions) = (clouds.classes.clone(), sets.collect());
+        let card = ModelCard { classes, edge_radii, abstractions, ..ModelCard::default() };
         model_file::write(&path, &mut trainer.model, &card).unwrap();
 
         let options =
@@ -218,4 +228,36 @@ fn neighbors_are_searched_among_all_points_whatever_the_sampler_kept() {
             }
         }
     }
+}
+
+/// A network learns what its teacher says, in place of labels.
+#[test]
+fn a_teacher_s_answers_are_its_softened_probabilities() {
+    let (clouds, folder) = (crate::clouds(60), tempfile::tempdir().unwrap());
+    let mut trainer = Trainer::new(recipe(false, false), 3).unwrap();
+    trainer.learn(&clouds, |_| {}).unwrap();
+    let path = folder.path().join("teacher.safetensors");
+    let card = ModelCard { classes: clouds.classes.clone(), ..ModelCard::default() };
+    model_file::write(&path, &mut trainer.model, &card).unwrap();
+    let teachers = vec![path.clone(), path.clone()];
+    let distillation = Distillation { teachers, ..Distillation::default() };
+    let teachers = Teachers::of(&distillation, &clouds).unwrap();
+    let augment = Augment { cut_mix: 1.0, ..Augment::default() };
+    let drawn =
+        augment::augment(&clouds, 7, (0, 0), &Recipe { points: 32, augment, ..Recipe::default() });
+    let mut classifier = Classifier::load(&path, &Options::default()).unwrap();
+    let mut expected = [0.0; 3];
+    for (part, share) in drawn.parts {
+        let logits = &classifier.classify(clouds.set.cloud(part)).unwrap().logits;
+        let odds: Vec<f32> = logits.iter().map(|x| (x / 4.0).exp()).collect();
+        (0..3).for_each(|c| expected[c] += share * odds[c] / odds.iter().sum::<f32>());
+    }
+    let taught = teachers.taught(&[drawn]);
+    for (found, expected) in taught.shares.iter().zip(expected) {
+        assert!((found - expected).abs() < 1e-6, "{found}, {expected}");
+    }
+    let mut other = clouds.clone();
+    other.classes.pop();
+    let error = Teachers::of(&distillation, &other).unwrap_err().to_string();
+    assert!(error.contains("expected a teacher of 2 classes, found 3"), "{error}");
 }

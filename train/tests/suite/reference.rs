@@ -137,8 +137,70 @@ impl Reference<'_> {
         counts.iter().map(largest).collect()
     }
 
+    /// The maxima and means of the features of the last abstraction's centres.
+    fn abstracted(&self, shape: &Shape) -> Table {
+        let mut h: Table = self.clouds.iter().flatten().cloned().collect();
+        for i in 1..=shape.trunk.len() {
+            let z = self.linear(&format!("feat.conv{i}"), &h);
+            h = self.norm(&format!("feat.bn{i}"), z, true);
+        }
+        let mut rows = h.into_iter();
+        // Duplicates count in statistics alone.
+        let distinct = |cloud: &Table| {
+            let mut some: Vec<(Vec<f64>, Vec<f64>)> = Vec::new();
+            for (p, u) in cloud.iter().zip(rows.by_ref()) {
+                if some.iter().all(|(q, _)| q != p) {
+                    some.push((p.clone(), u));
+                }
+            }
+            in_farthest_order(some)
+        };
+        let mut levels: Vec<_> = self.clouds.iter().map(distinct).collect();
+        for (abstraction, number) in shape.abstractions.iter().zip(1..) {
+            let part = |part: &str| &self.values[&format!("sa{number}.{part}")].1;
+            let (weight, bias, scale) =
+                (part("conv1.weight"), part("conv1.bias"), part("bn1.weight"));
+            let radius = f64::from(abstraction.radius);
+            let mut z = Table::new();
+            for cloud in &levels {
+                for (p, _) in cloud.iter().take(abstraction.centres) {
+                    let near = || cloud.iter().filter(|(q, _)| distance(p, q) <= radius);
+                    let pooled = |c: usize| {
+                        let (w, sign) = (&weight[4 * c..][..4], scale[c].signum());
+                        let along = |q: &[f64], k: usize| w[1 + k] * (q[k] - p[k]) / radius;
+                        let products = near().map(|(q, u)| {
+                            sign * (w[0] * u[c] + (0..3).map(|k| along(q, k)).sum::<f64>())
+                        });
+                        sign * products.fold(f64::MIN, f64::max) + bias[c]
+                    };
+                    z.push((0..scale.len()).map(pooled).collect());
+                }
+            }
+            let mut h = self.norm(&format!("sa{number}.bn1"), z, true);
+            for i in 2..2 + abstraction.widths.len() {
+                let z = self.linear(&format!("sa{number}.conv{i}"), &h);
+                h = self.norm(&format!("sa{number}.bn{i}"), z, true);
+            }
+            let mut rows = h.into_iter();
+            for cloud in &mut levels {
+                cloud.truncate(abstraction.centres);
+                cloud.iter_mut().for_each(|(_, u)| *u = rows.next().unwrap());
+            }
+        }
+        let pooled = |cloud: &Vec<(Vec<f64>, Vec<f64>)>| {
+            let column = |c: usize| cloud.iter().map(move |(_, u)| u[c]);
+            let channels = 0..cloud[0].1.len();
+            let largest = channels.clone().map(|c| column(c).fold(f64::MIN, f64::max));
+            largest.chain(channels.map(|c| column(c).sum::<f64>() / cloud.len() as f64)).collect()
+        };
+        levels.iter().map(pooled).collect()
+    }
+
     /// Logits, and the regulariser.
     pub fn logits(&self, shape: &Shape) -> (Table, f64) {
+        if !shape.abstractions.is_empty() {
+            return (self.head(self.abstracted(shape), shape), 0.0);
+        }
         let mut x: Table = self.clouds.iter().flatten().cloned().collect();
         let mut regulariser = 0.0;
         if shape.input_transform {
@@ -154,7 +216,11 @@ impl Reference<'_> {
         if shape.feature_transform {
             (x, regulariser) = self.turned("feat.fstn.", &x, shape);
         }
-        let mut h = self.points("feat.", x, (2, shape.trunk.len() - 1), false);
+        let h = self.points("feat.", x, (2, shape.trunk.len() - 1), false);
+        (self.head(h, shape), regulariser)
+    }
+
+    fn head(&self, mut h: Table, shape: &Shape) -> Table {
         for i in 1..=shape.head.len() {
             let mut z = self.linear(&format!("fc{i}"), &h);
             if let (true, Some(kept)) = (i == shape.head.len(), &self.kept) {
@@ -164,7 +230,7 @@ impl Reference<'_> {
             }
             h = self.norm(&format!("bn{i}"), z, true);
         }
-        (self.linear(&format!("fc{}", shape.head.len() + 1), &h), regulariser)
+        self.linear(&format!("fc{}", shape.head.len() + 1), &h)
     }
 
     /// The loss, of which `orthogonality` is the regulariser's weight.
@@ -184,4 +250,25 @@ pub fn values(network: &mut dyn Module) -> Values {
     let wide = |values: &[f32]| values.iter().map(|&x| f64::from(x)).collect();
     let tensors = train::model_file::tensors(network).into_iter();
     tensors.map(|(name, tensor)| (name, (tensor.shape, wide(&tensor.values)))).collect()
+}
+
+fn distance(p: &[f64], q: &[f64]) -> f64 {
+    p.iter().zip(q).map(|(p, q)| (p - q).powi(2)).sum::<f64>().sqrt()
+}
+
+/// `points` with their features, each the farthest from those before, and the first from the mean.
+fn in_farthest_order(mut points: Vec<(Vec<f64>, Vec<f64>)>) -> Vec<(Vec<f64>, Vec<f64>)> {
+    let n = points.len() as f64;
+    let mean = [0, 1, 2].map(|k| points.iter().map(|(p, _)| p[k]).sum::<f64>() / n);
+    let mut order: Vec<(Vec<f64>, Vec<f64>)> = Vec::new();
+    while !points.is_empty() {
+        let nearest = |p: &Vec<f64>| match order.is_empty() {
+            true => distance(p, &mean),
+            false => order.iter().map(|(q, _)| distance(p, q)).fold(f64::MAX, f64::min),
+        };
+        let far = |&i: &usize, &j: &usize| nearest(&points[i].0).total_cmp(&nearest(&points[j].0));
+        let next = (0..points.len()).max_by(far).unwrap();
+        order.push(points.swap_remove(next));
+    }
+    order
 }

@@ -26,6 +26,7 @@ macro_rules! declare {
 
         use $crate::edge_conv::{EdgeConv, EdgeScratch, Neighborhood};
         use $crate::kernel::loops::{self, Byte, Half, Single, Tile, Weight};
+        use $crate::set_abstraction::{NeighborPool, PoolStep};
         use $crate::kernel::{
             Candidate, GEMV_NR, Gemm, LevelSums, Panels, PrefilterKernels, Rows, Soa,
         };
@@ -43,6 +44,7 @@ macro_rules! declare {
             narrow_i8,
             fps_step,
             edge_features,
+            pool_neighbors,
         });
 
         const fn gemm<T: Tile<$lanes>>()
@@ -120,6 +122,9 @@ macro_rules! declare {
                 cloud: &Neighborhood,
                 scratch: &mut EdgeScratch,
             ) = EdgeConv::features::<$fused>;
+
+            fn pool_neighbors(pool: &NeighborPool, step: PoolStep<'_>) =
+                NeighborPool::run::<$fused>;
         }
     };
 }
@@ -137,7 +142,7 @@ macro_rules! enable {
     )*) => {$(
         fn $name $(<$t: $bound>)? ($($argument: $type),*) $(-> $out)? {
             #[target_feature(enable = $features)]
-            #[allow(unused_unsafe, reason = "the loop of `edge_features` is safe")]
+            #[allow(unused_unsafe, reason = "the loops of features are safe")]
             unsafe fn run $(<$t: $bound>)? ($($argument: $type),*) $(-> $out)? {
                 // SAFETY: `run` enables the features; the loops check their operands.
                 unsafe { $call($($argument),*) }

@@ -2,7 +2,7 @@
 //! with random weights.
 
 use crate::measure::reference::{STACKS, drawn};
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use formats::model_card::{ModelCard, Normalization};
 use formats::rng::StreamKey;
 use formats::weights::{Tensor, write_weights};
@@ -40,6 +40,7 @@ pub struct Network {
 impl Network {
     pub fn read(path: &Path) -> Result<Self> {
         let model = inspect(path)?;
+        ensure!(model.abstractions.is_empty(), "set abstractions are not modelled yet");
         let front = NetShape { convs: model.front.unwrap_or_default(), fcs: Vec::new() };
         Ok(Self {
             stn: model.stn.map(net).unwrap_or_default(),

@@ -54,7 +54,7 @@ const PAGES: [Page; 4] = [
         "train-recipe-reference.md",
         "# Keys of recipes of trainings\n\nA recipe of `train` is a TOML file: [Train](train.md) has an \
          example, and the folder of a run has its recipe with all keys. The built-in recipes are \
-         `edge-64`, `lidar-64` and `street-128`. Training expects clouds of every class in the training \
+         `edge-64`, `set-64`, `lidar-64` and `street-128`. Training expects clouds of every class in the training \
          part, those of `unknown` included, which few sweeps lack: the bundled `street-128` learnt from \
          2,000. Lengths of clouds in the unit sphere are in radii, those of clusters in metres.",
         TRAIN,
