@@ -135,10 +135,7 @@ impl Caster {
     /// # Errors
     /// As [`Caster::for_effects`].
     #[doc(hidden)]
-    pub async fn for_effects_async(
-        &self,
-        effects: &Effects,
-    ) -> Result<Arc<OpenCaster>, CastError> {
+    pub async fn for_effects_async(&self, effects: &Effects) -> Result<Arc<OpenCaster>, CastError> {
         if let Some(caster) = self.opened(effects) {
             return Ok(caster);
         }
