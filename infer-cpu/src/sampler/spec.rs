@@ -180,8 +180,8 @@ mod tests {
             assert_eq!(SamplerSpec { points: 1, ..spec }.check(), Ok(()));
         }
         let spec =
-            SamplerSpec { kind: SamplerKind::Cpl, points: 1 << 40, ..SamplerSpec::default() };
-        assert_eq!(spec.check(), Err(SamplerError::TooManyCritical(1 << 40)));
+            SamplerSpec { kind: SamplerKind::Cpl, points: usize::MAX, ..SamplerSpec::default() };
+        assert_eq!(spec.check(), Err(SamplerError::TooManyCritical(usize::MAX)));
         for size in [0.0, -0.5, f64::NAN, f64::INFINITY] {
             let kind = SamplerKind::Voxel;
             let spec = SamplerSpec { kind, voxel_size: Some(size), ..SamplerSpec::default() };
