@@ -14,6 +14,8 @@ struct Table {
     palette: Vec<String>,
     /// Of classes by their names.
     classes: HashMap<String, String>,
+    /// The names of SemanticKITTI's labels (semantic-kitti.yaml of semantic-kitti-api).
+    semantic_kitti: HashMap<u16, String>,
 }
 
 static TABLE: LazyLock<Table> = LazyLock::new(|| {
@@ -46,6 +48,11 @@ pub fn of_class(name: &str) -> RGBColor {
         Some(colour) => rgb(colour),
         None => of_number(name.bytes().fold(0x811c_9dc5, hash)),
     }
+}
+
+/// The class of a label of SemanticKITTI.
+pub fn semantic_kitti(label: u16) -> &'static str {
+    TABLE.semantic_kitti.get(&label).map_or("other", String::as_str)
 }
 
 fn rgb(colour: &str) -> RGBColor {

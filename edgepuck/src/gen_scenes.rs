@@ -23,7 +23,7 @@ use sweep_file::SweepFormat;
 
 use crate::caster::CasterArgs;
 use crate::shard::Shard;
-use crate::view::frame::{Labels, Points};
+use crate::view::frame::Labels;
 use crate::{Outcome, Usage, preview};
 use formats::outputs::Overwrite;
 
@@ -161,8 +161,8 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
 /// Draws the sweep of a scene, each point in the colour of its class.
 fn draw(stage: &Stage, done: &LabelledScene, out: &Path) -> anyhow::Result<()> {
     let (names, values) = sweep_file::point_classes(stage, done);
-    let labels = vec![Labels { name: "class", values, names: Some(names) }];
-    preview::draw(&Points { scan: done.sweep.scan.clone(), labels }, None, "scene 0", out)
+    let labels = Labels { name: "class", values, names: Some(names) };
+    preview::draw(&done.sweep.scan, Some(&labels), None, "scene 0", out)
 }
 
 /// Prints the clusters of each class, and what a whole set, of which a part need not have all, lacks.

@@ -42,7 +42,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let noisy = args.noisy.clone().or_else(|| noisy_twin(&args.scan));
     let noisy = noisy.map(|file| args.points.read(&file)).transpose()?;
     let title = args.scan.file_stem().unwrap_or_default().to_string_lossy();
-    preview::draw(&clean, noisy.as_ref(), &title, &args.out)?;
+    preview::draw(&clean.scan, clean.labels.first(), noisy.as_ref(), &title, &args.out)?;
     formats::say!("{} points: {}", clean.scan.len(), args.out.display());
     Ok(Outcome::Success)
 }

@@ -18,7 +18,7 @@ fn bytes(block: &Value) -> Vec<u8> {
     STANDARD.decode(base64.as_str().unwrap()).unwrap()
 }
 
-fn frame<'a>(data: &'a Value, pane: usize) -> &'a Value {
+fn frame(data: &Value, pane: usize) -> &Value {
     &data["panes"][pane]["frames"][0]
 }
 
@@ -42,7 +42,13 @@ fn a_page_holds_the_points_their_columns_and_the_boxes() {
     assert_eq!(names, ["class", "range", "beam", "ring", "time", "object", "intensity"]);
     // The class of each point is that of its object in the description beside the sweep.
     let described: Value = serde_json::from_str(&folder.text("street/sweeps/000000.json")).unwrap();
-    let classes: Vec<_> = bytes(&columns[0]["values"]).as_chunks().0.iter().copied().map(u32::from_le_bytes).collect();
+    let classes: Vec<_> = bytes(&columns[0]["values"])
+        .as_chunks()
+        .0
+        .iter()
+        .copied()
+        .map(u32::from_le_bytes)
+        .collect();
     for (object, class) in scan.object.as_ref().unwrap().iter().zip(classes) {
         let name = &columns[0]["names"][class as usize];
         match object.checked_sub(1) {
@@ -52,7 +58,8 @@ fn a_page_holds_the_points_their_columns_and_the_boxes() {
     }
     let found: Value = serde_json::from_str(&folder.text("objects.json")).unwrap();
     let boxes = frame["boxes"].as_array().unwrap();
-    let (truth, detected): (Vec<_>, Vec<_>) = boxes.iter().partition(|placed| placed["truth"] == true);
+    let (truth, detected): (Vec<_>, Vec<_>) =
+        boxes.iter().partition(|placed| placed["truth"] == true);
     assert_eq!(detected.len(), found["objects"].as_array().unwrap().len());
     // A car that was found stands where one was drawn, within the size of a person.
     let first = detected.iter().find(|placed| placed["class"] == "car").unwrap();
@@ -91,22 +98,34 @@ fn folders_captures_meshes_and_scenes_are_shown() {
     let two = data(&folder, "two.html");
     assert_eq!(frame(&two, 0)["points"], Value::Null);
     assert_eq!(frame(&two, 1)["meshes"][0]["class"], "</script>");
-    assert!(bytes(&frame(&two, 1)["sensors"][0]["rays"]).len() > 100 * 24);
+    // A ray has two ends of three numbers of four bytes, and each ray ends at a point.
+    let [rays, points] = ["/sensors/0/rays", "/points/position"]
+        .map(|at| bytes(frame(&two, 1).pointer(at).unwrap()));
+    assert!(!rays.is_empty() && rays.len() == 2 * points.len());
     folder.refuses(
         2,
         &[
             ("view drive.pcap --out page.png", "--out: expected a name with .html, found page.png"),
             ("view drive.pcap --out two.html", "two.html: it exists already"),
-            ("view drive drive drive --out a.html", "expected at most two files side by side, found 3"),
-            ("view drive.pcap drive.truth.jsonl --out a.html", "expected boxes in the sensor's frame"),
+            (
+                "view drive drive drive --out a.html",
+                "expected at most two files side by side, found 3",
+            ),
+            (
+                "view drive.pcap drive.truth.jsonl --out a.html",
+                "expected boxes in the sensor's frame",
+            ),
         ],
     );
     folder.write("empty/notes.md", "nothing");
     folder.write("bad.json", "{}");
     folder.refuses(2, &[("view empty --out a.html", "found no file of points in it")]);
-    folder.refuses(1, &[
-        ("view nowhere.npz --out a.html", "nowhere.npz"),
-        ("view bad.json --out a.html", "bad.json: objects: expected boxes as of detect"),
-    ]);
+    folder.refuses(
+        1,
+        &[
+            ("view nowhere.npz --out a.html", "nowhere.npz"),
+            ("view bad.json --out a.html", "bad.json: objects: expected boxes as of detect"),
+        ],
+    );
     assert!(!folder.at("a.html").exists());
 }

@@ -1,5 +1,5 @@
 // The words of the viewer as HTML: what colours mean, and what is known of a point or a box.
-import { classColour, colourOf, css, nameOf, rampCss } from "./colour.js";
+import { classColour, css, nameOf, rampCss } from "./colour.js";
 
 const MOST_ENTRIES = 14;
 const MARKS = { "&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;" };
@@ -24,15 +24,16 @@ export function scaleHtml(column) {
     return `${title}${ramp}<div class="marks"><span>${marks.join("</span><span>")}</span></div>`;
   }
   const entries = scale.entries.slice(0, MOST_ENTRIES).map(({ value, count }) => {
-    return entry(colourOf(column, scale, value), nameOf(column, value), count.toLocaleString("en"));
+    return entry(scale.look(value), nameOf(column, value), count.toLocaleString("en"));
   });
   const more = scale.entries.length - entries.length;
   return title + entries.join("") + (more > 0 ? `<small>and ${more} more</small>` : "");
 }
 
-/** The legend of boxes. */
-export function boxesHtml(boxes) {
-  const classes = [...new Set(boxes.map((box) => box.class).filter(Boolean))].sort();
+/** The legend of boxes, without the classes that that of points has. */
+export function boxesHtml(boxes, columns) {
+  const told = (name) => columns.some(({ kind, names }) => kind === "class" && names?.includes(name));
+  const classes = [...new Set(boxes.map((box) => box.class))].filter((name) => name && !told(name)).sort();
   const [found, truth] = [boxes.some((box) => !box.truth), boxes.some((box) => box.truth)];
   const kinds = [found && "lines: found", truth && "dashes: truth"].filter(Boolean).join(", ");
   const entries = classes.map((name) => entry(classColour(name), name)).join("");

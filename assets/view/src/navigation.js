@@ -24,7 +24,9 @@ export class Navigation {
     this.radius = radius;
     this.camera.near = radius / 500;
     this.camera.far = radius * 200;
-    this.camera.position.copy(target).addScaledVector(new Vector3(-0.82, -0.55, 0.62), 1.75 * radius);
+    this.camera.position
+      .copy(target)
+      .addScaledVector(new Vector3(-0.82, -0.55, 0.62), (1.75 * radius) / Math.min(1, this.camera.aspect));
     this.orbit.target.copy(target);
     this.camera.updateProjectionMatrix();
     this.orbit.update();

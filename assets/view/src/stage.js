@@ -3,7 +3,7 @@ import * as THREE from "three";
 import { LineMaterial } from "three/addons/lines/LineMaterial.js";
 import { LineSegments2 } from "three/addons/lines/LineSegments2.js";
 import { LineSegmentsGeometry } from "three/addons/lines/LineSegmentsGeometry.js";
-import { classColour, numberColour, paint, scaleOf } from "./colour.js";
+import { classColour, numberColour, scaleOf } from "./colour.js";
 
 const VERTEX = `
   attribute vec3 tint; uniform float size; uniform float focus; varying vec3 vTint;
@@ -115,6 +115,7 @@ export function extentOf(frame) {
   };
   add(frame.points?.position ?? []);
   for (const mesh of frame.meshes ?? []) add(mesh.position);
+  for (const { pose } of frame.meshes?.length ? (frame.sensors ?? []) : []) add([pose[3], pose[7], pose[11]]);
   for (const box of axes[0].length ? [] : (frame.boxes ?? [])) add(corners(box).flat());
   if (!axes[0].length) return { middle: [0, 0, 0], radius: 5, floor: 0 };
   for (const axis of axes) axis.sort((a, b) => a - b);
@@ -193,7 +194,10 @@ export class Stage {
     const column = this.columns.find((one) => one.name === name) ?? this.columns[0];
     if (!column) return undefined;
     column.scale ??= scaleOf(column);
-    paint(column, column.scale, this.tints.array);
+    const { array } = this.tints;
+    column.values.forEach((value, i) => {
+      [array[3 * i], array[3 * i + 1], array[3 * i + 2]] = column.scale.look(value);
+    });
     this.tints.needsUpdate = true;
     return column;
   }

@@ -118,8 +118,8 @@ class Viewer {
     this.frame = Math.min(this.frame, this.nFrames - 1);
     this.#stageFrames();
     this.#drawBar();
-    if (fit) this.fit();
     this.#resize();
+    if (fit) this.fit();
   }
 
   #stageFrames() {
@@ -135,7 +135,9 @@ class Viewer {
     this.unpick();
     this.#hide();
     this.#drawTime();
-    const usual = USUAL_COLOURS.find((name) => this.names.includes(name));
+    // Beside meshes, points in the colours of their objects could not be seen.
+    const first = this.panes.some(({ stage }) => stage.parts.meshes && stage.parts.points) ? 3 : 0;
+    const usual = USUAL_COLOURS.slice(first).find((name) => this.names.includes(name));
     this.colourBy(this.names.includes(this.colour) ? this.colour : usual);
   }
 
@@ -143,8 +145,12 @@ class Viewer {
   colourBy(name) {
     this.colour = name;
     for (const pane of this.panes) pane.column = pane.stage.colourBy(name);
-    const scales = this.panes.filter(({ column }) => column).map(({ column }) => scaleHtml(column));
-    const boxes = boxesHtml(this.panes.flatMap(({ frame }) => frame.boxes ?? []));
+    const columns = this.panes.map(({ column }) => column).filter(Boolean);
+    const scales = columns.map(scaleHtml);
+    const boxes = boxesHtml(
+      this.panes.flatMap(({ frame }) => frame.boxes ?? []),
+      columns,
+    );
     const grid = `<small>grid ${shown(this.panes[0]?.stage.gridStep ?? 1)} m</small>`;
     this.legend.innerHTML = [...new Set(scales), boxes, grid].join("");
     this.invalidate();
@@ -183,9 +189,12 @@ class Viewer {
     const points = `<label>colour <select name="colour">${this.names.map(option).join("")}</select></label>
       <label>size <input type="range" name="size" min="1" max="10" step="0.5" value="${this.pixels}"></label>`;
     const title = "F: turntable (drag, wheel) or flight (drag to look; keys W A S D Q E)";
-    this.bar.innerHTML = `${this.names.length ? points : ""}${PARTS.filter(has).map(toggle).join("")}
+    const html = `${this.names.length ? points : ""}${PARTS.filter(has).map(toggle).join("")}
       <button name="fly" title="${title}">${this.navigation.flies ? "fly" : "turntable"}</button>
       <button name="reset" title="R: look at all">reset</button>`;
+    // A list of colours that is open stays open while data change.
+    if (html !== this.shownBar) this.bar.innerHTML = html;
+    this.shownBar = html;
   }
 
   #drawTime() {
@@ -202,6 +211,8 @@ class Viewer {
     this.renderer.setPixelRatio(Math.min(2, window.devicePixelRatio));
     this.renderer.setSize(width, height, false);
     this.size = [width, height];
+    this.camera.aspect = width / Math.max(1, this.panes.length) / height;
+    this.camera.updateProjectionMatrix();
     this.invalidate();
   }
 
@@ -221,8 +232,6 @@ class Viewer {
     if (!this.size || !this.panes.length) return;
     const { renderer, camera } = this;
     const [width, height] = [this.size[0] / this.panes.length, this.size[1]];
-    camera.aspect = width / height;
-    camera.updateProjectionMatrix();
     camera.updateMatrixWorld();
     const [all, one, ratio] = [this.material.uniforms, this.marker.material.uniforms, renderer.getPixelRatio()];
     all.size.value = this.pixels * ratio;

@@ -35,7 +35,7 @@ pub fn draw(out: &Path, manifest: &Manifest) -> anyhow::Result<Option<PathBuf>> 
     };
     let title = format!("{name} as {sensor} sees it, {views}");
     let picture = layout::example(out);
-    preview::draw(&clean, noisy.as_ref(), &title, &picture)?;
+    preview::draw(&clean, None, noisy.as_ref(), &title, &picture)?;
     Ok(Some(picture))
 }
 

@@ -72,7 +72,8 @@ pub fn classes(stage: &Stage) -> Vec<&str> {
 pub fn point_classes(stage: &Stage, done: &LabelledScene) -> (Vec<String>, Vec<u32>) {
     let surfaces = surfaces(stage, &done.scene);
     let air = surfaces.len() - 1;
-    let of_points = done.sweep.surfaces().iter().map(|&i| surfaces[air.min(i as usize)].class.into());
+    let of_points =
+        done.sweep.surfaces().iter().map(|&i| surfaces[air.min(i as usize)].class.into());
     (classes(stage).into_iter().map(str::to_owned).collect(), of_points.collect())
 }
 

@@ -36,7 +36,8 @@ impl Frame {
         let sensor_m = scan.sensor_position_m();
         let centre = [0, 1, 2].map(|axis| sensor_m[axis] - scan.origin[axis]);
         let finite = scan.positions.iter().filter(|point| point.iter().all(|x| x.is_finite()));
-        let away = finite.flat_map(|at| [0, 1].map(|axis| (f64::from(at[axis]) - centre[axis]).abs()));
+        let away =
+            finite.flat_map(|at| [0, 1].map(|axis| (f64::from(at[axis]) - centre[axis]).abs()));
         let farthest = away.fold(1.0, f64::max);
         Self { centre, half: farthest.min(FARTHEST_M) }
     }

@@ -13,12 +13,12 @@ use anyhow::Result;
 use formats::Scan;
 use plotters::style::RGBColor;
 
-use crate::view::frame::Points;
+use crate::view::frame::Labels;
 use canvas::{draw_png, text};
 use colours::Colours;
 use frame::{Frame, View};
-pub use from_above::draw_from_above;
 use from_above::EDGE;
+pub use from_above::draw_from_above;
 
 const TITLE_HEIGHT: u32 = 52;
 const ROW_HEADING_HEIGHT: u32 = 30;
@@ -27,14 +27,19 @@ const BAR_WIDTH: u32 = 160;
 /// Draws `clean`, and `noisy` below it, to the PNG file `out`, atomically.
 ///
 /// All panels share one scale, in metres: the frame is the bounding box of the
-/// clean points, with a margin. Points are coloured by the first of their labels,
+/// clean points, with a margin. Points are coloured by `labels`,
 /// as the legend says; or by range where both scans know it, and by height otherwise,
 /// as the colour bar says. Points outside the
 /// frame are counted in their row's heading; those that are not finite count
 /// with them. Axes start at the scans' origin where that is not 0.
-pub fn draw(clean: &Points, noisy: Option<&Scan>, title: &str, out: &Path) -> Result<()> {
-    let Points { scan: clean, labels } = clean;
-    let labels = labels.first().filter(|_| noisy.is_none());
+pub fn draw(
+    clean: &Scan,
+    labels: Option<&Labels>,
+    noisy: Option<&Scan>,
+    title: &str,
+    out: &Path,
+) -> Result<()> {
+    let labels = labels.filter(|_| noisy.is_none());
     let rows: Vec<_> =
         [(if noisy.is_some() { "clean" } else { "" }, Some(clean)), ("noisy", noisy)]
             .into_iter()
@@ -44,7 +49,8 @@ pub fn draw(clean: &Points, noisy: Option<&Scan>, title: &str, out: &Path) -> Re
         scan.check_lengths()?;
     }
     let scans: Vec<_> = rows.iter().map(|&(_, scan)| scan).collect();
-    let (views, frame, panel_width, panel_height) = match noisy.is_none() && Frame::is_sweep(clean) {
+    let (views, frame, panel_width, panel_height) = match noisy.is_none() && Frame::is_sweep(clean)
+    {
         true => (&View::ALL[1..2], Frame::near_sensor(clean), EDGE, EDGE),
         false => (&View::ALL[..], Frame::around(&scans), panel::WIDTH, panel::HEIGHT),
     };
@@ -100,10 +106,6 @@ mod tests {
     use super::*;
     use std::fs;
 
-    fn points(scan: &Scan) -> Points {
-        Points { scan: scan.clone(), labels: Vec::new() }
-    }
-
     fn sphere(n: usize, range: bool) -> Scan {
         let golden = std::f32::consts::PI * (3.0 - 5f32.sqrt());
         let positions: Vec<_> = (0..n)
@@ -135,9 +137,9 @@ mod tests {
         };
         for n in [0, 1, 2, 500] {
             for scan in [sphere(n, true), sphere(n, false), far.clone(), wild.clone()] {
-                draw(&points(&scan), Some(&sphere(n, true)), "a sphere", &out).unwrap();
+                draw(&scan, None, Some(&sphere(n, true)), "a sphere", &out).unwrap();
                 let two_rows = size(&fs::read(&out).unwrap());
-                draw(&points(&scan), None, "", &out).unwrap();
+                draw(&scan, None, None, "", &out).unwrap();
                 let one_row = size(&fs::read(&out).unwrap());
                 assert_eq!(one_row[0], two_rows[0]);
                 assert_eq!(two_rows[1] - one_row[1], panel::HEIGHT + ROW_HEADING_HEIGHT);
@@ -150,7 +152,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let [first, second] = ["first.png", "second.png"].map(|name| {
             let out = folder.path().join(name);
-            draw(&points(&sphere(2000, true)), None, "a sphere", &out).unwrap();
+            draw(&sphere(2000, true), None, None, "a sphere", &out).unwrap();
             fs::read(out).unwrap()
         });
         assert_eq!(first, second);
@@ -174,7 +176,7 @@ mod tests {
         let picture = |corners: Option<[f64; 2]>| {
             let [low, high] = corners.unwrap_or_default();
             let corners = [[low, 0.0], [high, 0.0], [high, 0.5], [low, 0.5]];
-            let tint = plotters::style::RGBColor(9, 9, 9);
+            let tint = RGBColor(9, 9, 9);
             let outline = panel::Outline { corners, class: "car", score: 0.5, tint };
             let outlines = if high > low { vec![outline] } else { vec![] };
             draw_from_above(&scan, &[tint; 99], &outlines, "", &out).unwrap();

@@ -27,8 +27,8 @@ struct Object {
     confidence: Option<f64>,
     probability: Option<f64>,
     frame: Option<String>,
-    whole_box: Option<Box>,
-    r#box: Option<Box>,
+    whole_box: Option<Cuboid>,
+    r#box: Option<Cuboid>,
     /// Beside the size and the direction: the middle, or of `gen-scenes` that of the base.
     #[serde(alias = "centre_m")]
     position_m: Option<[f64; 3]>,
@@ -37,7 +37,7 @@ struct Object {
 }
 
 #[derive(Clone, Copy, Deserialize)]
-struct Box {
+struct Cuboid {
     centre_m: [f64; 3],
     size_m: [f64; 3],
     yaw_deg: f64,
@@ -65,7 +65,7 @@ pub fn read(file: &Path) -> Result<Vec<Placed>, FormatError> {
     let is_seen = |object: &Object| sensor_pose.is_none() || object.points != Some(0);
     let objects = objects.into_iter().filter(is_seen).filter_map(|object| object.placed(false));
     Ok(match sensor_pose {
-        Some(pose) => objects.map(|placed| seen_from(pose, placed).as_truth()).collect(),
+        Some(pose) => objects.map(|placed| seen_from(pose, placed)).collect(),
         None => objects.collect(),
     })
 }
@@ -74,9 +74,9 @@ impl Object {
     fn placed(self, in_world: bool) -> Option<Placed> {
         let own = || {
             let (centre_m, size_m) = (self.position_m?, self.size_m?);
-            Some(Box { centre_m, size_m, yaw_deg: self.yaw_deg? })
+            Some(Cuboid { centre_m, size_m, yaw_deg: self.yaw_deg? })
         };
-        let Box { centre_m, size_m, yaw_deg } = self.whole_box.or(self.r#box).or_else(own)?;
+        let Cuboid { centre_m, size_m, yaw_deg } = self.whole_box.or(self.r#box).or_else(own)?;
         Some(Placed {
             class: self.class,
             centre: centre_m,
@@ -91,11 +91,11 @@ impl Object {
     }
 }
 
-/// A box with this base in the street's frame, from the sensor.
+/// The truth of a box with this base in the street's frame, from the sensor.
 fn seen_from(pose: Pose, placed: Placed) -> Placed {
     let back = pose.rotation.inverse();
     let middle = DVec3::from(placed.centre) + 0.5 * placed.size[2] * DVec3::Z;
     let ahead = back * (DQuat::from_rotation_z(placed.yaw) * DVec3::X);
     let centre = (back * (middle - pose.position_m)).to_array();
-    Placed { centre, yaw: ahead.y.atan2(ahead.x), ..placed }
+    Placed { centre, yaw: ahead.y.atan2(ahead.x), truth: true, ..placed }
 }

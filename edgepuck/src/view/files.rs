@@ -4,11 +4,10 @@ use super::boxes;
 use super::frame::{Frame, Labels, Placed, Points};
 use super::scene;
 use crate::points::{PointsArgs, warn_of_packets};
-use crate::Usage;
-use anyhow::{Context, ensure};
+use crate::{Usage, colours};
+use anyhow::ensure;
 use formats::cloud_file::{CloudFormat, must_be_scan};
 use formats::labelled::read_labelled;
-use formats::labelled_sweep::read_labelled_sweep;
 use formats::turns::read_turns;
 use formats::{FormatError, Scan, Senders, ouster};
 use sim_gpu::internals::import::Format;
@@ -27,43 +26,6 @@ pub enum Content {
 
 /// The most clouds of a packed set and turns of a capture that are shown.
 const MOST_FRAMES: usize = 500;
-
-/// SemanticKITTI's labels (semantic-kitti.yaml of semantic-kitti-api), and their names here.
-const SEMANTIC_KITTI: [(u16, &str); 33] = [
-    (1, "air"),
-    (10, "car"),
-    (11, "bicycle"),
-    (13, "bus"),
-    (15, "motorcycle"),
-    (16, "on-rails"),
-    (18, "truck"),
-    (20, "other-vehicle"),
-    (30, "person"),
-    (31, "cyclist"),
-    (32, "motorcyclist"),
-    (40, "road"),
-    (44, "parking"),
-    (48, "sidewalk"),
-    (49, "ground"),
-    (50, "building"),
-    (51, "fence"),
-    (52, "other-structure"),
-    (60, "lane-marking"),
-    (70, "vegetation"),
-    (71, "trunk"),
-    (72, "terrain"),
-    (80, "pole"),
-    (81, "traffic-sign"),
-    (99, "other"),
-    (252, "car"),
-    (253, "cyclist"),
-    (254, "person"),
-    (255, "motorcyclist"),
-    (256, "on-rails"),
-    (257, "bus"),
-    (258, "truck"),
-    (259, "other-vehicle"),
-];
 
 /// Reads a file or a folder of any kind.
 pub fn read(file: &Path, points: &PointsArgs) -> anyhow::Result<Content> {
@@ -107,18 +69,21 @@ fn cloud(file: &Path, points: &PointsArgs) -> anyhow::Result<Frame> {
 
 /// The class of each point by the number of its object.
 fn classes(objects: &[u32], truth: &[Placed]) -> Labels {
-    let mut names = vec!["other".to_owned(), "ground".to_owned()];
-    let mut numbers = HashMap::from([(0, 1)]);
-    for placed in truth {
-        let class = placed.class.clone().unwrap_or_default();
-        let known = names.iter().position(|name| *name == class).unwrap_or(names.len());
-        if known == names.len() {
-            names.push(class);
-        }
-        numbers.extend(placed.track.map(|object| (object, known as u32)));
-    }
-    let class = |object: &u32| numbers.get(&u64::from(*object)).copied().unwrap_or(0);
-    let values = objects.iter().map(class).collect();
+    let named = truth.iter().filter_map(|placed| Some((placed.track?, placed.class.as_deref()?)));
+    let named: HashMap<u64, &str> = named.chain([(0, "ground")]).collect();
+    class_labels(objects.iter().map(|object| *named.get(&u64::from(*object)).unwrap_or(&"other")))
+}
+
+/// The class of each point by its name.
+fn class_labels<'a>(of_points: impl Iterator<Item = &'a str>) -> Labels {
+    let (mut names, mut numbers) = (Vec::new(), HashMap::new());
+    let number = |name: &'a str| {
+        *numbers.entry(name).or_insert_with(|| {
+            names.push(name.to_owned());
+            names.len() as u32 - 1
+        })
+    };
+    let values = of_points.map(number).collect();
     Labels { name: "class", values, names: Some(names) }
 }
 
@@ -130,14 +95,15 @@ fn has_faces(file: &Path) -> bool {
     let header = text.split("end_header").next().unwrap_or_default();
     let mut elements = header.lines().map(|line| line.split_whitespace().collect::<Vec<_>>());
     read.is_ok()
-        && elements.any(|words| {
-            matches!(words[..], ["element", "face" | "tristrips", count] if count != "0")
-        })
+        && elements.any(
+            |words| matches!(words[..], ["element", "face" | "tristrips", count] if count != "0"),
+        )
 }
 
 /// The labels of SemanticKITTI of `velodyne/N.bin`, which are in `labels/N.label`.
 fn semantic_labels(file: &Path, n_points: usize) -> anyhow::Result<Vec<Labels>> {
-    let sequence = file.parent().filter(|folder| folder.ends_with("velodyne")).and_then(Path::parent);
+    let sequence =
+        file.parent().filter(|folder| folder.ends_with("velodyne")).and_then(Path::parent);
     let stem = file.file_stem().unwrap_or_default();
     let Some(found) = sequence
         .map(|sequence| sequence.join("labels").join(stem).with_extension("label"))
@@ -154,59 +120,30 @@ fn semantic_labels(file: &Path, n_points: usize) -> anyhow::Result<Vec<Labels>> 
         bytes.len()
     );
     let words: Vec<u32> = words.iter().map(|word| u32::from_le_bytes(*word)).collect();
-    let mut names = vec!["other".to_owned()];
-    names.extend(SEMANTIC_KITTI.map(|(_, name)| name.to_owned()));
-    let class = |word: &u32| {
-        let known = SEMANTIC_KITTI.iter().position(|(label, _)| u32::from(*label) == word & 0xffff);
-        // Those that move have the names of those that stand.
-        let first = |at: usize| names.iter().position(|name| *name == names[at]);
-        known.and_then(|at| first(at + 1)).unwrap_or(0) as u32
-    };
-    let classes = words.iter().map(class).collect();
+    // Those that move have the names of those that stand.
+    let class = class_labels(words.iter().map(|word| colours::semantic_kitti(*word as u16)));
     let objects = words.iter().map(|word| word >> 16).collect();
-    Ok(vec![
-        Labels { name: "class", values: classes, names: Some(names) },
-        Labels { name: "object", values: objects, names: None },
-    ])
+    Ok(vec![class, Labels { name: "object", values: objects, names: None }])
 }
 
-/// A packed set, a frame for each cloud; a labelled sweep with its boxes; or else a cloud.
+/// A packed set, a frame for each cloud; or else a cloud.
 fn set(file: &Path, points: &PointsArgs) -> anyhow::Result<Vec<Frame>> {
-    if let Ok(set) = read_labelled(file) {
-        let shown = set.len().min(MOST_FRAMES);
-        if shown < set.len() {
-            let file = file.display();
-            formats::say!("{file}: the first {shown} of {} clouds are shown", set.len());
-        }
-        let class = |label: usize| {
-            set.classes.as_ref().map_or(format!("class {label}"), |classes| classes[label].clone())
-        };
-        let frame = |i: usize| {
-            let points = set.cloud(i).to_vec();
-            let name = set.names.as_ref().map_or(String::new(), |names| names[i].clone());
-            let class = class(set.labels[i]);
-            let name = format!("{class} {name}");
-            let values = vec![0; points.len()];
-            let labels = Labels { name: "class", values, names: Some(vec![class]) };
-            Frame::of_scan(name, Scan { positions: points, ..Scan::default() }, vec![labels])
-        };
-        return Ok((0..shown).map(frame).collect());
+    let Ok(set) = read_labelled(file) else { return Ok(vec![cloud(file, points)?]) };
+    let shown = set.len().min(MOST_FRAMES);
+    if shown < set.len() {
+        let file = file.display();
+        formats::say!("{file}: the first {shown} of {} clouds are shown", set.len());
     }
-    let Ok(sweep) = read_labelled_sweep(file) else { return Ok(vec![cloud(file, points)?]) };
-    let scan = Scan { ring: sweep.lasers, ..Scan::of_points(&sweep.points) };
-    let mut frame = Frame::of_scan(String::new(), scan, Vec::new());
-    frame.boxes.extend(sweep.boxes.into_iter().map(|of| Placed {
-        class: Some(of.class),
-        centre: of.centre_m,
-        size: of.size_m,
-        yaw: of.yaw_rad,
-        score: None,
-        track: None,
-        truth: true,
-        turn: None,
-        in_world: false,
-    }));
-    Ok(vec![frame])
+    let frame = |i: usize| {
+        let positions = set.cloud(i).to_vec();
+        let label = set.labels[i];
+        let class = set.classes.as_ref().map_or(label.to_string(), |names| names[label].clone());
+        let name = set.names.as_ref().map_or_else(String::new, |names| names[i].clone());
+        let name = format!("{class} {name}");
+        let labels = class_labels(std::iter::repeat_n(&*class, positions.len()));
+        Frame::of_scan(name, Scan { positions, ..Scan::default() }, vec![labels])
+    };
+    Ok((0..shown).map(frame).collect())
 }
 
 /// The sweeps of a sequence or of a folder; or the clusters that `segment` wrote, as one frame.
@@ -217,8 +154,10 @@ fn folder(folder: &Path, points: &PointsArgs) -> anyhow::Result<Vec<Frame>> {
         }
     }
     let entries = fs::read_dir(folder).map_err(|source| FormatError::io(folder, source))?;
-    let mut files: Vec<PathBuf> =
-        entries.filter_map(|entry| Some(entry.ok()?.path())).filter(|file| file.is_file()).collect();
+    let mut files: Vec<PathBuf> = entries
+        .filter_map(|entry| Some(entry.ok()?.path()))
+        .filter(|file| file.is_file())
+        .collect();
     files.sort();
     let is_cluster = |file: &&PathBuf| {
         let name = file.file_name().unwrap_or_default().to_string_lossy();
@@ -266,8 +205,7 @@ fn turns(file: &Path, points: &PointsArgs) -> anyhow::Result<Vec<Frame>> {
         scan.time_s.get_or_insert_default().push(turned.time_s as f32);
         scan.reflectivity.get_or_insert_default().push(turned.found.reflectivity);
         ControlFlow::Continue(())
-    })
-    .with_context(|| "showing the turns of a capture")?;
+    })?;
     warn_of_packets(file, &senders, &counts);
     let frame = |(scan, turn): (Scan, u64)| {
         let name = format!("turn {turn}");

@@ -94,22 +94,17 @@ impl Pane {
     }
 
     pub fn is_empty(&self) -> bool {
-        self.frames.iter().all(|frame| {
-            frame.n_points() + frame.meshes.len() + frame.boxes.len() == 0
-        })
+        self.frames
+            .iter()
+            .all(|frame| frame.n_points() + frame.meshes.len() + frame.boxes.len() == 0)
     }
 
     /// What it shows, for people.
     pub fn told(&self) -> String {
-        let count = |n: usize, what: &str| (n > 0).then(|| format!("{n} {what}"));
         let sum = |of: fn(&Frame) -> usize| self.frames.iter().map(of).sum::<usize>();
-        let parts = [
-            count(sum(Frame::n_points), "points"),
-            count(sum(|frame| frame.meshes.len()), "meshes"),
-            count(sum(|frame| frame.boxes.len()), "boxes"),
-            Some(self.frames.len()).filter(|n| *n > 1).map(|n| format!("{n} frames")),
-        ];
-        parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
+        let [meshes, boxes] = [sum(|frame| frame.meshes.len()), sum(|frame| frame.boxes.len())];
+        let (points, frames) = (sum(Frame::n_points), self.frames.len());
+        format!("{points} points, {meshes} meshes, {boxes} boxes in {frames} frames")
     }
 
     /// Adds the boxes in `file` to the frames of their turns, or to all frames if they name none.
@@ -157,7 +152,9 @@ impl Pane {
             let mut number = 0..;
             self.frames.retain(|_| number.next().is_some_and(|i: usize| i.is_multiple_of(every)));
             let (name, left) = (&self.name, self.frames.len());
-            formats::say!("{name}: {left} of {n} frames are shown, which have {most} points at most");
+            formats::say!(
+                "{name}: {left} of {n} frames are shown, which have {most} points at most"
+            );
         }
     }
 }
@@ -187,15 +184,8 @@ impl Frame {
     }
 }
 
-impl Placed {
-    pub fn as_truth(self) -> Self {
-        Self { truth: true, ..self }
-    }
-}
-
 /// A sensor at the origin, which looks along x.
-pub const IDENTITY: [f64; 16] =
-    [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.];
+pub const IDENTITY: [f64; 16] = [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.];
 
 /// The pose as seen from `origin`.
 pub fn from_origin(mut pose: [f64; 16], origin: [f64; 3]) -> [f64; 16] {

@@ -11,12 +11,12 @@ use crate::{Outcome, Usage};
 use anyhow::ensure;
 use files::Content;
 use formats::outputs::{Overwrite, need_extension};
-use frame::Pane;
+use frame::{Pane, Placed};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// The most points of a page: of a longer drive, every second or third sweep is shown, and so on.
-const MOST_POINTS: usize = 6_000_000;
+const MOST_POINTS: usize = 3_000_000;
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -83,7 +83,8 @@ fn panes(args: &Args) -> anyhow::Result<Vec<Pane>> {
         panes[pane].add(found, file)?;
     }
     if let Some(file) = &args.truth {
-        let found = boxes::read(file)?.into_iter().map(frame::Placed::as_truth).collect::<Vec<_>>();
+        let truth = |placed| Placed { truth: true, ..placed };
+        let found: Vec<_> = boxes::read(file)?.into_iter().map(truth).collect();
         for pane in &mut panes {
             pane.add(found.clone(), file)?;
         }

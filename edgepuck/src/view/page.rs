@@ -4,6 +4,7 @@ use super::frame::Pane;
 use anyhow::Context;
 use formats::atomic;
 use serde::Serialize;
+use std::io::Write;
 use std::path::Path;
 
 /// What the viewer takes.

@@ -30,7 +30,7 @@ pub fn run(summary: &mut Summary, install: bool, programs: &anyhow::Result<Progr
         passes(in_viewer("npm").args(["run", "--silent", "check"]))?;
         same_bundle()?;
         let counts = Counts { passed: 2, ..Counts::default() };
-        let answers = |name: &&str| succeeds(Command::new(name).arg("--version")).is_ok();
+        let answers = |name: &&&str| succeeds(Command::new(name).arg("--version")).is_ok();
         let Some(browser) = BROWSERS.iter().find(answers) else {
             return Ok(counts.and(summary.skip("pages in a browser", 1, "there is no Chromium")));
         };
