@@ -17,7 +17,10 @@ cargo run --release --manifest-path web/bindgen/Cargo.toml --target-dir "$target
     "$target/wasm32-unknown-unknown/web/edgepuck_web.wasm" "$out"
 wasm_opt=web/node_modules/.bin/wasm-opt
 if [ -x "$wasm_opt" ]; then
-    "$wasm_opt" -O3 -o "$out/smaller.wasm" "$out/edgepuck_web_bg.wasm"
+    # What Rust takes for granted of WebAssembly, and vectors.
+    "$wasm_opt" -O3 --enable-simd --enable-bulk-memory --enable-nontrapping-float-to-int --enable-sign-ext \
+        --enable-mutable-globals --enable-reference-types --enable-multivalue \
+        -o "$out/smaller.wasm" "$out/edgepuck_web_bg.wasm"
     mv "$out/smaller.wasm" "$out/edgepuck_web_bg.wasm"
 fi
 cp web/page/* assets/view/viewer.js assets/weights/edge-64.safetensors \

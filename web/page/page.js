@@ -140,8 +140,9 @@ function pane({ scan }, name) {
     columns.unshift({ name: "class", kind: "class", values, names: names.map((label) => label || "ground") });
   }
   const points = { position: positions, columns };
-  const sensors = [{ name: chosen("sensor"), pose: Array.from(pose) }];
   const meshes = data.mesh?.index.length ? [data.mesh] : [];
+  // Beside an object, its sensor would make it small.
+  const sensors = meshes.length ? [] : [{ name: chosen("sensor"), pose: Array.from(pose) }];
   return { name, frames: [{ name, points, sensors, meshes }] };
 }
 
