@@ -23,7 +23,8 @@ N_SWEEPS = 12
 RADII_M = [0.2, 0.5, 1.0]
 # `segment` writes clusters of at least so many points.
 MIN_POINTS = 10
-GROUND = [150, 150, 150]
+COLOURS = json.loads((ROOT / "assets/view/colours.json").read_text())
+GROUND = list(bytes.fromhex(COLOURS["classes"]["ground"].removeprefix("#")))
 # Both count what is lower for ground, whatever it is part of: Patchwork++ 0.125 m (th_dist),
 # `segment` 0.2 m.
 CLEARANCE_M = 0.3

@@ -149,7 +149,7 @@ impl Simulator {
         Ok(())
     }
 
-    /// Scans the subject; `settings` are those of [`Settings`] as JSON.
+    /// Scans the subject; `settings` are as JSON, with the names and units of `settings.rs`.
     ///
     /// # Errors
     /// A setting is out of its bounds; the sensor lacks what an effect needs; the adapter failed.
