@@ -19,6 +19,9 @@ use formats::weights::{Tensor, WeightsFile, tensor_part};
 use crate::dense::{BatchNorm, Dense};
 use crate::source::ModelSource;
 
+/// The most centres of a set abstraction: memory for all of them is allocated when a model is loaded.
+const MOST_CENTRES: usize = 1 << 16;
+
 /// A network whose point-wise layers are `C` and whose vector layers are `F`.
 pub struct Network<C, F> {
     /// The T-Net of the coordinates.
@@ -178,12 +181,12 @@ impl<C, F> Reader<'_, C, F> {
         let (trunk, mut width) = self.hidden_layers("feat", 1, 3, Role::First)?;
         let mut abstractions = Vec::new();
         for (&(centres, radius), number) in card.abstractions.iter().zip(1..) {
-            let before =
-                abstractions.last().map_or(usize::MAX, |before: &SetAbstraction<C>| before.centres);
-            if !((1..=before).contains(&centres) && radius.is_normal() && radius > 0.0) {
+            let most = abstractions
+                .last()
+                .map_or(MOST_CENTRES, |before: &SetAbstraction<C>| before.centres);
+            if !((1..=most).contains(&centres) && radius.is_normal() && radius > 0.0) {
                 let cause = format!(
-                    "expected 1 centre or more, no more than before, and a radius above 0, found \
-                     {centres} and {radius}"
+                    "expected 1 to {most} centres and a radius above 0, found {centres} and {radius}"
                 );
                 return Err(self.file_error("metadata `abstractions`", cause));
             }

@@ -78,8 +78,8 @@ pub struct Recipe {
     pub orthogonality: f64,
     /// Share of the target that is distributed over all classes.
     pub label_smoothing: f64,
-    /// Decay of the running mean of the weights over the steps, such as 0.999. The model has the mean
-    /// weights. With 0, it has those of the last step.
+    /// Decay of the running mean of the weights over the steps, such as 0.999; it is lower in the first
+    /// 10 / (1 - decay) steps. The model has the mean weights. With 0, it has those of the last step.
     #[serde(skip_serializing_if = "is_default")]
     pub average: f64,
     /// Models from which the network learns, beside the labels.
@@ -272,8 +272,9 @@ pub struct Augment {
     /// ball's centre (after PointCutMix-K: Zhang et al. 2022). The choice of points follows, so that
     /// neighborhoods are those of the mixed cloud.
     pub cut_mix: f64,
-    /// Largest local scaling, turn (radians) and shift (half as far) about each of four anchors,
-    /// smoothly blended (after PointWOLF: Kim et al. 2021).
+    /// How much the surroundings of four points are warped (after PointWOLF: Kim et al. 2021). With 0.1,
+    /// each is stretched by up to 10 %, turned by up to 0.1 radians about each axis, and shifted by up to
+    /// 0.05. What lies between them moves by a mean of the four.
     #[serde(skip_serializing_if = "is_default")]
     pub warp: f64,
 }
@@ -382,14 +383,17 @@ impl Recipe {
         let (abstractions, edges) = (&network.abstractions, &network.edges);
         let has_t_nets = network.input_transform || network.feature_transform;
         let is_sound = |a: &Abstraction| {
-            a.centres > 0 && a.radius.is_normal() && a.radius > 0.0 && !a.widths.is_empty()
+            (1..=1 << 16).contains(&a.centres)
+                && a.radius.is_normal()
+                && a.radius > 0.0
+                && !a.widths.is_empty()
         };
         checks.extend([
             (
                 abstractions.iter().all(is_sound)
                     && abstractions.is_sorted_by(|a, b| a.centres >= b.centres),
                 "network.abstractions",
-                "expected 1 centre or more, no more than before, a radius above 0, 1 layer or more",
+                "expected 1 to 65536 centres, no more than before, a radius above 0, 1 layer or more",
             ),
             (
                 abstractions.is_empty() || !has_t_nets && edges.is_empty() && self.cpl.is_none(),

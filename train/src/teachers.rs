@@ -7,7 +7,8 @@ use crate::error::Error;
 use crate::evaluate::predictions;
 use crate::matrix::Matrix;
 use crate::recipe::Distillation;
-use infer_cpu::Options;
+use infer_cpu::{Classifier, Options};
+use std::path::Path;
 
 /// The answers of teachers to all clouds of a set.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,14 +25,10 @@ impl Teachers {
         let Distillation { teachers, temperature, weight } = distillation;
         let mut shares = Matrix::zeros((clouds.len(), clouds.classes.len()));
         for path in teachers {
+            check_classes(path, &clouds.classes)?;
             let answers = predictions(path, clouds, &Options::default())?;
             for (mut shares, answer) in shares.rows_mut().into_iter().zip(&answers) {
                 let logits = &answer.logits;
-                if logits.len() != shares.len() {
-                    let (n, found) = (shares.len(), logits.len());
-                    let cause = format!("expected a teacher of {n} classes, found {found}");
-                    return Err(Error::Data { path: path.clone(), cause });
-                }
                 let largest = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
                 let odds = logits.iter().map(|x| (f64::from(x - largest) / temperature).exp());
                 let total = odds.clone().sum::<f64>() * teachers.len() as f64;
@@ -55,4 +52,21 @@ impl Teachers {
         }
         Taught { shares, temperature: self.temperature, weight: self.weight }
     }
+}
+
+/// The model at `path` must have these classes in this order.
+fn check_classes(path: &Path, classes: &[String]) -> Result<(), Error> {
+    let teacher = Classifier::load(path, &Options::default())?;
+    let found = teacher.classes();
+    let same = found.iter().zip(classes).take_while(|(found, class)| **found == **class).count();
+    if same == classes.len() && same == found.len() {
+        return Ok(());
+    }
+    let cause = format!(
+        "expected a teacher of the {} classes of the data, in their order, found {}, of which {same} agree \
+         before the first that differs",
+        classes.len(),
+        found.len()
+    );
+    Err(Error::Data { path: path.to_path_buf(), cause })
 }

@@ -89,8 +89,8 @@ impl Trainer {
         self.averages.clone()
     }
 
-    /// Moves the running means towards the tensors after the current step. The first steps count
-    /// more, so that the random weights of the beginning are soon forgotten.
+    /// Moves the running means towards the tensors after the current step: at first by more, so that
+    /// the random weights of the beginning are soon forgotten.
     fn average(&mut self) {
         if self.recipe.average <= 0.0 {
             return;

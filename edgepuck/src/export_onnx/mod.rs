@@ -111,7 +111,9 @@ fn kept_points(args: &ExportOnnxArgs, path: &Path, card: &ModelCard) -> anyhow::
 fn export(net: &Net, card: &ModelCard, n_points: Option<usize>) -> anyhow::Result<ModelProto> {
     const BATCH: Size<'_> = Size::Named("batch");
     if !net.abstractions.is_empty() {
-        bail!("expected a network without set abstractions, which have no graph yet");
+        bail!(
+            "expected a PointNet or a network of edges, found set abstractions, which ONNX cannot be written of yet"
+        );
     }
     let mut graph = Graph::default();
     let mut input = |name, n| graph.input(name, &[BATCH, Size::Named(n), Size::Fixed(3)]);

@@ -268,7 +268,7 @@ typedef struct EdgepuckObject {
   /**
    * The middle of the box of the whole object, metres, in the sensor's frame: its near side is that
    * of the box around the points, and its size and direction are from all clusters of the object. This
-   * and the next two fields are NaN if the class has no usual size.
+   * and the next two fields are NaN if it is not known: without a class, or for one without a usual size.
    */
   double whole_position_m[3];
   /**

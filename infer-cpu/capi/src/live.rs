@@ -50,7 +50,7 @@ pub struct EdgepuckObject {
     pub last_s: f64,
     /// The middle of the box of the whole object, metres, in the sensor's frame: its near side is that
     /// of the box around the points, and its size and direction are from all clusters of the object. This
-    /// and the next two fields are NaN if the class has no usual size.
+    /// and the next two fields are NaN if it is not known: without a class, or for one without a usual size.
     pub whole_position_m: [f64; 3],
     /// Length, width and height of the box of the whole object, metres.
     pub whole_size_m: [f64; 3],

@@ -114,7 +114,7 @@ impl<'a> BatchBuilder<'a> {
     /// Casts the batch.
     ///
     /// # Errors
-    /// As [`ScanBuilder::run`]; a pose that is no rotation; another number of poses in `moves` than poses
+    /// As [`ScanBuilder::run`]; a pose whose rotation is not valid; another number of poses in `moves` than poses
     /// times instances; an instance that the scene does not have; another attribute than intensity and
     /// power; more ranges than the memory holds.
     pub fn run(self) -> Result<Batch, Error> {

@@ -60,7 +60,7 @@ impl Mesh {
     }
 
     /// As [`Mesh::read`], from the bytes of a file of this name, whose extension is that of its format.
-    /// The file needs no other: a glTF file has its buffers inside.
+    /// The file must not refer to other files: the buffers of a glTF file are inside of it.
     ///
     /// ```
     /// # use sim_gpu::Mesh;

@@ -141,18 +141,23 @@ fn a_ball_of_points_is_mixed_in() {
 }
 
 #[test]
-fn a_warped_cloud_stays_near() {
+fn points_of_a_warped_cloud_move_in_proportion_to_its_strength() {
     let clouds = crate::clouds(3);
-    let most = 0.1;
-    let recipe = Recipe { augment: Augment { warp: most, ..plain().augment }, ..plain() };
-    let drawn = augment::augment(&clouds, 0, (0, 0), &recipe);
-    let pairs = drawn.points.iter().zip(clouds.set.cloud(0));
-    let moves =
-        pairs.map(|(p, q)| f64::from((0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f32>().sqrt()));
-    let moves: Vec<f64> = moves.collect();
-    // A mean of moves of what is at most a cube's diagonal from an anchor: scaled, then turned about
-    // three axes, then shifted.
-    let diagonal = 12f64.sqrt();
-    let bound = most * diagonal + 3.0 * most * (1.0 + most) * diagonal + 0.5 * most * 3f64.sqrt();
-    assert!(moves.iter().all(|&by| by > 1e-4 && by < bound), "{moves:?}");
+    let moves_of = |warp: f64| {
+        let recipe = Recipe { augment: Augment { warp, ..plain().augment }, ..plain() };
+        let drawn = augment::augment(&clouds, 0, (0, 0), &recipe);
+        let pairs = drawn.points.iter().zip(clouds.set.cloud(0));
+        let moves = pairs
+            .map(|(p, q)| f64::from((0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f32>().sqrt()));
+        moves.collect::<Vec<f64>>()
+    };
+    let (weak, strong) = (moves_of(0.005), moves_of(0.05));
+    assert!(weak.iter().all(|&by| by > 1e-5), "all points move: {weak:?}");
+    // At most a cube's diagonal from an anchor: stretched by 5 %, turned by 0.05 about three axes, and
+    // shifted by 0.025 along each.
+    let bound = 0.05 * 12f64.sqrt() * (1.0 + 3.0 * 1.05) + 0.025 * 3f64.sqrt();
+    assert!(strong.iter().all(|&by| by < bound), "{strong:?}");
+    // Turns and stretches multiply: second orders are about 0.05 of the first.
+    let ratio = strong.iter().sum::<f64>() / weak.iter().sum::<f64>();
+    assert!((9.0..11.0).contains(&ratio), "{ratio}");
 }

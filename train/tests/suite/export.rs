@@ -230,7 +230,7 @@ fn neighbors_are_searched_among_all_points_whatever_the_sampler_kept() {
     }
 }
 
-/// A network learns what its teacher says, in place of labels.
+/// The mean over the teachers, and for a mixed cloud over its parts.
 #[test]
 fn a_teacher_s_answers_are_its_softened_probabilities() {
     let (clouds, folder) = (crate::clouds(60), tempfile::tempdir().unwrap());
@@ -259,5 +259,5 @@ fn a_teacher_s_answers_are_its_softened_probabilities() {
     let mut other = clouds.clone();
     other.classes.pop();
     let error = Teachers::of(&distillation, &other).unwrap_err().to_string();
-    assert!(error.contains("expected a teacher of 2 classes, found 3"), "{error}");
+    assert!(error.contains("expected a teacher of the 2 classes of the data"), "{error}");
 }

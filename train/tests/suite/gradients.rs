@@ -177,9 +177,10 @@ fn gradients_of_a_taught_loss_are_its_differences() {
             moved[(row, class)] += by;
             loss::of_batch(moved, &batch).0.total
         };
-        // Logits of f32 move by 1e-2 ± 6e-8; the losses' third derivatives are below 1.
+        // Logits of up to 3 are rounded to 2.4e-7 when they move, and once more when the largest is
+        // subtracted: 2.4e-5 after the division. The losses' third derivatives are below 1: 1.7e-5.
         let expected = (at(0.01) - at(-0.01)) / 0.02;
-        assert!((f64::from(*found) - expected).abs() < 2e-5, "{found}, {expected}");
+        assert!((f64::from(*found) - expected).abs() < 5e-5, "{found}, {expected}");
     }
 }
 

@@ -17,7 +17,7 @@ fn recipe() -> Recipe {
 /// Set abstractions, whose weights are averaged.
 fn averaged() -> Recipe {
     let widths = vec![12];
-    let mut recipe = Recipe { average: 0.9, ..recipe() };
+    let mut recipe = Recipe { average: 0.5, ..recipe() };
     recipe.network.abstractions = vec![Abstraction { centres: 6, radius: 0.8, widths }];
     (recipe.network.input_transform, recipe.network.feature_transform) = (false, false);
     recipe
@@ -68,7 +68,7 @@ fn averages_are_the_running_means_of_the_steps() {
     for step in 1..=20 {
         trainer.learn(&clouds, |_| {}).unwrap();
         let value = f64::from(model_file::tensors(&mut trainer.model)[name].values[3]);
-        expected += (value - expected) * f64::max(0.1, 10.0 / f64::from(step + 9));
+        expected += (value - expected) * f64::max(0.5, 10.0 / f64::from(step + 9));
     }
     // 20 roundings of numbers below 1.
     let found = f64::from(trainer.tensors()[name].values[3]);
