@@ -58,7 +58,7 @@ impl Teachers {
 fn check_classes(path: &Path, classes: &[String]) -> Result<(), Error> {
     let teacher = Classifier::load(path, &Options::default())?;
     let found = teacher.classes();
-    let same = found.iter().zip(classes).take_while(|(found, class)| **found == **class).count();
+    let same = found.iter().zip(classes).take_while(|(found, class)| ***found == ***class).count();
     if same == classes.len() && same == found.len() {
         return Ok(());
     }
