@@ -81,10 +81,10 @@ class Scan:
         known = ", ".join(name for name in columns if getattr(self, name) is not None)
         return f"<Scan of {len(self)} points: {known}>"
 
-    def _repr_html_(self) -> str:
+    def _repr_html_(self) -> str | None:
         from ._view import view
 
-        return view(self)._repr_html_()
+        return view(self)._repr_html_() if len(self) else None
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
         array = self.positions if dtype is None else self.positions.astype(dtype, copy=False)

@@ -92,7 +92,7 @@ def _file(
     elif isinstance(shown, Mesh):
         file = place / "mesh.off"
         file.write_text(_off(shown.vertices, shown.faces))
-    elif isinstance(shown, list) and all(isinstance(one, Detection) for one in shown):
+    elif isinstance(shown, (list, tuple)) and all(isinstance(one, Detection) for one in shown):
         file = place / "detections.json"
         file.write_text(json.dumps({"objects": [_box(one) for one in shown]}))
     else:

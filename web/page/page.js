@@ -15,7 +15,7 @@ const pending = new Map();
 let nRequests = 0;
 
 /** The worker's answer to a request; an error in words if it has none. */
-export function ask(request) {
+function ask(request) {
   const id = nRequests++;
   return new Promise((resolve, reject) => {
     pending.set(id, { resolve, reject });
@@ -94,7 +94,7 @@ function drawFields(all) {
     control.dataset.usual = control.value;
     const wished = link.get(name);
     // What the link asks for and is not there stays as usual.
-    if (wished !== null) control.value = wished;
+    if (wished !== null && (options || Number.isFinite(Number.parseFloat(wished)))) control.value = wished;
     if (control.value === "" && wished !== "") control.value = control.dataset.usual;
     controls[name] = control;
     const text = tag("output", { htmlFor: name });
@@ -117,7 +117,8 @@ function showFields(isObject) {
 
 /** The link: what differs from the usual settings. */
 function link() {
-  const changed = Object.entries(controls).filter(([, control]) => control.value !== control.dataset.usual);
+  const isChanged = ({ name, value, dataset }) => value !== dataset.usual && !(name === "mesh" && file);
+  const changed = Object.entries(controls).filter(([, control]) => isChanged(control));
   const words = new URLSearchParams(changed.map(([name, control]) => [name, control.value])).toString();
   return words ? `#${words}` : location.pathname + location.search;
 }
@@ -125,7 +126,7 @@ function link() {
 const data = { scan: undefined, mesh: undefined };
 
 /** What the viewer shows: the points with their columns, the mesh, and the sensor. */
-function pane({ scan }, name) {
+function pane({ scan }, name, sensor) {
   const { positions, range, ring, intensity, object, pose } = scan;
   const columns = [
     { name: "range", unit: "m", kind: "number", values: range },
@@ -142,14 +143,14 @@ function pane({ scan }, name) {
   const points = { position: positions, columns };
   const meshes = data.mesh?.index.length ? [data.mesh] : [];
   // Beside an object, its sensor would make it small.
-  const sensors = meshes.length ? [] : [{ name: chosen("sensor"), pose: Array.from(pose) }];
+  const sensors = meshes.length ? [] : [{ name: sensor, pose: Array.from(pose) }];
   return { name, frames: [{ name, points, sensors, meshes }] };
 }
 
 let viewer;
-function draw(reply, name, isNew) {
+function draw(reply, { subject: { name }, settings: { sensor } }, isNew) {
   if (isNew) data.mesh = reply.scan.mesh;
-  const shown = { title: "Edgepuck", panes: [pane(reply, name)] };
+  const shown = { panes: [pane(reply, name, sensor)] };
   if (viewer) viewer.setData(shown, { fit: isNew });
   else viewer = EdgepuckViewer.createViewer($("viewer"), shown);
   // All of an object, in the middle of the picture.
@@ -161,10 +162,10 @@ function draw(reply, name, isNew) {
 const whole = (number) => number.toLocaleString("en");
 const ms = (number) => `${number.toFixed(number < 10 ? 1 : 0)} ms`;
 
-function say({ scan, answer, castMs, classMs, place }) {
+function say({ scan, answer, castMs, classMs, place }, name) {
   const nPoints = scan.range.length;
   const found = answer && `${answer.class} ${(100 * answer.probability).toFixed(0)} %`;
-  $("class").textContent = found ?? (nPoints ? chosen("mesh") : "no point: nothing is in view");
+  $("class").textContent = found ?? (nPoints ? name : "no point: nothing is in view");
   const facts = [`${whole(nPoints)} points`, `cast in ${ms(castMs)} on ${place}`];
   if (answer) facts.push(`named in ${ms(classMs)} on the CPU`);
   $("facts").textContent = facts.join(" · ");
@@ -195,10 +196,11 @@ async function update() {
       shownSubject = subject.key;
       fail(reply.warnings.join("\n"));
       if (isNew) showFields(reply.scan.mesh.index.length > 0);
-      draw(reply, subject.name, isNew);
-      say(reply);
+      say(reply, subject.name);
+      draw(reply, request, isNew);
     } catch (error) {
       fail(`${error}`);
+      if (shownSubject === subject.key && !(typeof error === "string")) continue;
       $("class").textContent = "not scanned";
       $("facts").textContent = "";
     }
@@ -211,6 +213,9 @@ let nFiles = 0;
 async function take(given) {
   if (!given) return;
   file = { name: given.name, bytes: new Uint8Array(await given.arrayBuffer()), key: `file ${nFiles++}` };
+  // The same file can be chosen again, and a mesh that is built in after it.
+  $("file").value = "";
+  controls.mesh.value = "";
   await update();
 }
 
@@ -218,14 +223,12 @@ function listen() {
   $("controls").addEventListener("input", ({ target }) => {
     if (target === $("file")) return;
     if (target === controls.mesh) file = undefined;
-    history.replaceState(null, "", link());
     update();
   });
+  // Not at each step of a slider: browsers limit how often.
+  $("controls").addEventListener("change", () => history.replaceState(null, "", link()));
   $("controls").addEventListener("submit", (event) => event.preventDefault());
   $("file").addEventListener("change", () => take($("file").files[0]));
-  $("drop").addEventListener("keydown", ({ key }) => {
-    if (key === "Enter" || key === " ") $("file").click();
-  });
   for (const kind of ["dragenter", "dragover", "dragleave", "drop"]) {
     document.addEventListener(kind, (event) => {
       event.preventDefault();

@@ -39,8 +39,8 @@ async function take({ runs, subject, model }) {
     has.subject = subject.key;
   }
   if (has.model !== model) {
-    const file = await fetch(`${model}.safetensors`);
-    if (!file.ok) throw `${model}: the server answers ${file.status}`;
+    const file = await fetch(`${model}.safetensors`).catch(() => undefined);
+    if (!file?.ok) throw `${model}: the server answers ${file?.status ?? "nothing"}`;
     simulator.take_model(new Uint8Array(await file.arrayBuffer()));
     has.model = model;
   }
@@ -57,7 +57,7 @@ async function answer(request) {
   await take(request);
   const [scanned, castMs] = await timed(() => simulator.scan(JSON.stringify(request.settings)));
   const [found, classMs] = await timed(() => simulator.classify(scanned));
-  const columns = ["positions", "range", "ring", "beam", "object", "triangle", "intensity", "pose"];
+  const columns = ["positions", "range", "ring", "object", "intensity", "pose"];
   const scan = Object.fromEntries(columns.map((name) => [name, scanned[name]]));
   scan.labels = scanned.labels.split(",");
   if (request.wantsMesh) scan.mesh = { position: simulator.mesh_positions(), index: simulator.mesh_indices() };
@@ -79,7 +79,7 @@ addEventListener("message", ({ data: { id, request } }) => {
     (error) => {
       postMessage({ id, error: typeof error === "string" ? error : `This page has a fault: ${error}` });
       // After a panic, or a device that was lost, nothing of it can be used.
-      if (typeof error !== "string" || error.startsWith("adapter ")) has = {};
+      if (typeof error !== "string" || error.startsWith("adapter ")) [has, simulator] = [{}, undefined];
     },
   );
 });

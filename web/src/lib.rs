@@ -38,12 +38,8 @@ pub struct Scanned {
     pub range: Vec<f32>,
     /// The ring of each point, from below.
     pub ring: Vec<u16>,
-    /// The number of the beam, by point.
-    pub beam: Vec<u32>,
     /// The number of the instance, by point.
     pub object: Vec<u32>,
-    /// The number of the triangle, by point.
-    pub triangle: Vec<u32>,
     /// 0 to 1, by point.
     pub intensity: Vec<f32>,
     /// From the sensor's frame to the world's: a matrix of 4 by 4, row by row.
@@ -76,8 +72,8 @@ pub struct Answer {
 
 #[wasm_bindgen]
 impl Simulator {
-    /// Casts by the first adapter whose name contains `adapter`; by the best for `auto`, and by the CPU for
-    /// `cpu`, and where there is no other.
+    /// Casts by the best GPU for `auto`, or by the CPU if none opens; by the CPU for `cpu`; else by the first
+    /// adapter whose name contains `adapter`.
     ///
     /// # Errors
     /// No adapter has such a name, or it does not open.
@@ -98,12 +94,6 @@ impl Simulator {
     #[must_use]
     pub fn built_ins() -> Vec<String> {
         subject::names().map(str::to_owned).collect()
-    }
-
-    /// Why the CPU casts; nothing where a GPU does.
-    #[must_use]
-    pub fn why_no_gpu(&self) -> Option<String> {
-        self.caster.why_no_gpu().map(str::to_owned)
     }
 
     /// Makes a built-in object or street the subject.
@@ -156,14 +146,8 @@ impl Simulator {
     pub async fn scan(&mut self, settings: &str) -> Result<Scanned, Words> {
         let settings = self.set(settings)?;
         let (scene, pose) = self.subject.scene(&settings);
-        let attributes = [
-            Attribute::Range,
-            Attribute::Ring,
-            Attribute::Beam,
-            Attribute::Object,
-            Attribute::Triangle,
-        ];
-        let scan = scene.scan(&self.sensor, pose).with(&self.caster).seed(settings.seed);
+        let attributes = [Attribute::Range, Attribute::Ring, Attribute::Object];
+        let scan = scene.scan(&self.sensor, pose).with(&self.caster);
         let scan = scan.effects(settings.effects()).attributes(attributes);
         let points = scan.run_async().await.map_err(words)?.points;
         let label = |instance: &sim_gpu::Instance| instance.label.clone().unwrap_or_default();
@@ -172,9 +156,7 @@ impl Simulator {
             positions: points.positions.into_flattened(),
             range: points.range_m.unwrap_or_default(),
             ring: points.ring.unwrap_or_default(),
-            beam: points.beam.unwrap_or_default(),
             object: points.object.unwrap_or_default(),
-            triangle: points.triangle.unwrap_or_default(),
             intensity: points.intensity.unwrap_or_default(),
             pose: pose.matrix().to_vec(),
             labels: labels.join(","),

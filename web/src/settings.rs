@@ -24,9 +24,6 @@ pub struct Settings {
     pub fog_m: f64,
     /// The returns of a beam that the sensor reports; without, beams have no width.
     pub returns: Option<ReturnMode>,
-    /// The seed of all random numbers.
-    #[serde(default)]
-    pub seed: u64,
 }
 
 impl Settings {

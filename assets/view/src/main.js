@@ -23,8 +23,13 @@ export function decode(json) {
 
 /** Shows the data in the element `dataId` of this page, in the element `id`. */
 export function show(id, dataId) {
-  const holder = document.getElementById(dataId);
-  const data = decode(holder.textContent);
-  holder.remove();
-  return createViewer(document.getElementById(id), data);
+  const [element, holder] = [id, dataId].map((name) => document.getElementById(name));
+  try {
+    const data = decode(holder.textContent);
+    holder.remove();
+    return createViewer(element, data);
+  } catch (error) {
+    element.style = "color: white; padding: 1em; font: 16px sans-serif";
+    element.textContent = `This browser cannot show the page: ${error}`;
+  }
 }

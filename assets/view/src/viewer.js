@@ -46,14 +46,15 @@ class Viewer {
   constructor(element) {
     this.root = document.createElement("div");
     this.root.className = "edgepuck-viewer";
-    this.root.innerHTML = `<style>${style}</style><canvas tabindex="0"></canvas><div class="labels"></div>
+    this.root.innerHTML = `<style>${style}</style><canvas tabindex="0" aria-label="Points in three dimensions"></canvas><div class="labels"></div>
       <div class="bar"></div><div class="legend"></div><div class="facts" hidden></div>
       <div class="time"><button name="play">play</button><input type="range" name="frame"><output></output></div>`;
-    element.append(this.root);
     const part = (name) => this.root.querySelector(name);
     [this.canvas, this.labels, this.bar] = [part("canvas"), part(".labels"), part(".bar")];
     [this.legend, this.facts, this.time] = [part(".legend"), part(".facts"), part(".time")];
+    // Throws without WebGL, before anything is in the page.
     this.renderer = new THREE.WebGLRenderer({ canvas: this.canvas, antialias: true });
+    element.append(this.root);
     this.renderer.setClearColor(0x12161d);
     this.renderer.autoClear = false;
     this.camera = new THREE.PerspectiveCamera(50, 1, 0.1, 1000);
@@ -77,7 +78,13 @@ class Viewer {
       const moved = Math.hypot(offsetX - down[0], offsetY - down[1]);
       if (moved < 4 && button === 0) this.pick(offsetX, offsetY);
     });
-    canvas.addEventListener("keydown", (event) => this.#press(event.key.toLowerCase()));
+    canvas.addEventListener("keydown", (event) => {
+      const { key, repeat, ctrlKey, metaKey, altKey } = event;
+      if (ctrlKey || metaKey || altKey || (repeat && !key.startsWith("Arrow"))) return;
+      if (key.startsWith("Arrow")) event.preventDefault();
+      this.#press(key.toLowerCase());
+    });
+    canvas.addEventListener("blur", () => this.navigation.pressed.clear());
     canvas.addEventListener("keyup", ({ key }) => this.navigation.key(key.toLowerCase(), false));
     this.root.addEventListener("input", ({ target }) => this.#change(target));
     this.root.addEventListener("click", ({ target }) => this.#press(target.name));
@@ -261,8 +268,17 @@ class Viewer {
     this.panes.forEach(({ name, frame }, pane) => {
       for (const box of this.hidden.has("labels") || this.hidden.has("boxes") ? [] : (frame.boxes ?? [])) {
         if (box.truth) continue;
-        const words = [box.class, box.track && `#${box.track}`, box.score?.toFixed(2)].filter(Boolean).join(" ");
-        const facts = () => this.#showFacts(box.class ?? "box", Object.entries(box));
+        const words = [box.class, Number.isInteger(box.track) && `#${box.track}`, box.score?.toFixed(2)]
+          .filter(Boolean)
+          .join(" ");
+        const facts = () =>
+          this.#showFacts(box.class ?? "box", [
+            ["centre (m)", box.centre],
+            ["size (m)", box.size],
+            ["yaw (°)", (box.yaw * 180) / Math.PI],
+            ["score", box.score],
+            ["track", box.track],
+          ]);
         const top = box.centre.with(2, box.centre[2] + box.size[2] / 2);
         add(pane, top, "box", words, facts, css(boxColour(box)));
       }

@@ -112,7 +112,7 @@ fn export(net: &Net, card: &ModelCard, n_points: Option<usize>) -> anyhow::Resul
     const BATCH: Size<'_> = Size::Named("batch");
     if !net.abstractions.is_empty() {
         bail!(
-            "expected a PointNet or a network of edges, found set abstractions, which ONNX cannot be written of yet"
+            "expected a PointNet or a network of edges, found one of set abstractions, which export-onnx cannot write yet"
         );
     }
     let mut graph = Graph::default();

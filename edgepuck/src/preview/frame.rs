@@ -39,15 +39,18 @@ impl Frame {
         let away =
             finite.flat_map(|at| [0, 1].map(|axis| (f64::from(at[axis]) - centre[axis]).abs()));
         let farthest = away.fold(1.0, f64::max);
-        Self { centre, half: farthest.min(FARTHEST_M) }
+        Self { centre, half: (farthest * MARGIN).min(FARTHEST_M) }
     }
 
-    /// Whether `scan` is a sweep: one picture from above shows it.
+    /// Whether `scan` is a sweep around its sensor: one picture from above shows it.
     pub fn is_sweep(scan: &Scan) -> bool {
         let Some((low, high)) = bounds(&scan.positions) else { return false };
         let size = [0, 1, 2].map(|axis| high[axis] - low[axis]);
         let across = size[0].max(size[1]);
-        across > LEAST_SWEEP_M && across > 3.0 * size[2]
+        let sensor_m = scan.sensor_position_m();
+        let is_around = (0..2)
+            .all(|axis| (low[axis]..=high[axis]).contains(&(sensor_m[axis] - scan.origin[axis])));
+        is_around && across > LEAST_SWEEP_M && across > 3.0 * size[2]
     }
 
     pub fn extent(&self, axis: usize) -> std::ops::Range<f64> {
@@ -90,4 +93,29 @@ impl View {
         Self { name: "top", right: 0, up: 1, depth: (2, 1.0) },
         Self { name: "front", right: 1, up: 2, depth: (0, 1.0) },
     ];
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The corners of a plate of 20 m, this far from the sensor.
+    fn plate(x_m: f32) -> Scan {
+        let corners = [[-10.0, -10.0], [10.0, -10.0], [10.0, 10.0], [-10.0, 10.0]];
+        let positions = corners.map(|[x, y]| [x + x_m, y, 0.0]).to_vec();
+        Scan { positions, ..Scan::default() }
+    }
+
+    #[test]
+    fn what_is_around_its_sensor_is_a_sweep() {
+        assert!(Frame::is_sweep(&plate(0.0)));
+        assert!(!Frame::is_sweep(&plate(1e5)));
+    }
+
+    #[test]
+    fn the_picture_of_a_sweep_holds_its_farthest_points() {
+        let scan = plate(3.0);
+        let frame = Frame::near_sensor(&scan);
+        assert!(scan.positions.iter().all(|point| frame.holds(*point)));
+    }
 }

@@ -1,5 +1,6 @@
 //! Files and folders, as frames or boxes.
 
+use super::MOST_POINTS;
 use super::boxes;
 use super::frame::{Frame, Labels, Placed, Points};
 use super::scene;
@@ -168,9 +169,31 @@ fn folder(folder: &Path, points: &PointsArgs) -> anyhow::Result<Vec<Frame>> {
         return Ok(vec![of_clusters(&clusters, points)?]);
     }
     files.retain(|file| CloudFormat::of_path(file).is_ok() || points.is_capture(file));
+    keep_commonest_extension(&mut files);
     let cause = "expected a folder of sweeps or clusters, found no file of points in it";
     ensure!(!files.is_empty(), Usage(format!("{}: {cause}", folder.display())));
-    files.iter().map(|file| cloud(file, points)).collect()
+    let n_points = files.len() * cloud(&files[0], points)?.n_points();
+    // So many that memory holds them.
+    let every = n_points.div_ceil(MOST_POINTS).max(1);
+    if every > 1 {
+        let (folder, shown) = (folder.display(), files.len().div_ceil(every));
+        formats::say!("{folder}: {shown} of {} sweeps are shown", files.len());
+    }
+    let frame = |(file, number): (&PathBuf, u64)| {
+        let frame = cloud(file, points)?;
+        Ok(Frame { turn: Some(number), ..frame })
+    };
+    files.iter().zip(0..).step_by(every).map(frame).collect()
+}
+
+/// Notes and lists may lie beside sweeps.
+fn keep_commonest_extension(files: &mut Vec<PathBuf>) {
+    let count =
+        |of: &PathBuf| files.iter().filter(|file| file.extension() == of.extension()).count();
+    let commonest = files.iter().max_by_key(|file| count(file)).and_then(|file| file.extension());
+    if let Some(commonest) = commonest.map(ToOwned::to_owned) {
+        files.retain(|file| file.extension() == Some(&commonest));
+    }
 }
 
 fn of_clusters(files: &[&PathBuf], points: &PointsArgs) -> anyhow::Result<Frame> {
@@ -190,8 +213,8 @@ fn turns(file: &Path, points: &PointsArgs) -> anyhow::Result<Vec<Frame>> {
     let mut senders = Senders::new(points.from);
     let (mut first, mut scans) = (None, Vec::<Scan>::new());
     let (_, counts) = read_turns(file, metadata.as_ref(), &mut senders, |turned| {
-        let turn = turned.turns.floor();
-        let number = (turn - *first.get_or_insert(turn)).max(0.0) as usize;
+        // As `live` counts turns.
+        let number = (turned.turns - *first.get_or_insert(turned.turns)).max(0.0) as usize;
         if number >= MOST_FRAMES {
             return ControlFlow::Break(());
         }

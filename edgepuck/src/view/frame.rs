@@ -143,7 +143,8 @@ impl Pane {
         Ok(())
     }
 
-    /// Keeps so few frames, evenly, that they have at most `most` points.
+    /// Keeps so few frames, evenly, and so few points of each, evenly, that there are about `most`
+    /// points.
     pub fn thin(&mut self, most: usize) {
         let n_points: usize = self.frames.iter().map(Frame::n_points).sum();
         let every = n_points.div_ceil(most.max(1));
@@ -151,10 +152,19 @@ impl Pane {
             let n = self.frames.len();
             let mut number = 0..;
             self.frames.retain(|_| number.next().is_some_and(|i: usize| i.is_multiple_of(every)));
-            let (name, left) = (&self.name, self.frames.len());
-            formats::say!(
-                "{name}: {left} of {n} frames are shown, which have {most} points at most"
-            );
+            formats::say!("{}: {} of {n} frames are shown", self.name, self.frames.len());
+        }
+        for frame in &mut self.frames {
+            let Some(Points { scan, labels }) = &mut frame.points else { continue };
+            let every = scan.len().div_ceil(most.max(1));
+            if every > 1 {
+                formats::say!("{}: one of {every} points is shown", self.name);
+                let kept: Vec<usize> = (0..scan.len()).step_by(every).collect();
+                *scan = scan.select(&kept);
+                for Labels { values, .. } in labels {
+                    *values = kept.iter().map(|&i| values[i]).collect();
+                }
+            }
         }
     }
 }

@@ -10,6 +10,7 @@ use crate::points::PointsArgs;
 use crate::{Outcome, Usage};
 use anyhow::ensure;
 use files::Content;
+use formats::hash::of_bytes;
 use formats::outputs::{Overwrite, need_extension};
 use frame::{Pane, Placed};
 use std::path::{Path, PathBuf};
@@ -94,10 +95,13 @@ fn panes(args: &Args) -> anyhow::Result<Vec<Pane>> {
     Ok(panes)
 }
 
-/// A page in the folder for temporary files. The same input has the same page, so that few pile up.
+/// A page in the folder for temporary files. The same file of the same user has the same page, so that
+/// few pile up.
 fn temporary(file: &Path) -> PathBuf {
     let stem = file.file_stem().unwrap_or_default().to_string_lossy();
-    std::env::temp_dir().join(format!("edgepuck-view-{stem}.html"))
+    let file = file.canonicalize().unwrap_or_else(|_| file.to_path_buf());
+    let own = of_bytes(format!("{:?} {}", std::env::home_dir(), file.display()).as_bytes());
+    std::env::temp_dir().join(format!("edgepuck-view-{stem}-{}.html", &own[..8]))
 }
 
 /// Opens `page` in the browser, if this machine has one; its path is printed anyway.

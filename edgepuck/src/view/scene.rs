@@ -37,7 +37,7 @@ fn of_scene(scene: &Scene) -> anyhow::Result<Frame> {
     let caster = Caster::cpu();
     let scan = |number| scene.scan_mounted(number).with(&caster).run();
     let scans = (0..scene.sensors.len()).map(scan).collect::<Result<Vec<_>, _>>()?;
-    let origin = scans.first().map_or([0.0; 3], |scan| scan.origin);
+    let origin = scans.first().map_or_else(|| origin_of(&scene), |scan| scan.origin);
     let meshes = scene.instances().iter().map(|instance| mesh(instance, origin)).collect();
     let sensors = scene.sensors.iter().zip(&scans).map(|(mounted, scan)| {
         let pose = scan.pose.unwrap_or(mounted.pose.matrix());
@@ -52,11 +52,21 @@ fn of_scene(scene: &Scene) -> anyhow::Result<Frame> {
     Ok(Frame { points, meshes, sensors, ..Frame::default() })
 }
 
+/// A point near the meshes if they are so far from the origin that f32 would lose their shape.
+fn origin_of(scene: &Scene) -> [f64; 3] {
+    const FAR_M: f64 = 1e4;
+    let Some(first) = scene.instances().first() else { return [0.0; 3] };
+    let [low, _] = first.mesh.bounds_m();
+    let at = (DVec3::from(low) + first.pose.position_m).round();
+    if at.abs().max_element() < FAR_M { [0.0; 3] } else { at.to_array() }
+}
+
 /// The points of all sensors.
 fn joined(scene: &Scene, scans: &[Scan], origin: [f64; 3]) -> Points {
     let names = scene.sensors.iter().map(|mounted| mounted.name.clone()).collect();
     let mut sensor = Labels { name: "sensor", values: Vec::new(), names: Some(names) };
-    let mut all = formats::Scan { origin, ..formats::Scan::default() };
+    let pose = scans.first().and_then(|scan| scan.pose);
+    let mut all = formats::Scan { origin, pose, ..formats::Scan::default() };
     for (scan, number) in scans.iter().zip(0..) {
         let shift = [0, 1, 2].map(|axis| (scan.origin[axis] - origin[axis]) as f32);
         let place = |at: &[f32; 3]| [0, 1, 2].map(|axis| at[axis] + shift[axis]);
