@@ -166,8 +166,10 @@ def compare_recording(subscriber, typestore, connections, recorded):
         expected = [typestore.deserialize_cdr(raw, name) for t, _, raw in recorded if t == topic]
         found = received.get(topic, [])
         assert len(found) > len(expected) / 3, f"{topic}: {len(found)} of {len(expected)}"
-        for ours, theirs in zip(found, expected[-len(found):], strict=True):
-            assert are_same(ours, theirs), f"{topic}: {ours} is not {theirs}"[:2000]
+        # A subscriber that is late loses messages, but none changes or overtakes another.
+        left = iter(expected)
+        for ours in found:
+            assert any(are_same(ours, theirs) for theirs in left), f"{topic}: {ours} is not in order"[:2000]
         print(f"of a recording, {topic}: {len(found)} of {len(expected)} messages")
     largest = max(len(cloud.data) for cloud in received["/points"])
     assert largest > 1.27e6, largest
