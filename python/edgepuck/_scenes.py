@@ -36,7 +36,7 @@ class DrawnScene:
     cluster_height: NDArray[np.float32]
     """The height of each cluster's lowest point above the ground, metres, [n_clusters]."""
 
-    def _repr_html_(self) -> str:
+    def _repr_html_(self) -> str | None:
         return self.scan._repr_html_()
 
     def __repr__(self) -> str:
