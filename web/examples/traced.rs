@@ -43,8 +43,6 @@ fn main() -> anyhow::Result<()> {
     files.sort();
     let mut simulator =
         pollster::block_on(Simulator::open("cpu")).map_err(|cause| anyhow!(cause))?;
-    let model = fs::read(assets.join("weights/shapes-rotational-64.safetensors"))?;
-    simulator.take_model(&model).map_err(|cause| anyhow!(cause))?;
     let built_in = ["car", "person", "tree", "street"].map(PathBuf::from);
     for file in files.into_iter().chain(built_in) {
         let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -65,7 +63,6 @@ fn main() -> anyhow::Result<()> {
                 let traced = traced.map_err(|cause| anyhow!(cause))?;
                 let scan = pollster::block_on(simulator.scan(&settings.to_string()));
                 let scan = scan.map_err(|cause| anyhow!(cause))?;
-                let answer = simulator.classify(&scan).map_err(|cause| anyhow!(cause))?;
                 let case = cases.len().to_string();
                 let write =
                     |ending, bytes| fs::write(folder.join(format!("{case}.{ending}")), bytes);
@@ -75,7 +72,7 @@ fn main() -> anyhow::Result<()> {
                 write("scan", le(&columns, |number| number.to_le_bytes()))?;
                 cases.push(serde_json::json!({
                     "case": case, "subject": name, "is_file": file.extension().is_some(),
-                    "settings": settings, "probability": answer.map(|answer| answer.probability),
+                    "settings": settings,
                 }));
             }
         }

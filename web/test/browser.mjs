@@ -54,14 +54,13 @@ async function compare() {
   const bytes = async (name) => new Uint8Array(await (await fetch(`/traced/${name}`)).arrayBuffer());
   const cases = await (await fetch("/traced/cases.json")).json();
   const [cpu, gpu] = [await Simulator.open("cpu"), await Simulator.open("")];
-  cpu.take_model(new Uint8Array(await (await fetch("/page/shapes-rotational-64.safetensors")).arrayBuffer()));
   const found = { rays: 0, hits: 0, points: 0, guesses: 0, differ: [] };
   const differing = (a, b) => (a.length === b.length ? a.filter((x, i) => x !== b[i]).length : "the length");
   // Of a ray that f64 decides, the triangle is a guess: WGSL leaves the rounding of divisions open.
   const decided = (code) => (code >= AMBIGUOUS && code !== MISS ? AMBIGUOUS : code);
   const bits = ({ buffer, byteOffset, length }) => new BigUint64Array(buffer, byteOffset, length);
   let taken;
-  for (const { case: number, subject, is_file, settings, probability } of cases) {
+  for (const { case: number, subject, is_file, settings } of cases) {
     if (taken !== subject)
       for (const simulator of [cpu, gpu])
         is_file ? simulator.take_file(subject, await bytes(subject)) : simulator.take_built_in(subject);
@@ -78,7 +77,6 @@ async function compare() {
       "ranges of WebAssembly": differing(ranges, bits(byCpu.ranges)),
       "ranges of WebGPU": differing(ranges, bits(byGpu.ranges)),
       "points in rain and fog": differing(points, new Uint32Array(columns.buffer)),
-      probability: Number((cpu.classify(scan)?.probability ?? null) !== probability),
     };
     if (Object.values(differ).some(Boolean)) found.differ.push({ subject, settings, ...differ });
     found.guesses += differing(native, byGpu.codes);
