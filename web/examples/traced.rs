@@ -51,12 +51,13 @@ fn main() -> anyhow::Result<()> {
             None => simulator.take_built_in(&name),
         };
         taken.map_err(|cause| anyhow!(cause))?;
-        for sensor in ["vlp32c", "generic-static"] {
+        // Weather needs a detection limit, which the second sensor lacks.
+        for (sensor, rain_mm_h, fog_m) in [("vlp32c", 20.0, 80.0), ("generic-static", 0.0, 0.0)] {
             for (distance_m, elevation_deg, azimuth_deg) in PLACES {
-                let returns = (sensor == "vlp32c" && distance_m == 5.0).then_some("dual");
+                let returns = (rain_mm_h > 0.0 && distance_m == 5.0).then_some("dual");
                 let settings = serde_json::json!({
                     "sensor": sensor, "distance_m": distance_m, "elevation_deg": elevation_deg,
-                    "azimuth_deg": azimuth_deg, "noise_m": 0.02, "rain_mm_h": 20.0, "fog_m": 80.0,
+                    "azimuth_deg": azimuth_deg, "noise_m": 0.02, "rain_mm_h": rain_mm_h, "fog_m": fog_m,
                     "returns": returns,
                 });
                 let traced = pollster::block_on(simulator.trace(&settings.to_string()));
