@@ -258,7 +258,7 @@ impl Object {
             "class": self.class,
             "confidence": self.confidence,
             "points": self.n_points,
-            "range_m": x.hypot(y),
+            "range_m": libm::hypotf(x, y),
             "box": of(&self.place),
             "whole_box": of(&self.whole),
         })

@@ -137,12 +137,12 @@ pub fn line(
     let base = DVec3::from(place.centre_m.map(f64::from)) - 0.5 * height * DVec3::Z;
     let (mut alpha, mut at, mut rotation) = (-10.0, base, yaw_rad);
     if let Some(camera) = camera {
-        let along = DVec3::new(yaw_rad.cos(), yaw_rad.sin(), 0.0);
+        let along = DVec3::new(libm::cos(yaw_rad), libm::sin(yaw_rad), 0.0);
         let along = camera.rect_from_lidar.transform_vector3(along);
         at = camera.rect_from_lidar.transform_point3(base);
         // About the camera's y axis, which points downwards.
-        rotation = (-along.z).atan2(along.x);
-        alpha = shorter_way(rotation - at.x.atan2(at.z), TAU);
+        rotation = libm::atan2(-along.z, along.x);
+        alpha = shorter_way(rotation - libm::atan2(at.x, at.z), TAU);
     }
     let [left, top, right, bottom] = bounds.unwrap_or([-1.0; 4]);
     let [x, y, z] = at.to_array();

@@ -1,5 +1,7 @@
 //! The commands of the program `edgepuck`, each in its own module.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod adapters;
 #[cfg(feature = "models")]
 mod advise;

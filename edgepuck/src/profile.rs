@@ -158,7 +158,8 @@ fn oddities(sensor: &SensorProfile, pattern: &BeamPattern) -> Vec<String> {
             "all elevations lie within {lowest:.3} to {highest:.3} degrees: are they in radians?"
         ));
     }
-    let [first, last] = ends(pattern.directions.iter().map(|at| at.y.atan2(at.x).to_degrees()));
+    let [first, last] =
+        ends(pattern.directions.iter().map(|at| libm::atan2(at.y, at.x).to_degrees()));
     let turn = std::f64::consts::PI;
     if (0.95 * turn..=turn).contains(&last)
         && first >= -turn
@@ -195,7 +196,7 @@ fn beams(pattern: &BeamPattern) -> String {
     let mut text = "time_s,ring,azimuth_deg,elevation_deg,x_m,y_m,z_m\n".to_owned();
     for (ray, direction) in (0..).zip(&pattern.directions) {
         let [time_s, ring] = [pattern.time_s[ray as usize], pattern.ring[ray as usize].into()];
-        let azimuth_deg = direction.y.atan2(direction.x).to_degrees();
+        let azimuth_deg = libm::atan2(direction.y, direction.x).to_degrees();
         // Adding zero turns minus zero into zero.
         let [x, y, z] = (pattern.start(ray).unwrap_or_default() + DVec3::ZERO).to_array();
         let elevation_deg = elevation_deg(direction);
@@ -206,7 +207,7 @@ fn beams(pattern: &BeamPattern) -> String {
 }
 
 fn elevation_deg(direction: &DVec3) -> f64 {
-    direction.z.clamp(-1.0, 1.0).asin().to_degrees()
+    libm::asin(direction.z.clamp(-1.0, 1.0)).to_degrees()
 }
 
 fn ends(numbers: impl Iterator<Item = f64>) -> [f64; 2] {

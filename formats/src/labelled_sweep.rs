@@ -48,7 +48,7 @@ impl LabelledBox {
     #[must_use]
     pub fn contains(&self, point: [f64; 3], margin_m: f64) -> bool {
         let [x, y, z] = [0, 1, 2].map(|axis| point[axis] - self.centre_m[axis]);
-        let (sin, cos) = self.yaw_rad.sin_cos();
+        let (sin, cos) = libm::sincos(self.yaw_rad);
         let own = [cos * x + sin * y, cos * y - sin * x, z];
         own.iter().zip(self.size_m).all(|(at, size)| at.abs() <= size / 2.0 + margin_m)
     }

@@ -17,6 +17,7 @@
 //!
 //! None of them needs a C compiler for its target.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 #![cfg_attr(
     not(all(feature = "dataset", feature = "cloud-files")),
     allow(dead_code, reason = "formats that are left out leave helpers that others share")

@@ -74,7 +74,8 @@ pub fn read_turns(
         for &found in &found {
             let [x, y, _] = found.point_m.map(f64::from);
             // Adding 1.5 makes the whole numbers round to the nearest.
-            let ahead = ((-y.atan2(x) - facts.azimuth_rad) / TAU + 1.5).rem_euclid(1.0) - 0.5;
+            let ahead =
+                ((-libm::atan2(y, x) - facts.azimuth_rad) / TAU + 1.5).rem_euclid(1.0) - 0.5;
             let time_s = (now.time_us + found.after_us) * 1e-6;
             let turned = TurnedReturn { found, turns: now.turns + ahead, time_s, gaps: now.gaps };
             if each(&turned).is_break() {

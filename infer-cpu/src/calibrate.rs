@@ -94,7 +94,7 @@ fn shape(number: u32) -> Vec<[f32; 3]> {
     let key = Stream::Calibration { shape: number }.key(0);
     let unit = |n: usize| 2.0 * key.unit(n as u64) - 1.0;
     // From rods and plates to cubes.
-    let size = [0, 1, 2].map(|axis| (-3.0 * key.unit(axis)).exp());
+    let size = [0, 1, 2].map(|axis| libm::exp(-3.0 * key.unit(axis)));
     let points: Vec<[f64; 3]> = (0..SHAPE_POINTS)
         .map(|i| {
             let mut p = [0, 1, 2].map(|axis| unit(16 + 4 * i + axis));

@@ -31,6 +31,7 @@
 //! out and names the formats: `infer-cpu = { version = "0.1", default-features = false, features =
 //! ["npz", "ply"] }`. Text, NPY and KITTI's `.bin` are always read.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 #![deny(unsafe_code)]
 
 mod calibrate;

@@ -68,8 +68,8 @@ pub fn to_metric(points: &[[f64; 3]], ground_z: Option<f64>, out: &mut Vec<[f32;
 /// rotated.
 pub fn to_metric_sight(points: &[[f64; 3]], ground_z: Option<f64>, out: &mut Vec<[f32; 3]>) {
     let direction = |[x, y]: [f64; 2]| {
-        let angle = y.atan2(x);
-        [angle.cos(), angle.sin()]
+        let angle = libm::atan2(y, x);
+        [libm::cos(angle), libm::sin(angle)]
     };
     turned_metric(points, ground_z, direction, out);
 }

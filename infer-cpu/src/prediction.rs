@@ -81,7 +81,7 @@ impl Prediction {
     /// temperature. For an unknown object, it is that of the class in [`Prediction::label`].
     #[must_use]
     pub fn confidence(&self) -> f64 {
-        self.log_probability(self.class).exp()
+        libm::exp(self.log_probability(self.class))
     }
 
     /// The natural logarithm of the probability of `class`.
@@ -92,8 +92,8 @@ impl Prediction {
     pub fn log_probability(&self, class: usize) -> f64 {
         let largest = f64::from(self.logits[self.class]);
         let shifted = |logit: f32| (f64::from(logit) - largest) / self.temperature;
-        let sum: f64 = self.logits.iter().map(|&logit| shifted(logit).exp()).sum();
-        shifted(self.logits[class]) - sum.ln()
+        let sum: f64 = self.logits.iter().map(|&logit| libm::exp(shifted(logit))).sum();
+        shifted(self.logits[class]) - libm::log(sum)
     }
 }
 
@@ -122,8 +122,8 @@ impl UnknownRule {
 #[must_use]
 pub fn energy(logits: &[f32], temperature: f64) -> f64 {
     let largest = f64::from(logits[argmax(logits)]);
-    let shifted = |&logit: &f32| ((f64::from(logit) - largest) / temperature).exp();
-    -largest - temperature * logits.iter().map(shifted).sum::<f64>().ln()
+    let shifted = |&logit: &f32| libm::exp((f64::from(logit) - largest) / temperature);
+    -largest - temperature * libm::log(logits.iter().map(shifted).sum::<f64>())
 }
 
 /// The index of the largest logit, the first one if several are equal.

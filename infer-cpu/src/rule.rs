@@ -33,7 +33,7 @@ impl Rule {
         let certain = |answer: &&Prediction| !(answer.is_unknown && self.is_known[answer.class]);
         let share = answer.filter(certain).map_or(WEIGHT_OF_UNKNOWN, |answer| {
             let known = (0..self.is_known.len()).filter(|&class| self.is_known[class]);
-            let known: f64 = known.map(|class| answer.log_probability(class).exp()).sum();
+            let known: f64 = known.map(|class| libm::exp(answer.log_probability(class))).sum();
             let own = if answer.is_unknown { 0.0 } else { answer.confidence() };
             own.max(WEIGHT_OF_UNKNOWN * (1.0 - known))
         });

@@ -67,7 +67,7 @@ impl TestTimeAugmentation {
             true => f64::from(vote) / f64::from(self.n) * std::f64::consts::TAU,
             false => 0.0,
         };
-        let (sin, cos) = angle.sin_cos();
+        let (sin, cos) = libm::sincos(angle);
         let [a, b] = self.up.others();
         for (out, point) in out.iter_mut().zip(&self.cloud) {
             *out = *point;
@@ -82,7 +82,7 @@ impl TestTimeAugmentation {
     pub fn count(&mut self, logits: &[f32]) {
         let largest = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
         let shifted = |logit: f32| f64::from(logit) - f64::from(largest);
-        let log_sum = logits.iter().map(|&logit| shifted(logit).exp()).sum::<f64>().ln();
+        let log_sum = libm::log(logits.iter().map(|&logit| libm::exp(shifted(logit))).sum::<f64>());
         for (sum, &logit) in self.sums.iter_mut().zip(logits) {
             *sum += shifted(logit) - log_sum;
         }

@@ -182,7 +182,7 @@ impl Recorded<'_> {
                 DVec3::new(speed_m_s * time_s, 0.0, 0.0)
             } else {
                 let radius_m = speed_m_s / rate_rad_s;
-                DVec3::new(turned_rad.sin(), 1.0 - turned_rad.cos(), 0.0) * radius_m
+                DVec3::new(libm::sin(turned_rad), 1.0 - libm::cos(turned_rad), 0.0) * radius_m
             };
             let seen = DQuat::from_rotation_z(-turned_rad) * (self.seen_from_sensor(i) - gone_m);
             *point = self.in_file(seen);

@@ -23,6 +23,8 @@
 //! `gpu` casts on GPUs and software Vulkan, through wgpu. `simplify` simplifies meshes, which takes
 //! a C++ compiler. `textures` reads reflectivities from images.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod aim;
 mod api;
 mod bvh;

@@ -396,7 +396,7 @@ fn tinted(srgb: [f64; 3], tint: [f64; 3]) -> f64 {
 
 /// Linear light of a part of an sRGB colour: IEC 61966-2-1.
 fn linear(part: f64) -> f64 {
-    if part <= 0.04045 { part / 12.92 } else { ((part + 0.055) / 1.055).powf(2.4) }
+    if part <= 0.04045 { part / 12.92 } else { libm::pow((part + 0.055) / 1.055, 2.4) }
 }
 
 #[cfg(test)]

@@ -113,6 +113,6 @@ impl Motion {
         if sine.is_nan() || sine >= 1.0 {
             return everything;
         }
-        Cone { axis, half_angle_rad: sine.asin() + sensor_rad + ANGLE_MARGIN_RAD }
+        Cone { axis, half_angle_rad: libm::asin(sine) + sensor_rad + ANGLE_MARGIN_RAD }
     }
 }

@@ -128,9 +128,9 @@ impl Pose {
                 "expected finite numbers and a distance that f64 holds",
             ));
         }
-        let level = to_target.x.hypot(to_target.y);
-        let azimuth_rad = if level == 0.0 { 0.0 } else { (-to_target.y).atan2(-to_target.x) };
-        let elevation_rad = (-to_target.z).atan2(level);
+        let level = libm::hypot(to_target.x, to_target.y);
+        let azimuth_rad = if level == 0.0 { 0.0 } else { libm::atan2(-to_target.y, -to_target.x) };
+        let elevation_rad = libm::atan2(-to_target.z, level);
         Ok(Self { position_m, rotation: facing_inwards(elevation_rad, azimuth_rad) })
     }
 
@@ -191,15 +191,15 @@ fn poses(PosesFile { pose }: PosesFile) -> Result<Vec<Pose>, Vec<InvalidValue>> 
 /// The rotation of a sensor at this elevation and azimuth from its target that looks at the target
 /// with a level left axis.
 fn facing_inwards(elevation_rad: f64, azimuth_rad: f64) -> DQuat {
-    let (sin_azimuth, cos_azimuth) = azimuth_rad.sin_cos();
+    let (sin_azimuth, cos_azimuth) = libm::sincos(azimuth_rad);
     let forward = -outwards(elevation_rad, azimuth_rad);
     let left = DVec3::new(sin_azimuth, -cos_azimuth, 0.0);
     DQuat::from_mat3(&DMat3::from_cols(forward, left, forward.cross(left))).normalize()
 }
 
 fn outwards(elevation_rad: f64, azimuth_rad: f64) -> DVec3 {
-    let (sin_elevation, cos_elevation) = elevation_rad.sin_cos();
-    let (sin_azimuth, cos_azimuth) = azimuth_rad.sin_cos();
+    let (sin_elevation, cos_elevation) = libm::sincos(elevation_rad);
+    let (sin_azimuth, cos_azimuth) = libm::sincos(azimuth_rad);
     DVec3::new(cos_elevation * cos_azimuth, cos_elevation * sin_azimuth, sin_elevation)
 }
 

@@ -136,7 +136,7 @@ impl RayFrame {
         if sine.is_nan() || sine >= 1.0 {
             return everything;
         }
-        Cone { axis, half_angle_rad: sine.asin() }
+        Cone { axis, half_angle_rad: libm::asin(sine) }
     }
 
     /// A lower bound of the distance from the start of any of `pattern`'s rays to the object,

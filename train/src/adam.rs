@@ -41,7 +41,7 @@ impl Adam {
 
     fn update(&self, parameter: &mut Parameter, step: u64, rate: f64) {
         let Self { beta1, beta2, epsilon, l2, .. } = *self;
-        let correction = |beta: f64| 1.0 - beta.powf(step as f64);
+        let correction = |beta: f64| 1.0 - libm::pow(beta, step as f64);
         let size = (rate / correction(beta1)) as f32;
         let root = (1.0 / correction(beta2).sqrt()) as f32;
         let [beta1, beta2, epsilon, l2] = [beta1, beta2, epsilon, l2].map(|x| x as f32);

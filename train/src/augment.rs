@@ -186,11 +186,11 @@ fn warp(points: &mut [[f32; 3]], most: f64, draws: &mut Draws) {
         let (mut moved, mut total) = ([0.0; 3], 0.0);
         for (anchor, scale, turn, shift) in &anchors {
             let mut q = [0, 1, 2].map(|k| p[k] - anchor[k]);
-            let weight = (-q.iter().map(|x| x * x).sum::<f64>() / (2.0 * REACH * REACH)).exp();
+            let weight = libm::exp(-q.iter().map(|x| x * x).sum::<f64>() / (2.0 * REACH * REACH));
             q = [0, 1, 2].map(|k| q[k] * (1.0 + scale[k]));
             for (axis, angle) in turn.iter().enumerate() {
                 let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
-                let (sin, cos) = angle.sin_cos();
+                let (sin, cos) = libm::sincos(*angle);
                 (q[a], q[b]) = (cos * q[a] - sin * q[b], sin * q[a] + cos * q[b]);
             }
             (0..3).for_each(|k| moved[k] += weight * (q[k] + anchor[k] + shift[k]));
@@ -225,7 +225,7 @@ fn transform(points: &mut [[f32; 3]], augment: &Augment, draws: &mut Draws) {
         angle = 0.0;
     }
     let [a, b, _] = axes(augment.up);
-    let (sin, cos) = angle.sin_cos();
+    let (sin, cos) = libm::sincos(angle);
     let sensor = (augment.sensor_noise > 0.0).then(|| sensor(augment.up, draws));
     for point in points {
         let mut p = point.map(f64::from);
@@ -256,9 +256,9 @@ fn sensor(up: Axis, draws: &mut Draws) -> [f64; 3] {
     let (elevation, azimuth) = (20f64.to_radians(), draws.between(0.0, std::f64::consts::TAU));
     let [a, b, up] = axes(up);
     let mut sensor = [0.0; 3];
-    sensor[a] = DISTANCE * elevation.cos() * azimuth.cos();
-    sensor[b] = DISTANCE * elevation.cos() * azimuth.sin();
-    sensor[up] = DISTANCE * elevation.sin();
+    sensor[a] = DISTANCE * libm::cos(elevation) * libm::cos(azimuth);
+    sensor[b] = DISTANCE * libm::cos(elevation) * libm::sin(azimuth);
+    sensor[up] = DISTANCE * libm::sin(elevation);
     sensor
 }
 

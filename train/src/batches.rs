@@ -64,7 +64,7 @@ fn order(labels: &[usize], n_classes: usize, epoch: u32, recipe: &Recipe) -> Vec
     } else {
         vec![all.collect()]
     };
-    let weight = |group: &Vec<usize>| (group.len() as f64).powf(1.0 - recipe.balance);
+    let weight = |group: &Vec<usize>| libm::pow(group.len() as f64, 1.0 - recipe.balance);
     let total: f64 = groups.iter().map(weight).sum();
     let size = size(labels.len(), recipe);
     let mut order = Vec::with_capacity(size);

@@ -20,7 +20,7 @@ pub fn temperature(logits: &[Vec<f32>], labels: &[usize]) -> f64 {
         return 1.0;
     }
     let cost = |log: f64| {
-        let t = log.exp();
+        let t = libm::exp(log);
         // -ln p = -logit / t - energy / t.
         let loss = |(logits, &label): (&Vec<f32>, &usize)| {
             -f64::from(logits[label]) / t - energy(logits, t) / t
@@ -28,12 +28,12 @@ pub fn temperature(logits: &[Vec<f32>], labels: &[usize]) -> f64 {
         logits.iter().zip(labels).map(loss).sum::<f64>()
     };
     let share = (5f64.sqrt() - 1.0) / 2.0;
-    let [mut low, mut high] = TEMPERATURES.map(f64::ln);
+    let [mut low, mut high] = TEMPERATURES.map(libm::log);
     for _ in 0..STEPS {
         let [left, right] = [high - share * (high - low), low + share * (high - low)];
         if cost(left) < cost(right) { high = right } else { low = left }
     }
-    low.midpoint(high).exp()
+    libm::exp(low.midpoint(high))
 }
 
 /// The smallest of `energies` that `share` of them do not exceed. `None` if there are no energies.

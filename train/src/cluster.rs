@@ -71,7 +71,8 @@ fn thinned(cluster: &[[f32; 3]], variation: &ClusterVariation, draws: &mut Draws
     if most <= least {
         return cluster.to_vec();
     }
-    let n = draws.between((least as f64).ln(), (most as f64 + 1.0).ln()).exp() as usize;
+    let n =
+        libm::exp(draws.between(libm::log(least as f64), libm::log(most as f64 + 1.0))) as usize;
     let n = n.clamp(least, most);
     let mut points = draws.shuffled(cluster, n);
     points.truncate(n);
@@ -119,7 +120,7 @@ fn add_ground(
     }
     let n = points.len() as f64;
     let middle = [0, 1].map(|axis| points.iter().map(|point| point[axis]).sum::<f64>() / n);
-    let range = middle[0].hypot(middle[1]).max(f64::MIN_POSITIVE);
+    let range = libm::hypot(middle[0], middle[1]).max(f64::MIN_POSITIVE);
     let sight = middle.map(|x| x / range);
     // Along the line of sight, and to its left.
     let turned = |x: f64, y: f64| [sight[0] * x + sight[1] * y, sight[0] * y - sight[1] * x];

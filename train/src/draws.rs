@@ -30,7 +30,7 @@ impl Draws {
     /// Standard normal (Box and Muller 1958).
     pub fn normal(&mut self) -> f64 {
         let (radius, angle) = (1.0 - self.unit(), self.unit());
-        (-2.0 * radius.ln()).sqrt() * (std::f64::consts::TAU * angle).cos()
+        (-2.0 * libm::log(radius)).sqrt() * libm::cos(std::f64::consts::TAU * angle)
     }
 
     /// Swaps points of `cloud` so that the first `n` are a random choice in random order (Fisher

@@ -27,9 +27,9 @@ pub fn draw(points: &[[f32; 3]], found: &Explanation, critical: &[usize]) -> Str
 fn dot(point: &[f32; 3], left: f64, radius: f64, colour: &str, opacity: f64) -> String {
     let [x, y, z] = point.map(f64::from);
     let (azimuth, elevation) = (30f64.to_radians(), 20f64.to_radians());
-    let across = x * azimuth.cos() + y * azimuth.sin();
-    let along = y * azimuth.cos() - x * azimuth.sin();
-    let up = z * elevation.cos() + along * elevation.sin();
+    let across = x * libm::cos(azimuth) + y * libm::sin(azimuth);
+    let along = y * libm::cos(azimuth) - x * libm::sin(azimuth);
+    let up = z * libm::cos(elevation) + along * libm::sin(elevation);
     let scale = 0.42 * SIDE;
     let [x, y] = [left + SIDE / 2.0 + scale * across, SIDE / 2.0 - scale * up];
     format!(

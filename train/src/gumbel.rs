@@ -17,7 +17,7 @@ pub fn top(rows: &[u32], scores: &[f64], keep: usize, stream: StreamKey) -> Vec<
     let perturbed = |(place, (&row, &score)): (usize, (&u32, &f64))| {
         // The draw can be 0, whose logarithm is not finite.
         let draw = stream.unit(place as u64).max(f64::MIN_POSITIVE);
-        (score.ln() - (-draw.ln()).ln(), row)
+        (libm::log(score) - libm::log(-libm::log(draw)), row)
     };
     let mut all: Vec<(f64, u32)> = rows.iter().zip(scores).enumerate().map(perturbed).collect();
     all.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));

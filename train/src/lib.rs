@@ -4,6 +4,7 @@
 //! infer-cpu reads. A training step is a forward and backward pass of [`network::PointNet`], whose
 //! layers compute their own gradients ([`layer`]), and an update by [`adam::Adam`].
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 #![deny(unsafe_code)]
 
 pub mod accuracy_report;

@@ -144,7 +144,7 @@ fn masks(k: usize, lime: &Lime) -> Vec<Vec<bool>> {
 fn weight(mask: &[bool], sigma: f64) -> f64 {
     let remaining = mask.iter().filter(|remains| **remains).count() as f64;
     let distance = 1.0 - (remaining / mask.len() as f64).sqrt();
-    (-(distance / sigma).powi(2)).exp().sqrt()
+    libm::exp(-(distance / sigma).powi(2)).sqrt()
 }
 
 /// Weighted ridge regression with an intercept that is not penalised. Returns the coefficients and

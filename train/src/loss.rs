@@ -46,13 +46,13 @@ pub fn cross_entropy(mut logits: Matrix, targets: &Matrix) -> (Loss, Matrix) {
             let target = target.to_slice().expect("invariant: rows are contiguous");
             let right = argmax(logits) == argmax(target);
             let largest = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-            let sum: f64 = logits.iter().map(|&x| f64::from(x - largest).exp()).sum();
-            let log_sum = sum.ln();
+            let sum: f64 = logits.iter().map(|&x| libm::exp(f64::from(x - largest))).sum();
+            let log_sum = libm::log(sum);
             let mut cost = 0.0;
             for (x, &t) in logits.iter_mut().zip(target) {
                 let log_p = f64::from(*x - largest) - log_sum;
                 cost -= f64::from(t) * log_p;
-                *x = ((log_p.exp() - f64::from(t)) / n) as f32;
+                *x = ((libm::exp(log_p) - f64::from(t)) / n) as f32;
             }
             (cost, right)
         })

@@ -82,7 +82,7 @@ fn patch(draws: &mut Draws) -> Vec<[f64; 3]> {
         if let Some(lines) = lines {
             y = (y * lines).round() / lines;
         }
-        let relief = height * (wave[0] * x + wave[1]).sin() * (wave[1] * y).cos();
+        let relief = height * libm::sin(wave[0] * x + wave[1]) * libm::cos(wave[1] * y);
         points.push([x, width * y, slope * x + relief + roughness * draws.normal()]);
     }
     turned(points.into_iter(), draws)
@@ -113,7 +113,9 @@ fn pair(clouds: &Clouds, draws: &mut Draws) -> Vec<[f64; 3]> {
     let (apart, angle) = (draws.between(1.0, 2.2), draws.between(0.0, std::f64::consts::TAU));
     let scale = draws.between(0.5, 1.0);
     let mut all = Vec::new();
-    for (scale, shift) in [(1.0, [0.0; 2]), (scale, [apart * angle.cos(), apart * angle.sin()])] {
+    for (scale, shift) in
+        [(1.0, [0.0; 2]), (scale, [apart * libm::cos(angle), apart * libm::sin(angle)])]
+    {
         let one = object(clouds, draws);
         let one = turned(one.into_iter().map(|point| point.map(|x| scale * x)), draws);
         let floor = one.iter().fold(f64::INFINITY, |floor, point| floor.min(point[2]));
@@ -139,6 +141,6 @@ fn object(clouds: &Clouds, draws: &mut Draws) -> Vec<[f64; 3]> {
 }
 
 fn turned(points: impl Iterator<Item = [f64; 3]>, draws: &mut Draws) -> Vec<[f64; 3]> {
-    let (sin, cos) = draws.between(0.0, std::f64::consts::TAU).sin_cos();
+    let (sin, cos) = libm::sincos(draws.between(0.0, std::f64::consts::TAU));
     points.map(|[x, y, z]| [cos * x - sin * y, sin * x + cos * y, z]).collect()
 }

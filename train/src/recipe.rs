@@ -211,7 +211,7 @@ impl Schedule {
             Self::Cosine { warm_up, .. } if progress < warm_up => (progress + 0.01) / warm_up,
             Self::Cosine { warm_up, last } => {
                 let done = (progress - warm_up) / (f64::from(epochs) - warm_up).max(1e-9);
-                let half = 0.5 * (1.0 + (std::f64::consts::PI * done.min(1.0)).cos());
+                let half = 0.5 * (1.0 + libm::cos(std::f64::consts::PI * done.min(1.0)));
                 last + (1.0 - last) * half
             }
         }

@@ -30,7 +30,7 @@ impl Teachers {
             for (mut shares, answer) in shares.rows_mut().into_iter().zip(&answers) {
                 let logits = &answer.logits;
                 let largest = logits.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-                let odds = logits.iter().map(|x| (f64::from(x - largest) / temperature).exp());
+                let odds = logits.iter().map(|x| libm::exp(f64::from(x - largest) / temperature));
                 let total = odds.clone().sum::<f64>() * teachers.len() as f64;
                 shares
                     .iter_mut()

@@ -1,8 +1,8 @@
-//! Writes what the native caster finds on the meshes of the tests, for web/test/browser.mjs to compare a
-//! browser with: `traced FOLDER`.
+//! Writes what the native caster finds on the meshes of the tests and on what is built in, and scans of them in
+//! rain and fog, for web/test/browser.mjs to compare a browser with: `traced FOLDER`.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
 use edgepuck_shapes::write_off;
@@ -27,8 +27,10 @@ fn main() -> anyhow::Result<()> {
     for (name, mesh) in meshes {
         write_off(&mesh, &folder.join(format!("{name}.off")))?;
     }
-    let bundled = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/meshes");
-    for entry in fs::read_dir(bundled)?.flat_map(|class| fs::read_dir(class?.path())).flatten() {
+    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets");
+    for entry in
+        fs::read_dir(assets.join("meshes"))?.flat_map(|class| fs::read_dir(class?.path())).flatten()
+    {
         let file = entry?;
         fs::copy(file.path(), folder.join(file.file_name()))?;
     }
@@ -41,28 +43,38 @@ fn main() -> anyhow::Result<()> {
     files.sort();
     let mut simulator =
         pollster::block_on(Simulator::open("cpu")).map_err(|cause| anyhow!(cause))?;
-    for file in files {
+    let built_in = ["car", "person", "tree", "street"].map(PathBuf::from);
+    for file in files.into_iter().chain(built_in) {
         let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        simulator.take_file(&name, &fs::read(&file)?).map_err(|cause| anyhow!(cause))?;
-        for sensor in ["vlp32c", "generic-static"] {
+        let taken = match file.extension() {
+            Some(_) => simulator.take_file(&name, &fs::read(&file)?).map(drop),
+            None => simulator.take_built_in(&name),
+        };
+        taken.map_err(|cause| anyhow!(cause))?;
+        // Weather needs a detection limit, which the second sensor lacks.
+        for (sensor, rain_mm_h, fog_m) in [("vlp32c", 20.0, 80.0), ("generic-static", 0.0, 0.0)] {
             for (distance_m, elevation_deg, azimuth_deg) in PLACES {
+                let returns = (rain_mm_h > 0.0 && distance_m == 5.0).then_some("dual");
                 let settings = serde_json::json!({
                     "sensor": sensor, "distance_m": distance_m, "elevation_deg": elevation_deg,
-                    "azimuth_deg": azimuth_deg, "noise_m": 0.0, "rain_mm_h": 0.0, "fog_m": 0.0,
-                    "returns": null,
+                    "azimuth_deg": azimuth_deg, "noise_m": 0.02, "rain_mm_h": rain_mm_h, "fog_m": fog_m,
+                    "returns": returns,
                 });
                 let traced = pollster::block_on(simulator.trace(&settings.to_string()));
                 let traced = traced.map_err(|cause| anyhow!(cause))?;
-                let case = format!("{}", cases.len());
-                fs::write(
-                    folder.join(format!("{case}.codes")),
-                    le(&traced.codes, |code| code.to_le_bytes()),
-                )?;
-                fs::write(
-                    folder.join(format!("{case}.ranges")),
-                    le(&traced.ranges, |range| range.to_le_bytes()),
-                )?;
-                cases.push(serde_json::json!({ "case": case, "file": name, "settings": settings }));
+                let scan = pollster::block_on(simulator.scan(&settings.to_string()));
+                let scan = scan.map_err(|cause| anyhow!(cause))?;
+                let case = cases.len().to_string();
+                let write =
+                    |ending, bytes| fs::write(folder.join(format!("{case}.{ending}")), bytes);
+                write("codes", le(&traced.codes, |code| code.to_le_bytes()))?;
+                write("ranges", le(&traced.ranges, |range| range.to_le_bytes()))?;
+                let columns = [scan.positions, scan.range, scan.intensity].concat();
+                write("scan", le(&columns, |number| number.to_le_bytes()))?;
+                cases.push(serde_json::json!({
+                    "case": case, "subject": name, "is_file": file.extension().is_some(),
+                    "settings": settings,
+                }));
             }
         }
     }

@@ -205,7 +205,7 @@ fn add_sweep(sweep: &Scan, number: u32, rings: &mut Vec<Vec<Firing>>) -> anyhow:
         if !(range_m > 0.0 && range_m.is_finite() && beam.is_finite()) {
             continue;
         }
-        let azimuth = (-beam.y.atan2(beam.x) / std::f64::consts::TAU).rem_euclid(1.0);
+        let azimuth = (-libm::atan2(beam.y, beam.x) / std::f64::consts::TAU).rem_euclid(1.0);
         let brightness = sweep.intensity.as_ref().map(|all| all[i]);
         let reflectivity = sweep.reflectivity.as_ref().map(|all| f32::from(all[i]) / 100.0);
         push(
@@ -219,9 +219,9 @@ fn add_sweep(sweep: &Scan, number: u32, rings: &mut Vec<Vec<Firing>>) -> anyhow:
                 piece: number,
             },
         );
-        let flat = beam.x.hypot(beam.y);
+        let flat = libm::hypot(beam.x, beam.y);
         elevations_deg.resize_with(elevations_deg.len().max(usize::from(ring) + 1), Vec::new);
-        elevations_deg[usize::from(ring)].push(beam.z.atan2(flat).to_degrees());
+        elevations_deg[usize::from(ring)].push(libm::atan2(beam.z, flat).to_degrees());
     }
     let middle = |angles: &mut Vec<f64>| {
         let enough = median(angles).filter(|_| angles.len() >= LEAST_RETURNS);

@@ -61,7 +61,7 @@ pub fn text(found: &Figures, recording: &Recording, out: &Path) -> String {
 fn shown(found: &Estimate, scale: f64) -> String {
     let half = 0.5 * (found.high - found.low) * scale;
     let decimals =
-        if half > 0.0 { (1.0 - half.log10().floor()).clamp(0.0, 6.0) as usize } else { 4 };
+        if half > 0.0 { (1.0 - libm::log10(half).floor()).clamp(0.0, 6.0) as usize } else { 4 };
     let number = |value: f64| {
         let text = format!("{:.decimals$}", value * scale);
         match text.contains('.') {

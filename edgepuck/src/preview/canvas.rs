@@ -56,7 +56,7 @@ pub fn metres(value: f64, step: f64) -> String {
     if !(1e-3..1e5).contains(&step) {
         return format!("{value:.1e}");
     }
-    let decimals = (-step.log10().floor()).max(0.0) as usize;
+    let decimals = (-libm::log10(step).floor()).max(0.0) as usize;
     // What would be written as -0 is 0.
     let value = if value.abs() < step * 1e-6 { 0.0 } else { value };
     format!("{value:.decimals$}")

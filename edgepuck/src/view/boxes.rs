@@ -97,5 +97,5 @@ fn seen_from(pose: Pose, placed: Placed) -> Placed {
     let middle = DVec3::from(placed.centre) + 0.5 * placed.size[2] * DVec3::Z;
     let ahead = back * (DQuat::from_rotation_z(placed.yaw) * DVec3::X);
     let centre = (back * (middle - pose.position_m)).to_array();
-    Placed { centre, yaw: ahead.y.atan2(ahead.x), truth: true, ..placed }
+    Placed { centre, yaw: libm::atan2(ahead.y, ahead.x), truth: true, ..placed }
 }

@@ -224,12 +224,12 @@ fn are_in_rings(points: impl Iterator<Item = [f64; 3]>) -> bool {
     let (mut counts, mut sectors, mut n) = (vec![0u32; n_bins], 0u64, 0u32);
     let mut ranges = vec![[f64::INFINITY, 0.0]; n_bins];
     for [x, y, z] in points.filter(|point| length(*point) > 0.0) {
-        let elevation_deg = z.atan2(x.hypot(y)).to_degrees() + 90.0;
+        let elevation_deg = libm::atan2(z, libm::hypot(x, y)).to_degrees() + 90.0;
         let bin = ((elevation_deg * BINS_A_DEGREE as f64) as usize).min(n_bins - 1);
         let (range, [nearest, farthest]) = (length([x, y, z]), ranges[bin]);
         ranges[bin] = [range.min(nearest), range.max(farthest)];
         counts[bin] += 1;
-        sectors |= 1 << (((y.atan2(x).to_degrees() + 180.0) / 10.0) as u32 % 36);
+        sectors |= 1 << (((libm::atan2(y, x).to_degrees() + 180.0) / 10.0) as u32 % 36);
         n += 1;
     }
     let is_peak = |bin: &usize| {

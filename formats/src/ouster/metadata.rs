@@ -177,7 +177,7 @@ impl Metadata {
     /// Rotation of the lidar frame in the sensor's frame about z, radians counterclockwise.
     #[must_use]
     pub fn yaw_rad(&self) -> f64 {
-        self.lidar_to_sensor[1][0].atan2(self.lidar_to_sensor[0][0])
+        libm::atan2(self.lidar_to_sensor[1][0], self.lidar_to_sensor[0][0])
     }
 }
 

@@ -263,7 +263,7 @@ impl Decoder {
     fn sensor_from_column(&self, measurement: usize) -> [[f64; 4]; 3] {
         let turns = measurement as f64 / f64::from(self.metadata.columns_per_frame);
         // The head turns clockwise.
-        let (sin, cos) = (-std::f64::consts::TAU * turns).sin_cos();
+        let (sin, cos) = libm::sincos(-std::f64::consts::TAU * turns);
         self.metadata
             .lidar_to_sensor
             .map(|[x, y, z, shift]| [x * cos + y * sin, y * cos - x * sin, z, shift])
@@ -273,7 +273,7 @@ impl Decoder {
     fn point(&self, pose: &[[f64; 4]; 3], beam: &Beam, range: f64) -> [f64; 3] {
         let [x, z] = self.metadata.origin_m;
         // The sensor reports ranges from the origin of the lidar frame.
-        let along = range - if z == 0.0 { x } else { x.hypot(z) };
+        let along = range - if z == 0.0 { x } else { libm::hypot(x, z) };
         let [dx, dy, dz] = beam.direction.map(|component| along * component);
         pose.map(|row| row[0] * (dx + x) + row[1] * dy + row[2] * (dz + z) + row[3])
     }
@@ -281,8 +281,8 @@ impl Decoder {
 
 impl Beam {
     fn new([altitude, azimuth]: [f64; 2]) -> Self {
-        let (sin_altitude, flat) = altitude.to_radians().sin_cos();
-        let (sin, cos) = azimuth.to_radians().sin_cos();
+        let (sin_altitude, flat) = libm::sincos(altitude.to_radians());
+        let (sin, cos) = libm::sincos(azimuth.to_radians());
         Self { ring: 0, direction: [flat * cos, -flat * sin, sin_altitude] }
     }
 }

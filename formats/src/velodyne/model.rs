@@ -122,9 +122,9 @@ impl Model {
         let laser = |(number, &[offset, elevation]): (usize, &[f64; 2])| Laser {
             ring: angles_deg.iter().filter(|[_, other]| *other < elevation).count() as u16,
             azimuth_offset: offset.to_radians(),
-            sin_elevation: elevation.to_radians().sin(),
-            cos_elevation: elevation.to_radians().cos(),
-            drop_m: crossing_m * elevation.to_radians().tan(),
+            sin_elevation: libm::sin(elevation.to_radians()),
+            cos_elevation: libm::cos(elevation.to_radians()),
+            drop_m: crossing_m * libm::tan(elevation.to_radians()),
             fires_us: (number / at_once) as f64 * FIRING_US,
         };
         angles_deg.iter().enumerate().map(laser).collect()

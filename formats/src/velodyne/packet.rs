@@ -125,7 +125,8 @@ impl Decoder {
     /// The elevations of its lasers by ring, ascending, radians.
     #[must_use]
     pub fn elevations_rad(&self) -> Vec<f32> {
-        let elevation = |laser: &Laser| laser.sin_elevation.atan2(laser.cos_elevation) as f32;
+        let elevation =
+            |laser: &Laser| libm::atan2(laser.sin_elevation, laser.cos_elevation) as f32;
         let mut elevations: Vec<_> = self.lasers.iter().map(elevation).collect();
         elevations.sort_by(f32::total_cmp);
         elevations
@@ -180,7 +181,7 @@ impl Decoder {
 
 impl Laser {
     fn hit(&self, angle: f64, range: f64, reflectivity: u8, after_us: f64, kind: Kind) -> Return {
-        let (sin, cos) = angle.sin_cos();
+        let (sin, cos) = libm::sincos(angle);
         let flat = range * self.cos_elevation;
         // Azimuths grow clockwise.
         let point = [flat * cos, -flat * sin, range * self.sin_elevation - self.drop_m];

@@ -11,6 +11,8 @@
 //! assert_eq!(TFMessage::default().to_cdr(), [0, 1, 0, 0, 0, 0, 0, 0]);
 //! ```
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod definitions;
 mod messages;
 mod objects;

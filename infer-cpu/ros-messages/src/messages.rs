@@ -172,7 +172,7 @@ impl Quaternion {
     /// A rotation about z, degrees counterclockwise.
     #[must_use]
     pub fn from_yaw_deg(yaw_deg: f64) -> Self {
-        let (z, w) = (yaw_deg.to_radians() / 2.0).sin_cos();
+        let (z, w) = libm::sincos(yaw_deg.to_radians() / 2.0);
         Self { x: 0.0, y: 0.0, z, w }
     }
 }

@@ -34,7 +34,7 @@ pub fn doubtful_axes(points: &[[f32; 3]]) -> Option<String> {
     }
     let up = (0..3).rev().min_by(|&a, &b| squares[a].total_cmp(&squares[b]))?;
     let sign = if below[up] < 0 { -1.0 } else { 1.0 };
-    let is_far = |point: &&[f32; 3]| point[0].hypot(point[1]) > INDOORS_M;
+    let is_far = |point: &&[f32; 3]| libm::hypotf(point[0], point[1]) > INDOORS_M;
     if up == 2 && (sign > 0.0 || 100 * returns().filter(is_far).count() < returns().count()) {
         return None;
     }
@@ -44,7 +44,7 @@ pub fn doubtful_axes(points: &[[f32; 3]]) -> Option<String> {
         [ahead, sign * aside, sign * point[up]]
     };
     let turned: Vec<_> = points.iter().map(turned).collect();
-    let sector = |[x, y, _]: &[f32; 3]| (y.atan2(*x).to_degrees() + 180.0) / 10.0;
+    let sector = |[x, y, _]: &[f32; 3]| (libm::atan2f(*y, *x).to_degrees() + 180.0) / 10.0;
     let sectors = turned.iter().fold(0u64, |seen, point| seen | 1 << sector(point) as u32);
     if sectors.count_ones() < FEWEST_SECTORS {
         return None;

@@ -37,7 +37,7 @@ struct Anchor {
 impl GroundFinder {
     /// Fills `grid` with the ground of `image`.
     pub fn find(&mut self, image: &impl Columns, settings: &Settings, grid: &mut HeightGrid) {
-        let slope = f64::from(settings.max_ground_slope_deg).to_radians().tan() as f32;
+        let slope = libm::tan(f64::from(settings.max_ground_slope_deg).to_radians()) as f32;
         // The plane helps to find the ground, and the ground determines the plane: a quarter of the
         // sectors gives a first estimate of the plane.
         let level = self.level_under_sensor(image);

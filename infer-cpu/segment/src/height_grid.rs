@@ -199,7 +199,7 @@ impl HeightGrid {
 
     /// The ground's z at `(x, y)`, if it is known.
     pub fn z_m(&self, x: f32, y: f32) -> Option<f32> {
-        let range_m = x.hypot(y);
+        let range_m = libm::hypotf(x, y);
         if self.cells.is_empty() || !range_m.is_finite() {
             return None;
         }

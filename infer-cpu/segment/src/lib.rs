@@ -20,6 +20,8 @@
 //! by steps of several widths, to a [`Hierarchy`], and a [`Stream`] does so for returns as they
 //! arrive. Clouds without the structure of a scan are cut into connected components instead.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod angle;
 mod axes;
 mod components;

@@ -145,13 +145,13 @@ impl Rectangle {
 
 /// The horizontal coordinates of a point with these along axes turned by `angle_rad`.
 fn unturned([along, across]: [f32; 2], angle_rad: f32) -> [f32; 2] {
-    let (sin, cos) = angle_rad.sin_cos();
+    let (sin, cos) = libm::sincosf(angle_rad);
     [cos * along - sin * across, sin * along + cos * across]
 }
 
 /// A point's horizontal coordinates along axes turned by `angle_rad`.
 fn turned(&[x, y, _]: &[f32; 3], angle_rad: f32) -> [f32; 2] {
-    let (sin, cos) = angle_rad.sin_cos();
+    let (sin, cos) = libm::sincosf(angle_rad);
     [cos * x + sin * y, cos * y - sin * x]
 }
 

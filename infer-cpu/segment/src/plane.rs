@@ -42,7 +42,7 @@ impl Plane {
             }
         }
         let [base, x, y] = plane;
-        if x.hypot(y) > f64::from(STEEPEST) {
+        if libm::hypot(x, y) > f64::from(STEEPEST) {
             return level;
         }
         Self { base: base as f32, slope: [x as f32, y as f32] }

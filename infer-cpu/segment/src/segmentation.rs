@@ -154,7 +154,7 @@ impl Extent {
     }
 
     pub fn diagonal_m(&self) -> f32 {
-        (self.high[0] - self.low[0]).hypot(self.high[1] - self.low[1])
+        libm::hypotf(self.high[0] - self.low[0], self.high[1] - self.low[1])
     }
 
     pub fn middle(&self) -> [f32; 2] {

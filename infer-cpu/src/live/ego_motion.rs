@@ -149,7 +149,7 @@ fn moved(linear_m_s: DVec3, angular_rad_s: DVec3, time_s: f64) -> Pose {
     let (a, b) = if angle < 1e-6 {
         (0.5, 1.0 / 6.0)
     } else {
-        ((1.0 - angle.cos()) / angle.powi(2), (angle - angle.sin()) / angle.powi(3))
+        ((1.0 - libm::cos(angle)) / angle.powi(2), (angle - libm::sin(angle)) / angle.powi(3))
     };
     let turned = w.cross(v);
     Pose {

@@ -54,7 +54,7 @@ impl Footprint {
     pub fn middle(&self, seen: &Observation<'_>) -> [f64; 3] {
         let (sides, yaw_rad) = self.sides_of(seen);
         let mut middle = seen.position_m;
-        let (sin, cos) = yaw_rad.sin_cos();
+        let (sin, cos) = libm::sincos(yaw_rad);
         for (i, [x, y]) in [[cos, sin], [-sin, cos]].into_iter().enumerate() {
             let hidden_m = (self.sides_m[i] - sides[i]).clamp(0.0, MOST_HIDDEN_M);
             let [dx, dy] = [0, 1].map(|axis| seen.position_m[axis] - seen.sensor_m[axis]);

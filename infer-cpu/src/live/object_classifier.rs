@@ -133,7 +133,7 @@ impl ObjectClassifier {
     /// a view.
     pub fn fused(&self, means: &[f64], energy: f64) -> Option<Fused> {
         let (class, largest) = means.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
-        let sum: f64 = means.iter().map(|mean| (mean - largest).exp()).sum();
+        let sum: f64 = means.iter().map(|mean| libm::exp(mean - largest)).sum();
         let answer = match self.unknown.holds(class, energy) {
             true => Arc::clone(&self.unknown_name),
             false => Arc::clone(&self.classes[class]),

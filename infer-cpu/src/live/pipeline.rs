@@ -330,7 +330,7 @@ impl Pipeline {
                 resembles: fused
                     .as_ref()
                     .map(|fused| Arc::clone(&self.classifiers.classes[fused.class])),
-                confidence: confidence.map(|((view, _), fused)| view[fused.class].exp()),
+                confidence: confidence.map(|((view, _), fused)| libm::exp(view[fused.class])),
                 probability: fused.as_ref().map(|fused| fused.probability),
                 frame: if pose.is_some() { "world" } else { "sensor" },
                 position_m: place.centre_m,
@@ -338,7 +338,7 @@ impl Pipeline {
                 yaw_deg: place.yaw_deg,
                 velocity_m_s: track.velocity_m_s(),
                 points: points.len(),
-                range_m: f64::from(seen.centre_m[0].hypot(seen.centre_m[1])),
+                range_m: f64::from(libm::hypotf(seen.centre_m[0], seen.centre_m[1])),
                 first_s: first.time_s,
                 last_s: last.time_s,
                 latency_ms: latency.map(|latency| latency.as_secs_f64() * 1e3),
@@ -442,9 +442,9 @@ fn placed(seen: &OrientedBox, pose: Option<Pose>) -> PlacedBox {
     let Some(pose) = pose else {
         return PlacedBox { centre_m, size_m, yaw_deg: f64::from(yaw_rad.to_degrees()) };
     };
-    let (sin, cos) = f64::from(yaw_rad).sin_cos();
+    let (sin, cos) = libm::sincos(f64::from(yaw_rad));
     let along = pose.world_from_sensor * DVec3::new(cos, sin, 0.0);
-    let yaw_deg = (along.y / along.x).atan().to_degrees();
+    let yaw_deg = libm::atan(along.y / along.x).to_degrees();
     PlacedBox { centre_m: pose.to_world(centre_m.into()).to_array(), size_m, yaw_deg }
 }
 

@@ -85,7 +85,7 @@ impl Track {
             let axis = axis.after(dt, ACCELERATION_M_S2[i]);
             let variance = axis.variance(sigma);
             distance += (middle[i] - axis.place).powi(2) / variance;
-            logarithm += variance.ln();
+            logarithm += libm::log(variance);
         }
         (distance <= GATE).then_some(distance + logarithm + self.footprint.mismatch(seen))
     }

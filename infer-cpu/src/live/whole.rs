@@ -50,17 +50,17 @@ impl Whole {
         let [size_weight, turn_weight] = [LEAST_SIZE_WEIGHT, LEAST_TURN_WEIGHT].map(weight);
         let turn_weight = if n_before > 0 { turn_weight.min(MOST_TURN_WEIGHT) } else { 1.0 };
         let seen_rad = seen.yaw_deg.to_radians();
-        let (sin, cos) = (2.0 * seen_rad).sin_cos();
+        let (sin, cos) = libm::sincos(2.0 * seen_rad);
         for (mean, new) in self.twice.iter_mut().zip([cos, sin]) {
             *mean += turn_weight * (new - *mean);
         }
-        let axis_rad = 0.5 * self.twice[1].atan2(self.twice[0]);
-        let fast = velocity_m_s.filter(|[x, y, _]| x.hypot(*y) > FAST_M_S);
-        let ahead_rad = fast.map_or(self.yaw_rad, |[x, y, _]| y.atan2(x));
-        let is_rear = (axis_rad - ahead_rad).cos() < 0.0;
+        let axis_rad = 0.5 * libm::atan2(self.twice[1], self.twice[0]);
+        let fast = velocity_m_s.filter(|&[x, y, _]| libm::hypot(x, y) > FAST_M_S);
+        let ahead_rad = fast.map_or(self.yaw_rad, |[x, y, _]| libm::atan2(y, x));
+        let is_rear = libm::cos(axis_rad - ahead_rad) < 0.0;
         self.yaw_rad = if is_rear { axis_rad - PI.copysign(axis_rad) } else { axis_rad };
         let [length_m, width_m, height_m] = seen.size_m;
-        let size_m = match (seen_rad - self.yaw_rad).sin().abs() < FRAC_1_SQRT_2 {
+        let size_m = match libm::sin(seen_rad - self.yaw_rad).abs() < FRAC_1_SQRT_2 {
             true => [length_m, width_m, height_m],
             false => [width_m, length_m, height_m],
         };
@@ -71,7 +71,7 @@ impl Whole {
         }
         // The near sides stay where they were seen.
         self.centre_m = seen.centre_m;
-        let (sin, cos) = self.yaw_rad.sin_cos();
+        let (sin, cos) = libm::sincos(self.yaw_rad);
         let [dx, dy] = [0, 1].map(|axis| seen.centre_m[axis] - sensor_m[axis]);
         for (side, [x, y]) in [[cos, sin], [-sin, cos]].into_iter().enumerate() {
             let away_m = 0.5 * (self.size_m[side] - size_m[side]) * (dx * x + dy * y).signum();
@@ -91,7 +91,7 @@ impl Whole {
     /// by `by_m`.
     pub fn holds(&self, position_m: [f64; 3], length_m: f64, by_m: [f64; 3]) -> bool {
         let [dx, dy, dz] = [0, 1, 2].map(|i| position_m[i] - self.centre_m[i] - by_m[i]);
-        let (sin, cos) = self.yaw_rad.sin_cos();
+        let (sin, cos) = libm::sincos(self.yaw_rad);
         let off_m = [cos * dx + sin * dy, cos * dy - sin * dx, dz];
         let is_near = |(off, size): (f64, f64)| off.abs() <= MARGIN_M + (0.5 + MARGIN_SHARE) * size;
         let fits = length_m <= 2.0 * MARGIN_M + (1.0 + 2.0 * MARGIN_SHARE) * self.size_m[0];

@@ -36,7 +36,7 @@ impl DrawnScene {
 
     fn level_from_world(&self) -> DQuat {
         let ahead = self.pose.rotation * DVec3::X;
-        DQuat::from_rotation_z(-ahead.y.atan2(ahead.x))
+        DQuat::from_rotation_z(-libm::atan2(ahead.y, ahead.x))
     }
 }
 
@@ -62,7 +62,7 @@ impl Stage {
                 object,
                 centre_m: level_from_world * (base_m + 0.5 * size_m.z * DVec3::Z),
                 size_m,
-                yaw_rad: heading.y.atan2(heading.x),
+                yaw_rad: libm::atan2(heading.y, heading.x),
                 n_points,
                 visible: f64::from(n_points) / f64::from(alone.max(n_points)),
             })

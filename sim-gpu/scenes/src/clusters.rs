@@ -73,7 +73,7 @@ pub fn label_clusters(
 
 fn range_and_lowest(points: &[[f32; 3]], chosen: &[u32]) -> (f32, f32) {
     let chosen = chosen.iter().map(|&i| points[i as usize]);
-    let sum_m: f64 = chosen.clone().map(|[x, y, _]| f64::from(x.hypot(y))).sum();
+    let sum_m: f64 = chosen.clone().map(|[x, y, _]| f64::from(libm::hypotf(x, y))).sum();
     let lowest_m = chosen.clone().map(|[.., z]| z).fold(f32::INFINITY, f32::min);
     ((sum_m / chosen.len().max(1) as f64) as f32, lowest_m)
 }

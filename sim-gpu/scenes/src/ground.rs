@@ -45,7 +45,7 @@ impl Ground {
         stream: StreamKey,
     ) -> Self {
         let mut within = |span: recipe::Span| span.at(s.uniform(0.0, 1.0));
-        let steepness = within(recipe.slope_deg).to_radians().tan();
+        let steepness = libm::tan(within(recipe.slope_deg).to_radians());
         let [roughness_m, width_m, kerb_m] =
             [recipe.roughness_m, recipe.road_width_m, recipe.kerb_m].map(&mut within);
         let slope = DVec2::from_angle(s.uniform(0.0, std::f64::consts::TAU)) * steepness;

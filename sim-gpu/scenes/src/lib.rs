@@ -11,6 +11,8 @@
 //! The same recipe, seed and number give the same scene, sweep and clusters on every machine,
 //! with any number of threads.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod boxes;
 mod clusters;
 mod drive;

@@ -209,7 +209,7 @@ impl Span {
     /// The value at `share` of the range on a logarithmic scale.
     #[must_use]
     pub fn at_log(self, share: f64) -> f64 {
-        self.least * (self.most / self.least).powf(share)
+        self.least * libm::pow(self.most / self.least, share)
     }
 
     fn check(self, key: &str, least: f64, most: f64) -> Result<(), InvalidValue> {

@@ -93,7 +93,7 @@ pub(crate) fn draw_mount(stage: &Stage, s: &mut Sampler) -> Pose {
     let height_m = mount.height_m.at(s.uniform(0.0, 1.0));
     let tilt_rad = mount.tilt_deg.at(s.uniform(0.0, 1.0)).to_radians();
     let towards_rad = s.uniform(0.0, TAU);
-    let tilt_axis = DVec3::new(towards_rad.cos(), towards_rad.sin(), 0.0);
+    let tilt_axis = DVec3::new(libm::cos(towards_rad), libm::sin(towards_rad), 0.0);
     let tilt = DQuat::from_axis_angle(tilt_axis, tilt_rad);
     Pose { position_m: DVec3::new(0.0, 0.0, height_m), rotation: tilt }
 }

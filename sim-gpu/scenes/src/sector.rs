@@ -22,7 +22,7 @@ impl Sector {
         let centre_m = centre_m.truncate();
         let share = radius_m / centre_m.length();
         // The margin of a nanoradian is far above the rounding of f64.
-        let widest_rad = self.half_rad + share.min(1.0).asin() + 1e-9;
+        let widest_rad = self.half_rad + libm::asin(share.min(1.0)) + 1e-9;
         share >= 1.0 || self.middle.angle_to(centre_m).abs() <= widest_rad
     }
 }

@@ -41,7 +41,7 @@ impl Sway {
         let [pitch_rad, roll_rad] = self.phases_rad.map(|phases_rad| {
             let waves = SPECTRUM.iter().zip(phases_rad).map(|((hz, share), phase_rad)| {
                 // The variance of a sine is half the square of its amplitude.
-                (2.0 * share).sqrt() * (TAU * hz * time_s + phase_rad).sin()
+                (2.0 * share).sqrt() * libm::sin(TAU * hz * time_s + phase_rad)
             });
             self.sigma_rad * waves.sum::<f64>()
         });

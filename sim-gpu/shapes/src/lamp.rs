@@ -129,8 +129,8 @@ fn desk_lamp(b: &mut Builder, s: &mut Sampler) {
         block(b, 0.04 * arm_m * DVec3::Z, DVec3::new(1.6 * foot_m, 1.6 * foot_m, 0.08 * arm_m));
     }
     let shoulder = 0.06 * arm_m * DVec3::Z;
-    let elbow = shoulder + arm_m * DVec3::new(0.0, back_rad.sin(), back_rad.cos());
-    let over = DVec3::new(0.0, -over_rad.cos(), over_rad.sin());
+    let elbow = shoulder + arm_m * DVec3::new(0.0, libm::sin(back_rad), libm::cos(back_rad));
+    let over = DVec3::new(0.0, -libm::cos(over_rad), libm::sin(over_rad));
     let wrist = elbow + arm_m * s.uniform(0.7, 1.05) * over;
     let twin = s.chance(0.5);
     for side in if twin { vec![-1.0, 1.0] } else { vec![0.0] } {
@@ -154,7 +154,7 @@ fn gooseneck(b: &mut Builder, s: &mut Sampler) {
     let foot_m = 0.12 * height_m + 0.04;
     let mut points = vec![DVec3::ZERO, 0.5 * (height_m - bend_m) * DVec3::Z];
     for k in 0..5 {
-        let (sin, cos) = (k as f64 / 4.0 * 0.85 * PI).sin_cos();
+        let (sin, cos) = libm::sincos(k as f64 / 4.0 * 0.85 * PI);
         points.push(DVec3::new(0.0, -bend_m * (1.0 - cos), height_m - bend_m + bend_m * sin));
     }
     smooth_tube(b, &points, 2, 0.012 * height_m + 0.003);

@@ -7,6 +7,8 @@
 //! that are shared or not. The proportions of the classes overlap (a wide vase is a bowl), so that
 //! a classifier must learn shapes instead of sizes.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+
 mod airplane;
 mod bottle;
 mod bowl;

@@ -144,7 +144,7 @@ fn pair(b: &mut Builder, s: &mut Sampler) {
     let turn_rad = s.uniform(0.05, 0.35);
     let middle_m = gap_m + 0.5 * screen.height_m;
     for side in [-1.0, 1.0] {
-        let y = side * 0.52 * screen.width_m * turn_rad.cos();
+        let y = side * 0.52 * screen.width_m * libm::cos(turn_rad);
         let turn = DAffine3::from_rotation_z(-side * turn_rad);
         b.turned(DVec3::new(0.0, y, middle_m), turn, |b| screen.build(b, s));
     }

@@ -29,7 +29,7 @@ impl Sampler {
 
     /// A number in `low..high` whose logarithm is uniform; both above 0.
     pub fn log_uniform(&mut self, low: f64, high: f64) -> f64 {
-        self.uniform(low.ln(), high.ln()).exp()
+        libm::exp(self.uniform(libm::log(low), libm::log(high)))
     }
 
     /// True with probability `p`.

@@ -34,8 +34,8 @@ pub fn capsule(radius_m: f64, length_m: f64) -> TriangleMesh {
     let quarter = n / 4;
     let point = |i: usize, z: f64| {
         let angle = TAU * i as f64 / n as f64;
-        let r = if i.is_multiple_of(2 * quarter) { 0.0 } else { radius_m * angle.sin() };
-        (r, z - radius_m * angle.cos())
+        let r = if i.is_multiple_of(2 * quarter) { 0.0 } else { radius_m * libm::sin(angle) };
+        (r, z - radius_m * libm::cos(angle))
     };
     let lower = (0..=quarter).map(|i| point(i, -0.5 * length_m));
     let from = if length_m > 0.0 { quarter } else { quarter + 1 };
@@ -46,7 +46,7 @@ pub fn capsule(radius_m: f64, length_m: f64) -> TriangleMesh {
 /// The sides of a circle, a multiple of four. Of a sphere with as many in all directions, the middle of
 /// a side is `radius (1 - cos^2(pi / n))` inside at most.
 fn segments(radius_m: f64) -> usize {
-    let half = (BOUND_M / radius_m).sqrt().min(1.0).asin();
+    let half = libm::asin((BOUND_M / radius_m).sqrt().min(1.0));
     ((PI / half).ceil() as usize).clamp(16, 4096).next_multiple_of(4)
 }
 
@@ -58,7 +58,7 @@ fn turned(profile: &[(f64, f64)], n: usize) -> TriangleMesh {
         let first = mesh.vertices.len() as u32;
         let n_points = if radius == 0.0 { 1 } else { n };
         mesh.vertices.extend((0..n_points).map(|i| {
-            let (sin, cos) = (TAU * i as f64 / n as f64).sin_cos();
+            let (sin, cos) = libm::sincos(TAU * i as f64 / n as f64);
             DVec3::new(radius * cos, radius * sin, z)
         }));
         rings.push((first, n_points as u32));

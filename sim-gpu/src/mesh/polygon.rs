@@ -56,7 +56,8 @@ pub(super) fn cut(mut corners: Vec<DVec3>) -> Cut {
     let is_uneven = thickness > FLATNESS * size;
 
     let is_turned_right = |part: &DVec3| part.dot(normal) >= -ROUNDING * area.length();
-    let angles = fan(&corners).zip(&areas).map(|([_, a, b], area)| area.length().atan2(a.dot(b)));
+    let angles =
+        fan(&corners).zip(&areas).map(|([_, a, b], area)| libm::atan2(area.length(), a.dot(b)));
     if areas.iter().all(is_turned_right) && angles.sum::<f64>() < TAU + ROUNDING {
         return Cut { is_uneven, ..Cut::default() };
     }

@@ -36,7 +36,7 @@ pub(super) fn coherent_order(directions: &[DVec3]) -> Vec<u32> {
 }
 
 fn azimuth_elevation_rad(direction: &DVec3) -> [f64; 2] {
-    [direction.y.atan2(direction.x), direction.z.clamp(-1.0, 1.0).asin()]
+    [libm::atan2(direction.y, direction.x), libm::asin(direction.z.clamp(-1.0, 1.0))]
 }
 
 /// The cell at this part, 0 to 1, of the side of a square.

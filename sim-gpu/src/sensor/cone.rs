@@ -42,7 +42,7 @@ impl Cone {
         let half_angle_rad = self.half_angle_rad + ANGLE_MARGIN_RAD;
         let is_part = half_angle_rad < PI && self.axis.is_finite();
         is_part.then(|| {
-            let (sin, cos) = half_angle_rad.max(0.0).sin_cos();
+            let (sin, cos) = libm::sincos(half_angle_rad.max(0.0));
             WidenedCone { axis: self.axis, cos, sin, threshold: cos - COSINE_MARGIN }
         })
     }

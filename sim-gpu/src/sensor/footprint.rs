@@ -46,7 +46,7 @@ pub(super) fn rays_of(
 ) -> impl Iterator<Item = DVec3> {
     let across = DVec3::Z.cross(direction).try_normalize().unwrap_or(DVec3::Y);
     let up = direction.cross(across);
-    let [wide, high] = divergence_deg.map(|full_deg| (full_deg.to_radians() / 2.0).tan());
+    let [wide, high] = divergence_deg.map(|full_deg| libm::tan(full_deg.to_radians() / 2.0));
     disc.iter().map(move |&[x, y]| match [x, y] {
         // Not normalized again, so that the axis equals the beam of a sensor without width.
         [0.0, 0.0] => direction,
@@ -79,7 +79,7 @@ pub(super) fn disc(samples: u32) -> Vec<[f64; 2]> {
         let turn = f64::from(ring % 2) / 4.0;
         points.extend((0..count).map(|i| {
             let angle_rad = TAU * (f64::from(i) + turn) / f64::from(count);
-            [radius * angle_rad.cos(), radius * angle_rad.sin()]
+            [radius * libm::cos(angle_rad), radius * libm::sin(angle_rad)]
         }));
         inner = outer;
     }
@@ -90,7 +90,7 @@ pub(super) fn disc(samples: u32) -> Vec<[f64; 2]> {
 /// The integral of `t exp(-t)` to infinity from the radius that encloses `power`.
 fn moment(power: f64) -> f64 {
     let rest = 1.0 - power;
-    if rest <= f64::EPSILON { 0.0 } else { rest * (1.0 - rest.ln()) }
+    if rest <= f64::EPSILON { 0.0 } else { rest * (1.0 - libm::log(rest)) }
 }
 
 #[cfg(test)]

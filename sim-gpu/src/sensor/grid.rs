@@ -99,7 +99,7 @@ impl Grid {
         let optics = self.optics().expect("invariant: validated");
         match optics {
             Optics::FieldOfView { x_deg, y_deg } => {
-                let edge = |fov_deg: f64| (fov_deg.to_radians() / 2.0).tan();
+                let edge = |fov_deg: f64| libm::tan(fov_deg.to_radians() / 2.0);
                 let across = |edge: f64, n: u32| linear_steps(edge, -edge, n).collect();
                 (across(edge(x_deg), self.width), across(edge(y_deg), self.height))
             }

@@ -33,8 +33,8 @@ impl Rings {
             return None;
         }
         let polar_rad = first_polar_rad + (ring + 0.5) * step_rad;
-        let (sin_polar, cos_polar) = polar_rad.sin_cos();
-        let (sin_azimuth, cos_azimuth) = direction.y.atan2(direction.x).sin_cos();
+        let (sin_polar, cos_polar) = libm::sincos(polar_rad);
+        let (sin_azimuth, cos_azimuth) = libm::sincos(libm::atan2(direction.y, direction.x));
         Some(DVec3::new(sin_polar * cos_azimuth, sin_polar * sin_azimuth, cos_polar))
     }
 
@@ -53,5 +53,5 @@ impl Rings {
 /// The angle between a vector and the z axis, radians in 0..=pi.
 #[must_use]
 pub fn polar_angle_rad(vector: DVec3) -> f64 {
-    vector.x.hypot(vector.y).atan2(vector.z)
+    libm::atan2(libm::hypot(vector.x, vector.y), vector.z)
 }

@@ -56,10 +56,10 @@ impl Prism {
     /// `ray` behind both faces, `time_s` after the tilted face stood upright; `None` if it is
     /// reflected.
     fn refract(&self, ray: DVec3, time_s: f64) -> Option<DVec3> {
-        let (sin_tilt, cos_tilt) = self.wedge_deg.abs().to_radians().sin_cos();
+        let (sin_tilt, cos_tilt) = libm::sincos(self.wedge_deg.abs().to_radians());
         // The fraction is taken before the multiplication, so that late phases keep their digits.
         let turned_rad = TAU * (self.rate_hz * time_s).fract();
-        let (sine, cosine) = turned_rad.sin_cos();
+        let (sine, cosine) = libm::sincos(turned_rad);
         // Normals point against the light.
         let flat = DVec3::NEG_X;
         let tilted = DVec3::new(-cos_tilt, -sin_tilt * sine, sin_tilt * cosine);
@@ -84,8 +84,8 @@ fn refract(ray: DVec3, normal: DVec3, ratio: f64) -> Option<DVec3> {
 
 impl Line {
     fn direction(&self) -> DVec3 {
-        let (sin_azimuth, cos_azimuth) = self.azimuth_deg.to_radians().sin_cos();
-        let (sin_elevation, cos_elevation) = self.elevation_deg.to_radians().sin_cos();
+        let (sin_azimuth, cos_azimuth) = libm::sincos(self.azimuth_deg.to_radians());
+        let (sin_elevation, cos_elevation) = libm::sincos(self.elevation_deg.to_radians());
         DVec3::new(cos_elevation * cos_azimuth, cos_elevation * sin_azimuth, sin_elevation)
     }
 }

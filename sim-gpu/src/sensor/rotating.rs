@@ -142,11 +142,11 @@ impl Rotating {
                 let encoder_rad = self.encoder_rad(start_us * 1e-6, time_s);
                 rays.push(direction(laser, encoder_rad), rings[beam], time_s);
                 if let Some(crossing_m) = self.beam_crossing_m {
-                    let below_m = crossing_m * laser.elevation_deg.to_radians().tan();
+                    let below_m = crossing_m * libm::tan(laser.elevation_deg.to_radians());
                     rays.starts_m.push(DVec3::new(0.0, 0.0, -below_m));
                 }
                 if let Some(start_m) = self.beam_start_m {
-                    let (sine, cosine) = encoder_rad.sin_cos();
+                    let (sine, cosine) = libm::sincos(encoder_rad);
                     rays.starts_m.push(DVec3::new(cosine, -sine, 0.0) * start_m);
                 }
             }
@@ -184,7 +184,7 @@ impl Rotating {
 
 fn direction(laser: &Beam, encoder_rad: f64) -> DVec3 {
     let clockwise_rad = encoder_rad - laser.azimuth_offset_deg.to_radians();
-    let (sin_azimuth, cos_azimuth) = clockwise_rad.sin_cos();
-    let (sin_elevation, cos_elevation) = laser.elevation_deg.to_radians().sin_cos();
+    let (sin_azimuth, cos_azimuth) = libm::sincos(clockwise_rad);
+    let (sin_elevation, cos_elevation) = libm::sincos(laser.elevation_deg.to_radians());
     DVec3::new(cos_elevation * cos_azimuth, -cos_elevation * sin_azimuth, sin_elevation)
 }

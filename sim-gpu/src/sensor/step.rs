@@ -43,8 +43,8 @@ impl SensorProfile {
                 let (left, up) = grid.tangents();
                 let kept = left.into_iter().step_by(self.decimation.get() as usize);
                 [
-                    least_gap(kept.map(f64::atan).collect()),
-                    least_gap(up.into_iter().map(f64::atan).collect()),
+                    least_gap(kept.map(libm::atan).collect()),
+                    least_gap(up.into_iter().map(libm::atan).collect()),
                 ]
             }
         };
@@ -56,7 +56,7 @@ impl SensorProfile {
 fn least_angle(directions: &[DVec3]) -> Option<f64> {
     let mut sorted = directions.to_vec();
     sorted.sort_unstable_by(|a, b| a.z.total_cmp(&b.z));
-    let same = 2.0 * (SAME_BEAM_RAD / 2.0).sin();
+    let same = 2.0 * libm::sin(SAME_BEAM_RAD / 2.0);
     let mut least = f64::INFINITY;
     for (i, &a) in sorted.iter().enumerate() {
         for &b in &sorted[i + 1..] {
@@ -70,7 +70,7 @@ fn least_angle(directions: &[DVec3]) -> Option<f64> {
             }
         }
     }
-    least.is_finite().then(|| 2.0 * (least / 2.0).min(1.0).asin())
+    least.is_finite().then(|| 2.0 * libm::asin((least / 2.0).min(1.0)))
 }
 
 /// The least difference of two of `angles` that are not the same.

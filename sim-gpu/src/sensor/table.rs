@@ -118,8 +118,8 @@ impl Table {
         for row in (0..rows).filter(|row| (row / in_turn).is_multiple_of(keep_each.into())) {
             let place = self.place(row);
             let [azimuth_rad, elevation_rad] = self.directions_deg[place].map(f64::to_radians);
-            let (sin_azimuth, cos_azimuth) = azimuth_rad.sin_cos();
-            let (sine, cosine) = elevation_rad.sin_cos();
+            let (sin_azimuth, cos_azimuth) = libm::sincos(azimuth_rad);
+            let (sine, cosine) = libm::sincos(elevation_rad);
             let direction = DVec3::new(cosine * cos_azimuth, cosine * sin_azimuth, sine);
             let line = place % usize::from(self.lines);
             rays.push(direction, line as u16, row as f64 / self.pulse_hz);

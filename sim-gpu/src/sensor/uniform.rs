@@ -44,12 +44,13 @@ impl Uniform {
             linear_steps(self.azimuth_from_deg, self.azimuth_to_deg, self.azimuth_steps);
         let elevations_deg =
             linear_steps(self.elevation_from_deg, self.elevation_to_deg, self.elevation_steps);
-        let rows: Vec<(f64, f64)> = elevations_deg.map(|deg| deg.to_radians().sin_cos()).collect();
+        let rows: Vec<(f64, f64)> =
+            elevations_deg.map(|deg| libm::sincos(deg.to_radians())).collect();
         let downwards = self.elevation_from_deg > self.elevation_to_deg;
         let n_columns = self.azimuth_steps.div_ceil(keep_each) as usize;
         let mut rays = Rays::with_capacity(n_columns * rows.len());
         for azimuth_deg in azimuths_deg.step_by(keep_each as usize) {
-            let (sin_azimuth, cos_azimuth) = azimuth_deg.to_radians().sin_cos();
+            let (sin_azimuth, cos_azimuth) = libm::sincos(azimuth_deg.to_radians());
             let time_s = self.time_s(azimuth_deg);
             for (row, &(sin_elevation, cos_elevation)) in rows.iter().enumerate() {
                 let direction = DVec3::new(

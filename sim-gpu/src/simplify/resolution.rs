@@ -42,7 +42,7 @@ pub fn resolved_m(mesh: &TriangleMesh, units_per_m: f64, viewpoints: &[Viewpoint
         if half_footprint_rad >= std::f64::consts::FRAC_PI_2 {
             return f64::INFINITY;
         }
-        nearest * half_footprint_rad.tan()
+        nearest * libm::tan(half_footprint_rad)
     };
     viewpoints.iter().map(radius).fold(f64::INFINITY, f64::min)
 }

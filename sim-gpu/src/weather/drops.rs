@@ -44,23 +44,23 @@ const STEPS: usize = 256;
 
 /// The extinction of rain at this rate, per metre.
 pub(super) fn rain_extinction(mm_h: f64) -> f64 {
-    3.67e-4 * mm_h.powf(0.63)
+    3.67e-4 * libm::pow(mm_h, 0.63)
 }
 
 /// The extinction of snow at this rate, per metre.
 pub(super) fn snow_extinction(mm_h: f64) -> f64 {
-    1.447e-3 * mm_h.powf(0.565)
+    1.447e-3 * libm::pow(mm_h, 0.565)
 }
 
 impl Drops {
     /// Marshall and Palmer's rain.
     pub fn rain(mm_h: f64, beam: &Beam) -> Self {
-        Self::new(8000.0, 4.1 * mm_h.powf(-0.21), WATER, beam)
+        Self::new(8000.0, 4.1 * libm::pow(mm_h, -0.21), WATER, beam)
     }
 
     /// Gunn and Marshall's snow, twice as dense: LISA.
     pub fn snow(mm_h: f64, beam: &Beam) -> Self {
-        Self::new(7600.0 * mm_h.powf(-0.87), 2.55 * mm_h.powf(-0.48), ICE, beam)
+        Self::new(7600.0 * libm::pow(mm_h, -0.87), 2.55 * libm::pow(mm_h, -0.48), ICE, beam)
     }
 
     /// Drops with a density of `per_m3_mm * exp(-slope D)` per cubic metre and millimetre of
@@ -80,7 +80,7 @@ impl Drops {
             none: 1.0,
         };
         let to_m = drops.last_m(beam.range.max_m);
-        let per_m3 = per_m3_mm / slope * (-slope * SMALLEST_MM).exp();
+        let per_m3 = per_m3_mm / slope * libm::exp(-slope * SMALLEST_MM);
         let density = |range_m: f64| {
             // The cross-section of the beam.
             let area = std::f64::consts::PI / 4.0 * (width * range_m).powi(2);
@@ -94,13 +94,13 @@ impl Drops {
             count += step_m / 6.0 * (at(0.0) + 4.0 * at(0.5) + at(1.0));
             counts.push(count);
         }
-        (drops.step_m, drops.counts, drops.none) = (step_m, counts, (-count).exp());
+        (drops.step_m, drops.counts, drops.none) = (step_m, counts, libm::exp(-count));
         drops
     }
 
     /// The smallest diameter that is detected at this range, millimetres; infinite if none is.
     fn least_mm(&self, range_m: f64) -> f64 {
-        let through = (-2.0 * self.extinction * range_m).exp();
+        let through = libm::exp(-2.0 * self.extinction * range_m);
         let whole = self.reflectance * through / range_m.powi(2);
         if whole < self.least_power {
             return f64::INFINITY;
@@ -110,7 +110,7 @@ impl Drops {
     }
 
     fn part_detected(&self, range_m: f64) -> f64 {
-        (-self.slope * (self.least_mm(range_m) - SMALLEST_MM)).exp()
+        libm::exp(-self.slope * (self.least_mm(range_m) - SMALLEST_MM))
     }
 
     /// The range up to which drops are detected, at most `end_m`, metres: beyond it, less than one
@@ -159,10 +159,10 @@ impl Drops {
         for number in 0..count {
             let [_, place, size, _] = if number == 0 { first } else { bits(number) };
             let range_m = self.place(super::unit(place) * mean).min(end_m);
-            let excess_mm = -(-super::unit(size)).ln_1p() / self.slope;
+            let excess_mm = -libm::log1p(-super::unit(size)) / self.slope;
             let diameter_m = (self.least_mm(range_m) + excess_mm) / 1000.0;
             let part = (diameter_m / (self.width * range_m)).powi(2).min(1.0);
-            let through = (-2.0 * self.extinction * range_m).exp();
+            let through = libm::exp(-2.0 * self.extinction * range_m);
             let power = self.reflectance * through * part / range_m.powi(2);
             if power >= self.least_power {
                 take(range_m, power);
@@ -183,7 +183,7 @@ impl Drops {
 /// A Poisson number of this `mean` from a uniform number in [0, 1), by inversion; at most
 /// [`Purpose::MOST_DROPS`].
 fn poisson(mean: f64, uniform: f64) -> u32 {
-    let mut term = (-mean).exp();
+    let mut term = libm::exp(-mean);
     let (mut sum, mut count) = (term, 0);
     while uniform >= sum && count < Purpose::MOST_DROPS {
         count += 1;

@@ -36,7 +36,7 @@ pub(super) struct Fog {
 
 /// The extinction per metre for this visibility V: ln 20 / V, at which a contrast of 5 % remains.
 pub(super) fn extinction_of(visibility_m: f64) -> f64 {
-    20f64.ln() / visibility_m
+    libm::log(20.0) / visibility_m
 }
 
 /// The brightness of this length of fog with this visibility, metres, with clear air before it. At
@@ -44,7 +44,7 @@ pub(super) fn extinction_of(visibility_m: f64) -> f64 {
 pub(super) fn of_one_pulse(visibility_m: f64, length_m: f64) -> f64 {
     let twice_extinction = 2.0 * extinction_of(visibility_m);
     let length_m = length_m.min(PULSE_M / 2.0);
-    -PI * BACKSCATTER / visibility_m * (-twice_extinction * length_m).exp_m1() / twice_extinction
+    -PI * BACKSCATTER / visibility_m * libm::expm1(-twice_extinction * length_m) / twice_extinction
 }
 
 impl Fog {
@@ -158,8 +158,8 @@ fn returned(range_m: f64, extinction: f64) -> f64 {
 fn integrand(r: f64, range_m: f64, extinction: f64) -> f64 {
     let t = 2.0 * (range_m - r) / LIGHT_M_S;
     let seen = ((r - BLIND_M) / (WHOLE_M - BLIND_M)).clamp(0.0, 1.0);
-    let pulse = (PI * t / (2.0 * HALF_PULSE_S)).sin().powi(2);
-    pulse * (-2.0 * extinction * r).exp() * seen / (r * r)
+    let pulse = libm::sin(PI * t / (2.0 * HALF_PULSE_S)).powi(2);
+    pulse * libm::exp(-2.0 * extinction * r) * seen / (r * r)
 }
 
 #[cfg(test)]

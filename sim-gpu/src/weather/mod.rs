@@ -164,7 +164,8 @@ impl Air {
             + snow_mm_h.map_or(0.0, drops::snow_extinction)
             + weather.fog_visibility_m.map_or(0.0, extinction_of)
             + weather.haze_visibility_m.map_or(0.0, haze_extinction);
-        let width = divergence_deg.map(|deg| deg.to_radians().tan()).iter().product::<f64>().sqrt();
+        let width =
+            divergence_deg.map(|deg| libm::tan(deg.to_radians())).iter().product::<f64>().sqrt();
         let beam = drops::Beam { width, extinction, least_power: limit.power(), range: *range };
         let model = weather.fog_model;
         Self {
@@ -183,7 +184,7 @@ impl Air {
     #[must_use]
     pub fn transmission(&self, origin: DVec3, direction: DVec3, range_m: f64) -> f64 {
         let in_volumes = self.depth_in_volumes(origin, direction, range_m);
-        (-2.0 * (self.extinction * range_m + in_volumes)).exp()
+        libm::exp(-2.0 * (self.extinction * range_m + in_volumes))
     }
 
     /// The optical depth of the volumes along a beam up to this range.
@@ -205,7 +206,7 @@ impl Air {
             if self.volumes.is_empty() {
                 return one;
             }
-            let left = (-2.0 * self.depth_in_volumes(origin, direction, one.range_m)).exp();
+            let left = libm::exp(-2.0 * self.depth_in_volumes(origin, direction, one.range_m));
             Scattered { power: one.power * left, brightness: one.brightness * left, ..one }
         };
         let mut drops_of = |drops: &Option<Drops>, purpose: fn(u32) -> Purpose, medium| {
@@ -239,7 +240,7 @@ impl Air {
         if optical_depth == 0.0 || unit(event) * 0.7 >= optical_depth {
             return None;
         }
-        let within = -(unit(place) * (-optical_depth).exp_m1()).ln_1p() / extinction;
+        let within = -libm::log1p(unit(place) * libm::expm1(-optical_depth)) / extinction;
         let range_m = enters_m + within.min(leaves_m - enters_m);
         let transmission = self.transmission(origin, direction, range_m);
         let brightness = fog::of_one_pulse(volume.visibility_m, leaves_m - range_m) * transmission;
@@ -286,9 +287,9 @@ fn haze_extinction(visibility_m: f64) -> f64 {
     let exponent = match visibility_km {
         above if above > 50.0 => 1.6,
         above if above >= 6.0 => 1.3,
-        below => 0.585 * below.cbrt(),
+        below => 0.585 * libm::cbrt(below),
     };
-    3.912 / visibility_m * WAVELENGTH.powf(-exponent)
+    3.912 / visibility_m * libm::pow(WAVELENGTH, -exponent)
 }
 
 #[cfg(test)]

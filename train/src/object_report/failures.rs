@@ -57,7 +57,7 @@ fn words(object: &Object, classes: &[String]) -> [String; 2] {
 fn add_views(parts: &mut String, cloud: &[[f32; 3]], left: f64, top: f64) {
     let n = cloud.len().max(1) as f64;
     let mean = |axis: usize| cloud.iter().map(|point| f64::from(point[axis])).sum::<f64>() / n;
-    let (sin, cos) = mean(1).atan2(mean(0)).sin_cos();
+    let (sin, cos) = libm::sincos(libm::atan2(mean(1), mean(0)));
     // Along the line of sight, to its left, and up.
     let turned = |point: &[f32; 3]| {
         let [x, y, z] = point.map(f64::from);

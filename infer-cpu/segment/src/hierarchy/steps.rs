@@ -90,7 +90,7 @@ pub fn find_steps(
 pub fn most_columns(this: &Return, column_width: f32) -> usize {
     // The factor covers rounding.
     let sine = 1.001 * WIDEST * base_m(distance_m(this)) / this.range_m;
-    if sine < 1.0 { (sine.asin() / column_width) as usize + 2 } else { MOST_COLUMNS }
+    if sine < 1.0 { (libm::asinf(sine) / column_width) as usize + 2 } else { MOST_COLUMNS }
         .min(MOST_COLUMNS)
 }
 

@@ -50,7 +50,7 @@ pub fn propeller(b: &mut Builder, front: DVec3, radius_m: f64, n_blades: usize) 
         let hub = front - 0.05 * radius_m * DVec3::Y;
         b.turned(hub, DAffine3::from_rotation_y(turn_rad), |b| {
             sheet(b, [radius_m, 0.12 * radius_m], |u, v| {
-                let (sin, cos) = (1.0 - 0.6 * u).sin_cos();
+                let (sin, cos) = libm::sincos(1.0 - 0.6 * u);
                 let across = (v - 0.5) * 0.16 * radius_m * (1.0 - 0.5 * u * u);
                 DVec3::new(across * cos, across * sin, (0.05 + 0.95 * u) * radius_m)
             });

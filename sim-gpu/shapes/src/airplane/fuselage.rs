@@ -38,7 +38,7 @@ impl Fuselage {
     fn radius_at(&self, share: f64) -> f64 {
         let ahead = (1.0 - share / self.nose).max(0.0);
         let nose = (1.0 - ahead * ahead).max(0.0).sqrt().max(0.06);
-        let tail = 1.0 - 0.8 * self.along_tail(share).powf(1.4);
+        let tail = 1.0 - 0.8 * libm::pow(self.along_tail(share), 1.4);
         self.radius_m() * nose * tail
     }
 

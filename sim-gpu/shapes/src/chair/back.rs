@@ -119,7 +119,7 @@ fn hooped(b: &mut Builder, s: &mut Sampler, back: Back) {
     let r = s.uniform(0.005, 0.01);
     spindles(b, s, r, back, |across| (1.0 - across * across).sqrt());
     let arch: Vec<_> = (0..=8)
-        .map(|k| (k as f64 / 8.0 * PI).sin_cos())
+        .map(|k| libm::sincos(k as f64 / 8.0 * PI))
         .map(|(sin, cos)| DVec3::new(cos * back.half_m, 0.0, sin * back.high_m))
         .collect();
     smooth_tube(b, &arch, 2, 1.8 * r);
@@ -142,7 +142,7 @@ fn medallion(b: &mut Builder, s: &mut Sampler, back: Back) {
     let middle_m = back.high_m - half.y;
     posts(b, Back { half_m: 0.45 * back.half_m, high_m: middle_m }, 0.012);
     let ring: Vec<_> = (0..=16)
-        .map(|k| (k as f64 / 16.0 * TAU).sin_cos())
+        .map(|k| libm::sincos(k as f64 / 16.0 * TAU))
         .map(|(sin, cos)| DVec3::new(cos * half.x, 0.0, middle_m + sin * half.y))
         .collect();
     smooth_tube(b, &ring, 1, s.uniform(0.012, 0.025));

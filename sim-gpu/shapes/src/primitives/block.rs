@@ -34,7 +34,7 @@ pub fn cushion(b: &mut Builder, centre: DVec3, size: DVec3, radius_m: f64) {
     let radius_m = radius_m.min(0.999 * half.min_element());
     let n = b.curved(radius_m * FRAC_PI_2, 2);
     let section = |side: f64, k: usize| {
-        let (sin, cos) = (k as f64 / n as f64 * FRAC_PI_2).sin_cos();
+        let (sin, cos) = libm::sincos(k as f64 / n as f64 * FRAC_PI_2);
         let inset = DVec2::splat(radius_m * (1.0 - cos));
         let outline =
             outline::rounded_rectangle(half.truncate() - inset, radius_m * cos.max(0.1), n);

@@ -10,9 +10,9 @@ pub fn ellipse(half: DVec2, n: usize) -> Vec<DVec2> {
 
 /// A superellipse |x/a|^e + |y/b|^e = 1: an ellipse at `exponent` 2, nearly a rectangle from 6 on.
 pub fn superellipse(half: DVec2, exponent: f64, n: usize) -> Vec<DVec2> {
-    let power = |value: f64| value.signum() * value.abs().powf(2.0 / exponent);
+    let power = |value: f64| value.signum() * libm::pow(value.abs(), 2.0 / exponent);
     (0..n)
-        .map(|k| (k as f64 / n as f64 * TAU).sin_cos())
+        .map(|k| libm::sincos(k as f64 / n as f64 * TAU))
         .map(|(sin, cos)| DVec2::new(power(cos), power(sin)) * half)
         .collect()
 }
@@ -50,7 +50,7 @@ pub fn airfoil(thickness: f64, n: usize) -> Vec<DVec2> {
             * (0.2969 * x.sqrt() + x * (-0.1260 + x * (-0.3516 + x * (0.2843 + x * -0.1036))))
     };
     // Cosine spacing puts more points where the nose bends.
-    let station = |k: usize| 0.5 - 0.5 * (k as f64 / n as f64 * TAU / 2.0).cos();
+    let station = |k: usize| 0.5 - 0.5 * libm::cos(k as f64 / n as f64 * TAU / 2.0);
     let lower = (0..n).map(|k| (station(k), -1.0));
     let upper = (1..=n).rev().map(|k| (station(k), 1.0));
     lower.chain(upper).map(|(x, side)| DVec2::new(x, side * half_thickness(x).max(0.0))).collect()

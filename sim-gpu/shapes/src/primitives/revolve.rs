@@ -101,16 +101,17 @@ impl Section {
             Self::Round => direction,
             Self::Oval(ratio) => direction * DVec2::new(1.0, ratio),
             Self::Square(exponent) => {
-                let sum = direction.abs().x.powf(exponent) + direction.abs().y.powf(exponent);
-                direction * sum.powf(-1.0 / exponent)
+                let sum =
+                    libm::pow(direction.abs().x, exponent) + libm::pow(direction.abs().y, exponent);
+                direction * libm::pow(sum, -1.0 / exponent)
             }
             Self::Polygon(sides) => {
                 let sector_rad = TAU / sides as f64;
                 let within_rad = angle_rad.rem_euclid(sector_rad) - sector_rad / 2.0;
-                direction * (sector_rad / 2.0).cos() / within_rad.cos()
+                direction * libm::cos(sector_rad / 2.0) / libm::cos(within_rad)
             }
             Self::Fluted { count, depth } => {
-                direction * (1.0 + depth * (count as f64 * angle_rad).cos())
+                direction * (1.0 + depth * libm::cos(count as f64 * angle_rad))
             }
         }
     }
@@ -153,7 +154,7 @@ pub fn ellipsoid(b: &mut Builder, centre: DVec3, radii_m: DVec3) {
     let widest_m = radii_m.max_element();
     let n = b.curved(FRAC_PI_2 * 2.0 * widest_m, 6);
     let meridian: Vec<_> = (0..=n)
-        .map(|k| (k as f64 / n as f64 * FRAC_PI_2 * 2.0).sin_cos())
+        .map(|k| libm::sincos(k as f64 / n as f64 * FRAC_PI_2 * 2.0))
         .map(|(sin, cos)| widest_m * DVec2::new(sin, -cos))
         .collect();
     let scaled = DAffine3::from_scale(radii_m / widest_m);

@@ -283,5 +283,5 @@ impl Sampled<'_> {
 /// The angle between two rotations, radians, also where it is small.
 fn turn(a: DQuat, b: DQuat) -> f64 {
     let difference = a.conjugate() * b;
-    2.0 * difference.xyz().length().atan2(difference.w.abs())
+    2.0 * libm::atan2(difference.xyz().length(), difference.w.abs())
 }

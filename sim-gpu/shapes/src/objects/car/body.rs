@@ -51,7 +51,7 @@ impl<'a> Body<'a> {
     pub fn plan_y(&self, x: f64) -> f64 {
         let share = (x.abs() / self.form.half.x).min(1.0);
         let e = self.squareness;
-        self.form.half.y * (1.0 - share.powf(e)).max(0.0).powf(1.0 / e)
+        self.form.half.y * libm::pow((1.0 - libm::pow(share, e)).max(0.0), 1.0 / e)
     }
 
     /// Half the width at `x`, at the windows' lower edge.
@@ -89,7 +89,8 @@ impl<'a> Body<'a> {
     fn stations(&self) -> Vec<DVec2> {
         let half = self.form.half;
         let e = self.squareness;
-        let end_x = END_SHARES.map(|share: f64| half.x * (1.0 - share.powf(e)).powf(1.0 / e));
+        let end_x =
+            END_SHARES.map(|share: f64| half.x * libm::pow(1.0 - libm::pow(share, e), 1.0 / e));
         let ends = |side: f64| (0..5).map(move |k| (side * end_x[k], END_SHARES[k] * half.y));
         let corner_x = end_x[4] - 0.02;
         let arches = self.arches.iter().flat_map(Arch::stations);

@@ -64,7 +64,8 @@ impl Arch {
     /// The x at which a side needs columns for a round opening.
     pub fn stations(&self) -> impl Iterator<Item = f64> {
         let Self { x, radius_m, .. } = *self;
-        let round = (0..=6).map(move |k| x - radius_m * (f64::from(k) * 30f64.to_radians()).cos());
+        let round =
+            (0..=6).map(move |k| x - radius_m * libm::cos(f64::from(k) * 30f64.to_radians()));
         round.chain([x - radius_m - 0.02, x + radius_m + 0.02])
     }
 }

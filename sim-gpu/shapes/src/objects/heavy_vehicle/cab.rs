@@ -104,7 +104,7 @@ impl Cab {
         block_between(b, DVec3::new(-0.25, -outer, 0.4), DVec3::new(0.0, outer, 0.75));
         b.mirrored_y(|b| {
             b.surface([6, 1], |u, v| {
-                let (sin, cos) = (u * std::f64::consts::PI).sin_cos();
+                let (sin, cos) = libm::sincos(u * std::f64::consts::PI);
                 let r = self.wheel_m + 0.1;
                 let across = y + v * (outer - y);
                 DVec3::new(self.axle_x + r * cos, across, self.wheel_m + r * sin)

@@ -63,20 +63,21 @@ impl Pose {
         let elbow_rad = if running { 1.4 } else { s.uniform(0.1, 0.6) };
         for (k, side) in [-1.0, 1.0].into_iter().enumerate() {
             let phase = (phase + 0.5 * k as f64).fract();
-            let hip_rad = vigour * (4.0 + 23.0 * (TAU * phase).cos()).to_radians() + 0.5 * bend_rad;
+            let hip_rad =
+                vigour * (4.0 + 23.0 * libm::cos(TAU * phase)).to_radians() + 0.5 * bend_rad;
             let bump = |middle: f64, width: f64| {
                 let x = (phase - middle) / width;
-                if x.abs() < 1.0 { 0.5 + 0.5 * (PI * x).cos() } else { 0.0 }
+                if x.abs() < 1.0 { 0.5 + 0.5 * libm::cos(PI * x) } else { 0.0 }
             };
             let knee_deg = 4.0 + 13.0 * bump(0.14, 0.14) + 58.0 * bump(0.72, 0.25);
             let knee_rad = vigour.min(1.2) * knee_deg.to_radians() + bend_rad;
             // The heel leaves the ground late in the stance.
             let sole_rad = 0.7 * bump(0.62, 0.2) - 0.3 * bump(0.98, 0.12) - 0.3 * bump(-0.02, 0.12);
             self.legs[k] = self.leg(measures, side, [hip_rad, knee_rad, sole_rad]);
-            let arm_rad = -swing_rad * (TAU * phase).cos() + 0.05;
+            let arm_rad = -swing_rad * libm::cos(TAU * phase) + 0.05;
             self.hands[k] = self.hanging(measures, side, arm_rad, elbow_rad);
         }
-        self.twist_rad += 0.1 * vigour * (TAU * phase).cos();
+        self.twist_rad += 0.1 * vigour * libm::cos(TAU * phase);
     }
 
     /// The feet are side by side or one ahead of the other.
@@ -88,7 +89,7 @@ impl Pose {
             let apart_m = s.uniform(0.035, 0.11) * h;
             let ankle = DVec3::new(s.uniform(-0.07, 0.07) * h, side * apart_m, 0.039 * h);
             let turned_rad = side * s.uniform(-5.0, 35.0).to_radians();
-            let toes = DVec3::new(turned_rad.cos(), turned_rad.sin(), 0.0);
+            let toes = DVec3::new(libm::cos(turned_rad), libm::sin(turned_rad), 0.0);
             self.legs[k] = self.leg_to(measures, side, ankle, toes);
             let [arm_rad, elbow_rad] = [s.uniform(-0.15, 0.25), s.uniform(0.05, 0.5)];
             self.hands[k] = self.hanging(measures, side, arm_rad, elbow_rad);
@@ -111,13 +112,13 @@ impl Pose {
     /// The leg with these angles of hip, knee and sole in the plane of walking.
     fn leg(&self, measures: &Measures, side: f64, angles_rad: [f64; 3]) -> Leg {
         let [hip_rad, knee_rad, sole_rad] = angles_rad;
-        let down = |angle: f64| DVec3::new(angle.sin(), 0.0, -angle.cos());
+        let down = |angle: f64| DVec3::new(libm::sin(angle), 0.0, -libm::cos(angle));
         let hip = self.pelvis + side * measures.hip_joint_m() * DVec3::Y;
         let knee = hip + measures.stature_m * Measures::THIGH * down(hip_rad);
         let inwards = -0.012 * side * measures.stature_m * DVec3::Y;
         let ankle =
             knee + inwards + measures.stature_m * Measures::SHANK * down(hip_rad - knee_rad);
-        let toes = DVec3::new(sole_rad.cos(), 0.1 * side, -sole_rad.sin());
+        let toes = DVec3::new(libm::cos(sole_rad), 0.1 * side, -libm::sin(sole_rad));
         Leg { knee, ankle, toes }
     }
 
@@ -132,10 +133,10 @@ impl Pose {
     /// The wrist of a hanging arm that is swung forward by `arm_rad` and bent by `elbow_rad`.
     fn hanging(&self, measures: &Measures, side: f64, arm_rad: f64, elbow_rad: f64) -> DVec3 {
         let h = measures.stature_m;
-        let down = |angle: f64| DVec3::new(angle.sin(), 0.0, -angle.cos());
+        let down = |angle: f64| DVec3::new(libm::sin(angle), 0.0, -libm::cos(angle));
         let out = side * (0.035 + 0.04 * (measures.girth - 0.9)) * h * DVec3::Y;
-        let shoulder =
-            self.pelvis + measures.shoulder(side).with_x(measures.neck_m() * self.lean_rad.sin());
+        let shoulder = self.pelvis
+            + measures.shoulder(side).with_x(measures.neck_m() * libm::sin(self.lean_rad));
         shoulder + out + 0.186 * h * down(arm_rad) + 0.19 * h * down(arm_rad + elbow_rad)
     }
 
@@ -143,7 +144,7 @@ impl Pose {
     /// behind the back, or reached out.
     fn occupy_hands(&mut self, s: &mut Sampler, measures: &Measures) {
         let h = measures.stature_m;
-        let ahead_m = measures.neck_m() * self.lean_rad.sin();
+        let ahead_m = measures.neck_m() * libm::sin(self.lean_rad);
         let at =
             |x: f64, y: f64, z: f64| self.pelvis + h * DVec3::new(x, y, z) + ahead_m * DVec3::X;
         let side = s.pick(&[-1.0, 1.0]);

@@ -27,10 +27,10 @@ fn thicket(b: &mut Builder, s: &mut Sampler) {
 /// twigs. `size_m` is the half width, the half depth and the height.
 fn clumps(b: &mut Builder, s: &mut Sampler, size_m: DVec3) {
     let n = s.count(5, 16);
-    let clump_m = size_m.element_product().cbrt() * s.uniform(1.0, 1.5) / (n as f64).cbrt();
+    let clump_m = libm::cbrt(size_m.element_product()) * s.uniform(1.0, 1.5) / libm::cbrt(n as f64);
     let ragged = s.uniform(0.1, 0.6);
     let clump = |_| {
-        let out = s.uniform(0.0, 1.0).cbrt() * s.uniform(1.0 - ragged, 1.0);
+        let out = libm::cbrt(s.uniform(0.0, 1.0)) * s.uniform(1.0 - ragged, 1.0);
         let place = direction(s);
         let radii_m = clump_m * s.uniform(0.5, 1.0) * DVec3::new(1.0, 1.0, s.uniform(0.6, 1.2));
         let inner_m = (size_m - radii_m).max(0.3 * size_m);

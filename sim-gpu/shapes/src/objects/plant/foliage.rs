@@ -15,7 +15,7 @@ pub struct Clump {
 impl Clump {
     /// The approximate mean area of the clump's silhouettes.
     fn silhouette_m2(&self) -> f64 {
-        PI * self.radii_m.element_product().powf(2.0 / 3.0)
+        PI * libm::pow(self.radii_m.element_product(), 2.0 / 3.0)
     }
 }
 
@@ -48,7 +48,7 @@ pub fn fill(b: &mut Builder, s: &mut Sampler, clumps: &[Clump], n: usize, layers
     for clump in clumps {
         let share = clump.silhouette_m2() / area_m2;
         for _ in 0..(share * n as f64).round() as usize {
-            let out = s.uniform(0.0, 1.0).powf(0.22);
+            let out = libm::pow(s.uniform(0.0, 1.0), 0.22);
             let at = clump.centre + out * direction(s) * clump.radii_m;
             leaf(b, s, at.with_z(at.z.max(0.05)), length_m);
         }

@@ -61,9 +61,9 @@ fn broadleaved(b: &mut Builder, s: &mut Sampler) {
     let stems = form.stems(b, s);
     let (middle, crown_m) = form.crown();
     let n = s.count(7, 22);
-    let size = s.uniform(0.75, 1.1) / (n as f64).cbrt();
+    let size = s.uniform(0.75, 1.1) / libm::cbrt(n as f64);
     let clump = |_| {
-        let out = s.uniform(0.1, 1.0).cbrt() * (1.0 - 0.6 * size);
+        let out = libm::cbrt(s.uniform(0.1, 1.0)) * (1.0 - 0.6 * size);
         let flat = DVec3::new(1.0, 1.0, s.uniform(0.6, 1.0));
         let radii_m = size * s.uniform(0.7, 1.3) * crown_m * flat;
         Clump { centre: middle + out * direction(s) * crown_m, radii_m }

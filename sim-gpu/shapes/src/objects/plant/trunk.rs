@@ -38,7 +38,7 @@ fn fork(b: &mut Builder, s: &mut Sampler, from: DVec3, radius_m: f64, rise_m: f6
     let n = s.count(2, 3);
     let turn_rad = s.uniform(0.0, TAU);
     for limb in 0..n {
-        let (sin, cos) = (turn_rad + limb as f64 / n as f64 * TAU).sin_cos();
+        let (sin, cos) = libm::sincos(turn_rad + limb as f64 / n as f64 * TAU);
         let apart = rise_m * s.uniform(0.12, 0.5) * DVec3::new(cos, sin, 0.0);
         let foot = from - 0.4 * radius_m * DVec3::Z;
         let thick_m = radius_m * s.uniform(0.5, 0.8);
@@ -62,7 +62,7 @@ fn ivy(b: &mut Builder, s: &mut Sampler, stem: &Stem) {
 /// Thin shoots and tall grass around the foot.
 fn shoots(b: &mut Builder, s: &mut Sampler, radius_m: f64) {
     for _ in 0..80 {
-        let (sin, cos) = s.uniform(0.0, TAU).sin_cos();
+        let (sin, cos) = libm::sincos(s.uniform(0.0, TAU));
         let foot = radius_m * s.uniform(1.0, 1.6) * DVec3::new(cos, sin, 0.0);
         let top = foot + s.uniform(0.1, 0.5) * (DVec3::Z + 0.4 * direction(s));
         blade(b, foot, top.with_z(top.z.max(0.05)), 0.02);

@@ -13,7 +13,7 @@ const N_AROUND: usize = 20;
 /// A random direction, uniform on the sphere.
 pub fn direction(s: &mut Sampler) -> DVec3 {
     let z = s.uniform(-1.0, 1.0);
-    let (sin, cos) = s.uniform(0.0, TAU).sin_cos();
+    let (sin, cos) = libm::sincos(s.uniform(0.0, TAU));
     let across = (1.0 - z * z).sqrt();
     DVec3::new(across * cos, across * sin, z)
 }
@@ -38,7 +38,7 @@ impl Ripple {
     }
 
     pub fn at(&self, place: DVec3) -> f64 {
-        let sum: f64 = self.waves.iter().map(|(k, phase)| (k.dot(place) + phase).sin()).sum();
+        let sum: f64 = self.waves.iter().map(|(k, phase)| libm::sin(k.dot(place) + phase)).sum();
         self.amplitude_m * sum
     }
 }
@@ -56,9 +56,9 @@ pub struct Lump {
 impl Lump {
     /// The point of the surface in a direction from the middle.
     pub fn at(&self, direction: DVec3) -> DVec3 {
-        let power = |value: f64| value.abs().powf(self.exponent);
+        let power = |value: f64| libm::pow(value.abs(), self.exponent);
         let sum = power(direction.x) + power(direction.y) + power(direction.z);
-        let smooth = direction * sum.powf(-1.0 / self.exponent) * self.radii_m;
+        let smooth = direction * libm::pow(sum, -1.0 / self.exponent) * self.radii_m;
         let out = smooth.normalize_or(DVec3::Z);
         let point = self.centre + smooth + self.ripple.at(self.centre + smooth) * out;
         point.with_z(point.z.max(0.0))
@@ -67,10 +67,10 @@ impl Lump {
     /// Adds the surface, which is opaque.
     pub fn build(&self, b: &mut Builder) {
         let row = |j: usize| {
-            let (sin, cos) = (j as f64 / (N_AROUND / 2) as f64 * PI).sin_cos();
+            let (sin, cos) = libm::sincos(j as f64 / (N_AROUND / 2) as f64 * PI);
             let n = if j == 0 || j == N_AROUND / 2 { 1 } else { N_AROUND };
             let point = |i: usize| {
-                let (y, x) = (i as f64 / N_AROUND as f64 * TAU).sin_cos();
+                let (y, x) = libm::sincos(i as f64 / N_AROUND as f64 * TAU);
                 self.at(DVec3::new(sin * x, sin * y, -cos))
             };
             (0..n).map(point).collect()

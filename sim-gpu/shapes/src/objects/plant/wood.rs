@@ -46,7 +46,7 @@ impl Stem {
     pub fn radius_m(&self, share: f64) -> f64 {
         let [low_m, high_m] = self.radii_m;
         let height = share * self.rise.z / (0.8 * low_m);
-        low_m + share * (high_m - low_m) + self.flare * low_m * (-height).exp()
+        low_m + share * (high_m - low_m) + self.flare * low_m * libm::exp(-height)
     }
 
     /// A point of the bark, at an angle about the stem.
@@ -65,7 +65,7 @@ impl Stem {
         };
         // Sections are closer near the roots, which spread.
         let sections: Vec<_> =
-            (0..=n_along).map(|j| section((j as f64 / n_along as f64).powf(1.5))).collect();
+            (0..=n_along).map(|j| section(libm::pow(j as f64 / n_along as f64, 1.5))).collect();
         skin(b, &sections);
         cap(b, &sections[n_along]);
     }

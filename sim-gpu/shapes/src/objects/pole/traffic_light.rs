@@ -31,7 +31,7 @@ fn head(b: &mut Builder, s: &mut Sampler, centre: DVec3, n: usize, lens_m: f64) 
 /// The upper half of a tube over a lens.
 fn visor(b: &mut Builder, lens: DVec3, radius_m: f64) {
     sheet(b, [PI * radius_m, radius_m], |u, v| {
-        let (sin, cos) = (PI * (1.2 * u - 0.1)).sin_cos();
+        let (sin, cos) = libm::sincos(PI * (1.2 * u - 0.1));
         lens + DVec3::new(1.2 * v * radius_m, radius_m * cos, radius_m * sin)
     });
 }

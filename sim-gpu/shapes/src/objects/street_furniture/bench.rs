@@ -30,7 +30,7 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
     for y in [-0.42 * long_m, 0.42 * long_m] {
         side(b, [deep_m, y, seat_m], solid);
         if backed {
-            let top = foot + back_m * DVec3::new(-lean_rad.sin(), 0.0, lean_rad.cos());
+            let top = foot + back_m * DVec3::new(-libm::sin(lean_rad), 0.0, libm::cos(lean_rad));
             rod(b, foot.with_y(y), top.with_y(y), [0.025, 0.025]);
         }
         if arms {

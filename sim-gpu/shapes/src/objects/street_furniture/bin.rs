@@ -109,7 +109,7 @@ fn four_wheels(b: &mut Builder, s: &mut Sampler) {
 
 /// One end of a round lid: an arch over the x axis.
 fn arch(half: DVec3, side: f64) -> Vec<DVec3> {
-    let at = |k: usize| (k as f64 / 6.0 * std::f64::consts::PI).sin_cos();
+    let at = |k: usize| libm::sincos(k as f64 / 6.0 * std::f64::consts::PI);
     (0..=6).map(at).map(|(sin, cos)| half * DVec3::new(cos, side, sin)).collect()
 }
 

@@ -134,7 +134,7 @@ fn a_board(b: &mut Builder, s: &mut Sampler) {
     let size = DVec3::new(0.025, s.uniform(0.5, 0.8), high_m);
     let lean_rad = s.uniform(0.12, 0.35);
     for side in [-1.0, 1.0] {
-        let top = high_m * lean_rad.cos() * DVec3::Z;
+        let top = high_m * libm::cos(lean_rad) * DVec3::Z;
         let lean = DAffine3::from_rotation_y(-side * lean_rad);
         b.turned(top, lean, |b| block(b, -0.5 * high_m * DVec3::Z, size));
     }

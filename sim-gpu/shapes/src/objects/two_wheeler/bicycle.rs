@@ -53,7 +53,7 @@ impl Bicycle {
 
     /// The middle of the right (-1) or left (1) pedal, on a crank of 0.17 m.
     fn pedal(&self, side: f64) -> DVec3 {
-        let (sin, cos) = self.crank_rad.sin_cos();
+        let (sin, cos) = libm::sincos(self.crank_rad);
         self.crank + DVec3::new(-0.17 * side * cos, 0.12 * side, -0.17 * side * sin)
     }
 
