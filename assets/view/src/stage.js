@@ -189,17 +189,17 @@ export class Stage {
     this.scene.add(object);
   }
 
-  /** Colours the points by the column of this name; returns the column and its scale. */
-  colourBy(name) {
+  /** Colours the points by the column of this name, with the span of its colours; returns it and its scale. */
+  colourBy(name, spanOf) {
     const column = this.columns.find((one) => one.name === name) ?? this.columns[0];
     if (!column) return undefined;
-    column.scale ??= scaleOf(column);
+    const scale = scaleOf(column, spanOf(column));
     const { array } = this.tints;
     column.values.forEach((value, i) => {
-      [array[3 * i], array[3 * i + 1], array[3 * i + 2]] = column.scale.look(value);
+      [array[3 * i], array[3 * i + 1], array[3 * i + 2]] = scale.look(value);
     });
     this.tints.needsUpdate = true;
-    return column;
+    return { ...column, scale };
   }
 
   dispose() {

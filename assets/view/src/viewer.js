@@ -1,9 +1,9 @@
 import * as THREE from "three";
-import { css } from "./colour.js";
+import { css, spanOf } from "./colour.js";
 import { boxesHtml, escaped, factsHtml, scaleHtml, shown, titleOf } from "./legend.js";
 import { Navigation } from "./navigation.js";
 import { pick } from "./picking.js";
-import { boxColour, extentOf, pointMaterial, Stage } from "./stage.js";
+import { boxColour, columnsOf, extentOf, pointMaterial, Stage } from "./stage.js";
 import style from "./viewer.css";
 
 /**
@@ -116,7 +116,7 @@ class Viewer {
   }
 
   setData(data, { fit = false } = {}) {
-    this.data = data;
+    [this.data, this.spans] = [data, {}];
     this.nFrames = Math.max(1, ...data.panes.map((pane) => pane.frames.length));
     this.time.hidden = this.nFrames < 2;
     // The first turn of a capture may have only a few points.
@@ -151,7 +151,7 @@ class Viewer {
   /** Colours the points by the column of this name. */
   colourBy(name) {
     this.colour = name;
-    for (const pane of this.panes) pane.column = pane.stage.colourBy(name);
+    for (const pane of this.panes) pane.column = pane.stage.colourBy(name, (column) => this.#spanOf(column));
     const columns = this.panes.map(({ column }) => column).filter(Boolean);
     const scales = columns.map(scaleHtml);
     const boxes = boxesHtml(
@@ -161,6 +161,14 @@ class Viewer {
     const grid = `<small>grid ${shown(this.panes[0]?.stage.gridStep ?? 1)} m</small>`;
     this.legend.innerHTML = [...new Set(scales), boxes, grid].join("");
     this.invalidate();
+  }
+
+  /** A colour means the same in all frames and panes. */
+  #spanOf({ name, kind }) {
+    const frames = this.data.panes.flatMap((pane) => pane.frames);
+    const isOf = (other) => other.name === name && other.kind === kind;
+    if (kind === "number") this.spans[name] ??= spanOf(frames.flatMap((frame) => columnsOf(frame).filter(isOf)));
+    return this.spans[name];
   }
 
   /** Shows the frame with this number of each pane. */

@@ -123,12 +123,17 @@ try {
     await page.mouse.click(at[0], at[1]);
     assert.match(await page.textContent(".facts"), new RegExp(`point ${at[2]}.*x \\(m\\).*range \\(m\\)`, "s"));
   });
-  await check("drive", "drive", async (page) => {
+  await check("drive", "drive street/sweeps/000000.npz", async (page) => {
     assert.match(await page.textContent("output"), /1 of 5/);
+    await page.selectOption("select[name=colour]", "range");
+    const marks = await page.locator(".marks").allTextContents();
+    assert.equal(marks.length, 1, "the files side by side have one scale");
     const first = await page.evaluate(() => viewer.panes[0].frame.name);
     await page.fill("input[name=frame]", "3");
     assert.match(await page.textContent("output"), /4 of 5/);
     assert.notEqual(await page.evaluate(() => viewer.panes[0].frame.name), first);
+    assert.deepEqual(await page.locator(".marks").allTextContents(), marks, "all frames have one scale");
+    await page.selectOption("select[name=colour]", "class");
     assert.match(await legend(page), /class.*(car|building)/s);
   });
   await check("clusters", "clusters", async (page) => assert.match(await legend(page), /cluster/));
