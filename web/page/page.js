@@ -153,10 +153,6 @@ function draw(reply, { subject: { name }, settings: { sensor } }, isNew) {
   const shown = { panes: [pane(reply, name, sensor)] };
   if (viewer) viewer.setData(shown, { fit: isNew });
   else viewer = EdgepuckViewer.createViewer($("viewer"), shown);
-  // All of an object, in the middle of the picture.
-  const { extent, navigation } = viewer;
-  const { middle, radius } = extent;
-  if (isNew && data.mesh?.index.length) navigation.fit({ middle, radius: 1.3 * radius, floor: middle[2] });
 }
 
 const whole = (number) => number.toLocaleString("en");

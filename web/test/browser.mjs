@@ -166,11 +166,16 @@ await test("a sensor that lacks what an effect needs is told in words", async ()
   await done();
 });
 
-await test("a phone shows all of the page", async () => {
+await test("a phone shows all of the page, and the object beside its legend", async () => {
   const settings = { viewport: { width: 390, height: 844 }, deviceScaleFactor: 2, isMobile: true, hasTouch: true };
   const { opened, done } = await show("#mesh=car", settings);
   const width = await opened.evaluate(() => document.documentElement.scrollWidth);
   assert.equal(width, 390);
+  const [picture, bar, legend] = await Promise.all(
+    ["canvas", ".bar", ".legend"].map((part) => opened.locator(part).boundingBox()),
+  );
+  assert.ok(legend.y - (bar.y + bar.height) > picture.height / 2, "the middle half of the picture is free");
+  assert.ok(await opened.locator("input[name=meshes]").isVisible());
   await opened.screenshot({ path: join(pictures, "phone.png"), fullPage: true });
   await done();
 });

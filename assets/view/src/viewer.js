@@ -299,7 +299,8 @@ class Viewer {
         );
       }
       const count = frame.points ? `, ${countOf(frame).toLocaleString("en")} points` : "";
-      const label = Object.assign(document.createElement("span"), { className: "title", textContent: name + count });
+      const className = this.panes.length > 1 ? "title" : "title only";
+      const label = Object.assign(document.createElement("span"), { className, textContent: name + count });
       label.style.left = `${(pane + 0.5) * width}px`;
       made.push({ label, depth: -1 });
     });

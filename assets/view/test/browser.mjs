@@ -141,12 +141,13 @@ try {
     const parts = await page.evaluate(() => Object.keys(viewer.panes[0].stage.parts).sort());
     assert.deepEqual(parts, ["beams", "grid", "meshes", "points", "sensors"]);
     const camera = () => page.evaluate(() => viewer.camera.position.toArray().join());
-    await page.click("button[name=fly]");
     const before = await camera();
+    await page.click("button[name=fly]");
     await page.focus("canvas");
     await page.keyboard.press("w", { delay: 200 });
     assert.notEqual(await camera(), before);
     await page.click("button[name=reset]");
+    assert.equal(await camera(), before);
   });
   await check("two", "meshes/lamp/train/lamp_0001.off street/sweeps/000000.npz", async (page) => {
     assert.equal(await page.locator(".labels .title").count(), 2);
