@@ -13,8 +13,7 @@ chromium="${CHROMIUM:-/usr/bin/chromium}"
 [ -x "$chromium" ] || skip "there is no $chromium"
 command -v node >/dev/null || skip "there is no node"
 command -v npm >/dev/null || skip "there is no npm"
-npm ci --silent || skip "npm could not install package.json"
-npx biome ci --error-on-warnings .
+(cd ../assets/view && npm ci --silent) || skip "npm could not install the packages of assets/view"
 
 out="${CARGO_TARGET_DIR:-../target}/web"
 rm -rf "$out"

@@ -3,14 +3,14 @@
 import assert from "node:assert/strict";
 import { mkdir, readFile } from "node:fs/promises";
 import { join } from "node:path";
-import { open } from "./chromium.mjs";
+import { faultsOf, open } from "../../assets/view/test/chromium.mjs";
 import { serve } from "./server.mjs";
 
 const [page, traced] = process.argv.slice(2);
 const pictures = join(page, "../pictures");
 await mkdir(pictures, { recursive: true });
 const address = await serve({ page, traced });
-const browser = await open();
+const browser = await open(process.env.CHROMIUM);
 
 const failures = [];
 async function test(name, check) {
@@ -27,12 +27,7 @@ async function test(name, check) {
 async function tab(settings = {}) {
   const context = await browser.newContext(settings);
   const opened = await context.newPage();
-  const faults = [];
-  opened.on("console", (message) => message.type() === "error" && faults.push(message.text()));
-  opened.on("pageerror", (error) => faults.push(`${error}`));
-  opened.on("request", (request) => {
-    if (!/^(http:\/\/localhost:|blob:|data:)/.test(request.url())) faults.push(request.url());
-  });
+  const faults = faultsOf(opened, (url) => /^(http:\/\/localhost:|blob:|data:)/.test(url));
   return { opened, done: () => context.close().then(() => assert.deepEqual(faults, [])) };
 }
 

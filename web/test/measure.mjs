@@ -3,12 +3,12 @@
 import { readdir, readFile } from "node:fs/promises";
 import { join } from "node:path";
 import { brotliCompressSync, constants } from "node:zlib";
-import { open } from "./chromium.mjs";
+import { open } from "../../assets/view/test/chromium.mjs";
 import { serve } from "./server.mjs";
 
 const [page] = process.argv.slice(2);
 const address = await serve({ page });
-const browser = await open();
+const browser = await open(process.env.CHROMIUM);
 
 /** Runs in the browser: the milliseconds of a scan and of a classification. */
 async function times([adapter, mesh]) {

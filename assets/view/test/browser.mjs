@@ -5,7 +5,7 @@ import { mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "nod
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { pathToFileURL } from "node:url";
-import { chromium } from "playwright-core";
+import { faultsOf, open } from "./chromium.mjs";
 
 const [program, executablePath, pictures] = process.argv.slice(2);
 const folder = mkdtempSync(join(tmpdir(), "edgepuck-view-"));
@@ -25,30 +25,21 @@ position_m = [3.0, 1.0, 1.0]
 look_at_m = [0.0, 0.0, 0.5]
 `;
 
-const ARGS =
-  "--no-sandbox --disable-quic --no-first-run --disable-background-networking --disable-component-update --disable-sync --use-angle=swiftshader --enable-unsafe-swiftshader";
-const browser = await chromium.launch({ executablePath, headless: true, args: ARGS.split(" ") });
+const browser = await open(executablePath);
 const context = await browser.newContext({ viewport: { width: 1280, height: 800 } });
 let nChecks = 0;
 
 /** Shows these files in a page, which may ask for nothing and report no error, and checks it. */
 async function check(name, words, test) {
   run(`view ${words} --out ${name}.html`);
-  const [page, faults] = [await context.newPage(), []];
+  const page = await context.newPage();
   const url = pathToFileURL(join(folder, `${name}.html`)).href;
-  page.on("request", (request) => request.url() !== url && faults.push(`request: ${request.url().slice(0, 100)}`));
-  page.on("console", (message) => ["error", "warning"].includes(message.type()) && faults.push(message.text()));
-  page.on("pageerror", (error) => faults.push(error.message));
+  const faults = faultsOf(page, (requested) => requested === url);
   await page.goto(url);
   await page.waitForFunction(() => viewer.firstPictureMs > 0);
   await test(page);
   if (pictures) await page.screenshot({ path: join(pictures, `${name}.png`) });
-  // What SwiftShader says of its own speed is no fault of the page.
-  assert.deepEqual(
-    faults.filter((fault) => !/GPU stall due to ReadPixels|swiftshader/i.test(fault)),
-    [],
-    name,
-  );
+  assert.deepEqual(faults, [], name);
   await page.close();
   nChecks += 1;
 }
