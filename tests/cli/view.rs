@@ -3,6 +3,8 @@
 use crate::Folder;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use formats::hash::Hashing;
+use formats::packed::PackedWriter;
 use serde_json::Value;
 
 /// The data of the page `file`.
@@ -128,4 +130,41 @@ fn folders_captures_meshes_and_scenes_are_shown() {
         ],
     );
     assert!(!folder.at("a.html").exists());
+}
+
+#[test]
+fn what_is_damaged_is_named() {
+    let folder = Folder::new();
+    folder.write("none.json", r#"{"objects": [{"class": "car", "size_m": [4, 2, 1], "yaw_deg": 0}]}"#);
+    folder.write("none.jsonl", "\n{}\n");
+    folder.write("sweep.xyz", "1 2 3\n");
+    folder.write("sweep.json", r#"{"sensor_pose": {"#);
+    let mut writer = PackedWriter::create(&folder.at("set.npz"), 1, vec!["a".into()]).unwrap();
+    writer.push(&[[0.0; 3]], 0, "a_1", 1).unwrap();
+    writer.finish(Hashing::None).unwrap();
+    folder.succeeds("view set.npz --out set.html");
+    let mut set = folder.bytes("set.npz");
+    for at in 0..set.len() - 10 {
+        if set[at..].starts_with(b"points.npy") {
+            set[at] = b'j';
+        }
+    }
+    folder.write("set.npz", set);
+    folder.write("clouds.tar", "");
+    let lack = "expected boxes as of detect, live, gen-scenes or gen-drive: found neither";
+    folder.refuses(
+        1,
+        &[
+            ("view none.json --out a.html", &format!("none.json: objects[0]: {lack}")),
+            ("view none.jsonl --out a.html", &format!("none.jsonl: line 2: {lack}")),
+            ("view sweep.xyz --out a.html", "sweep.xyz: expected its description in sweep.json"),
+            ("view sweep.xyz --out a.html", "sweep.json: objects: expected boxes as of"),
+            ("view set.npz --out a.html", "expected a packed set of labelled clouds"),
+        ],
+    );
+    folder.refuses(2, &[("view clouds.tar --out a.html", "found a tar: unpack it")]);
+    assert!(!folder.at("a.html").exists());
+    // Another file of that name is no description.
+    folder.write("sweep.json", r#"{"camera": "left"}"#);
+    folder.succeeds("view sweep.xyz --out sweep.html");
 }
