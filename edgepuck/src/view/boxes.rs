@@ -3,10 +3,9 @@
 use super::frame::Placed;
 use formats::FormatError;
 use formats::foreign::read_text;
-use glam::{DQuat, DVec3};
 use serde::Deserialize;
 use serde_json::Value;
-use sim_gpu::{Pose, glam};
+use sim_gpu::Pose;
 use std::fmt::Display;
 use std::path::Path;
 
@@ -36,6 +35,9 @@ struct Object {
     position_m: Option<[f64; 3]>,
     size_m: Option<[f64; 3]>,
     yaw_deg: Option<f64>,
+    /// Of `gen-drive`; of `live` that of the last point.
+    #[serde(alias = "last_s")]
+    time_s: Option<f64>,
 }
 
 #[derive(Clone, Copy, Deserialize)]
@@ -107,15 +109,14 @@ impl Object {
             truth: false,
             turn: self.turn,
             in_world,
+            time_s: self.time_s,
         })
     }
 }
 
 /// The truth of a box with this base in the street's frame, from the sensor.
 fn truth_seen_from(pose: Pose, placed: Placed) -> Placed {
-    let back = pose.rotation.inverse();
-    let middle = DVec3::from(placed.centre) + 0.5 * placed.size[2] * DVec3::Z;
-    let ahead = back * (DQuat::from_rotation_z(placed.yaw) * DVec3::X);
-    let centre = (back * (middle - pose.position_m)).to_array();
-    Placed { centre, yaw: ahead.y.atan2(ahead.x), truth: true, ..placed }
+    let [x, y, z] = placed.centre;
+    let centre = [x, y, z + 0.5 * placed.size[2]];
+    Placed { centre, truth: true, ..placed }.seen_from(pose)
 }
