@@ -216,13 +216,18 @@ async function take(given) {
 }
 
 function listen() {
+  // A GPU opens a device for each value of these, so that only the one that is chosen counts.
+  const areEffects = [controls.noise, controls.rain, controls.fog];
   $("controls").addEventListener("input", ({ target }) => {
-    if (target === $("file")) return;
+    if (target === $("file") || areEffects.includes(target)) return;
     if (target === controls.mesh) file = undefined;
     update();
   });
-  // Not at each step of a slider: browsers limit how often.
-  $("controls").addEventListener("change", () => history.replaceState(null, "", link()));
+  $("controls").addEventListener("change", ({ target }) => {
+    // Not at each step of a slider: browsers limit how often.
+    history.replaceState(null, "", link());
+    if (areEffects.includes(target)) update();
+  });
   $("controls").addEventListener("submit", (event) => event.preventDefault());
   $("file").addEventListener("change", () => take($("file").files[0]));
   for (const kind of ["dragenter", "dragover", "dragleave", "drop"]) {
