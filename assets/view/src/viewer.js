@@ -12,7 +12,6 @@ import style from "./viewer.css";
  *     const viewer = EdgepuckViewer.createViewer(element, data);
  *     viewer.setData(data);            // the camera and the chosen colour stay
  *     viewer.setData(data, { fit: true });
- *     viewer.dispose();
  *
  * `data` is `{ panes: [pane] }`, with one pane or two side by side. Lengths are in metres, z is up.
  * All but the names, `frames`, `position` and `columns` may be left out.
@@ -88,8 +87,7 @@ class Viewer {
     canvas.addEventListener("keyup", ({ key }) => this.navigation.key(key.toLowerCase(), false));
     this.root.addEventListener("input", ({ target }) => this.#change(target));
     this.root.addEventListener("click", ({ target }) => this.#press(target.name));
-    this.resizes = new ResizeObserver(() => this.#resize());
-    this.resizes.observe(this.root);
+    new ResizeObserver(() => this.#resize()).observe(this.root);
   }
 
   #press(what) {
@@ -291,12 +289,8 @@ class Viewer {
         add(pane, top, "box", words, facts, css(boxColour(box)));
       }
       for (const sensor of this.hidden.has("sensors") ? [] : (frame.sensors ?? [])) {
-        add(
-          pane,
-          [3, 7, 11].map((i) => sensor.pose[i]),
-          "sensor",
-          sensor.name,
-        );
+        const at = [3, 7, 11].map((i) => sensor.pose[i]);
+        add(pane, at, "sensor", sensor.name);
       }
       const count = frame.points ? `, ${countOf(frame).toLocaleString("en")} points` : "";
       const className = this.panes.length > 1 ? "title" : "title only";
@@ -344,16 +338,5 @@ class Viewer {
   #showFacts(title, facts) {
     this.facts.innerHTML = factsHtml(title, facts);
     this.facts.hidden = false;
-  }
-
-  /** Removes the viewer and frees its memory. */
-  dispose() {
-    clearInterval(this.playing);
-    cancelAnimationFrame(this.request);
-    this.resizes.disconnect();
-    for (const { stage } of this.panes) stage.dispose();
-    this.navigation.orbit.dispose();
-    this.renderer.dispose();
-    this.root.remove();
   }
 }
