@@ -14,7 +14,7 @@ chromium="${CHROMIUM:-/usr/bin/chromium}"
 command -v node >/dev/null || skip "there is no node"
 [ -d ../assets/view/node_modules ] || skip "there are no packages: run npm ci in assets/view"
 
-out="${CARGO_TARGET_DIR:-../target}/web"
+out="${CARGO_TARGET_DIR:-../target}/page-test"
 rm -rf "$out"
 sh build.sh "$out/page"
 cargo run --profile test --package edgepuck-web --example traced -- "$out/traced"
