@@ -170,7 +170,10 @@ fn boxes_in_the_world_stand_around_the_points_of_a_drive() {
 #[test]
 fn what_is_damaged_is_named() {
     let folder = Folder::new();
-    folder.write("none.json", r#"{"objects": [{"class": "car", "size_m": [4, 2, 1], "yaw_deg": 0}]}"#);
+    folder.write(
+        "none.json",
+        r#"{"objects": [{"class": "car", "size_m": [4, 2, 1], "yaw_deg": 0}]}"#,
+    );
     folder.write("none.jsonl", "\n{}\n");
     folder.write("sweep.xyz", "1 2 3\n");
     folder.write("sweep.json", r#"{"sensor_pose": {"#);

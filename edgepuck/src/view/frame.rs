@@ -134,7 +134,7 @@ impl Pane {
         }
         let has_points = self.frames.iter().any(|frame| frame.n_points() > 0);
         let boxes = match has_points && boxes.iter().any(|placed| placed.in_world) {
-            true => self.from_sensor(boxes, file)?,
+            true => self.seen_from_sensor(boxes, file)?,
             false => boxes,
         };
         for (number, frame) in (0..).zip(&mut self.frames) {
@@ -153,7 +153,7 @@ impl Pane {
     }
 
     /// The boxes in `file` from the sensor, by its poses.
-    fn from_sensor(&self, boxes: Vec<Placed>, file: &Path) -> anyhow::Result<Vec<Placed>> {
+    fn seen_from_sensor(&self, boxes: Vec<Placed>, file: &Path) -> anyhow::Result<Vec<Placed>> {
         let (file, poses) = (file.display(), self.poses.display());
         ensure!(
             self.poses.is_file(),
