@@ -4704,7 +4704,8 @@ void main() {
   flex-wrap: wrap;
   gap: 4px 12px;
   align-items: center;
-  max-width: calc(100% - 42px);
+  box-sizing: border-box;
+  max-width: calc(100% - 20px);
 }
 .edgepuck-viewer .bar:empty {
   display: none;
@@ -4845,9 +4846,6 @@ void main() {
   bottom: 62px;
 }
 @media (max-width: 700px) {
-  .edgepuck-viewer .bar {
-    max-width: calc(100% - 20px);
-  }
   .edgepuck-viewer .legend {
     right: 10px;
     max-height: 90px;
