@@ -27,7 +27,7 @@
 
 mod read;
 
-pub use read::read_labelled;
+pub use read::{is_labelled, read_labelled};
 
 /// A labelled set in memory.
 #[derive(Clone, Debug, PartialEq)]

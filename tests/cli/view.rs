@@ -3,6 +3,8 @@
 use crate::Folder;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use formats::hash::Hashing;
+use formats::packed::PackedWriter;
 use serde_json::Value;
 
 /// The data of the page `file`.
@@ -111,10 +113,6 @@ fn folders_captures_meshes_and_scenes_are_shown() {
                 "view drive drive drive --out a.html",
                 "expected at most two files side by side, found 3",
             ),
-            (
-                "view drive.pcap drive.truth.jsonl --out a.html",
-                "expected boxes in the sensor's frame",
-            ),
         ],
     );
     folder.write("empty/notes.md", "nothing");
@@ -128,4 +126,83 @@ fn folders_captures_meshes_and_scenes_are_shown() {
         ],
     );
     assert!(!folder.at("a.html").exists());
+}
+
+/// The sensor of `gen-drive` moves at 5 m/s, 0.5 m a turn, within which its points lie where it was.
+#[test]
+fn boxes_in_the_world_stand_around_the_points_of_a_drive() {
+    let folder = Folder::new();
+    folder.succeeds("gen-drive --seconds 0.3 --out drive.pcap");
+    folder.succeeds("view drive.pcap --truth drive.truth.jsonl --out drive.html");
+    let data = data(&folder, "drive.html");
+    let truth: Vec<Value> = folder
+        .text("drive.truth.jsonl")
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    let turn = &data["panes"][0]["frames"][1];
+    let positions = bytes(&turn["points"]["position"]);
+    let positions: Vec<f32> =
+        positions.as_chunks().0.iter().copied().map(f32::from_le_bytes).collect();
+    let boxes = turn["boxes"].as_array().unwrap();
+    assert!(boxes.len() > 10);
+    for placed in boxes {
+        let number = |at: &str| placed.pointer(at).unwrap().as_f64().unwrap();
+        let (sin, cos) = number("/yaw").sin_cos();
+        let inside = positions.as_chunks::<3>().0.iter().filter(|point| {
+            let off = |axis: usize| f64::from(point[axis]) - number(&format!("/centre/{axis}"));
+            let [x, y, z] = [0, 1, 2].map(off);
+            let own = [cos * x + sin * y, cos * y - sin * x, z];
+            (0..3).all(|axis| own[axis].abs() < 0.5 * number(&format!("/size/{axis}")) + 0.5)
+        });
+        let is_of = |of: &&Value| of["turn"] == 1 && of["object"] == placed["track"];
+        let points = truth.iter().find(is_of).unwrap()["points"].as_u64().unwrap();
+        assert!(inside.count() as u64 >= points, "{placed}");
+    }
+    let view = "view drive.pcap drive.truth.jsonl --out a.html";
+    let poses = folder.text("drive.tum").replace("\n9466848", "\n9467848");
+    folder.write("drive.tum", poses);
+    folder.refuses(1, &[(view, "drive.tum: times: expected poses from 946684800")]);
+    std::fs::remove_file(folder.at("drive.tum")).unwrap();
+    folder.refuses(2, &[(view, "no poses of the sensor in drive.tum: copy them there")]);
+}
+
+#[test]
+fn what_is_damaged_is_named() {
+    let folder = Folder::new();
+    folder.write(
+        "none.json",
+        r#"{"objects": [{"class": "car", "size_m": [4, 2, 1], "yaw_deg": 0}]}"#,
+    );
+    folder.write("none.jsonl", "\n{}\n");
+    folder.write("sweep.xyz", "1 2 3\n");
+    folder.write("sweep.json", r#"{"sensor_pose": {"#);
+    let mut writer = PackedWriter::create(&folder.at("set.npz"), 1, vec!["a".into()]).unwrap();
+    writer.push(&[[0.0; 3]], 0, "a_1", 1).unwrap();
+    writer.finish(Hashing::None).unwrap();
+    folder.succeeds("view set.npz --out set.html");
+    let mut set = folder.bytes("set.npz");
+    for at in 0..set.len() - 10 {
+        if set[at..].starts_with(b"points.npy") {
+            set[at] = b'j';
+        }
+    }
+    folder.write("set.npz", set);
+    folder.write("clouds.tar", "");
+    let lack = "expected boxes as of detect, live, gen-scenes or gen-drive: found neither";
+    folder.refuses(
+        1,
+        &[
+            ("view none.json --out a.html", &format!("none.json: objects[0]: {lack}")),
+            ("view none.jsonl --out a.html", &format!("none.jsonl: line 2: {lack}")),
+            ("view sweep.xyz --out a.html", "sweep.xyz: expected its description in sweep.json"),
+            ("view sweep.xyz --out a.html", "sweep.json: objects: expected boxes as of"),
+            ("view set.npz --out a.html", "expected a packed set of labelled clouds"),
+        ],
+    );
+    folder.refuses(2, &[("view clouds.tar --out a.html", "found a tar: unpack it")]);
+    assert!(!folder.at("a.html").exists());
+    // Another file of that name is no description.
+    folder.write("sweep.json", r#"{"camera": "left"}"#);
+    folder.succeeds("view sweep.xyz --out sweep.html");
 }

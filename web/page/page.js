@@ -11,48 +11,32 @@ function tag(name, properties = {}, ...children) {
 }
 
 const worker = new Worker("worker.js", { type: "module" });
-const pending = new Map();
-let nRequests = 0;
 
-/** The worker's answer to a request; an error in words if it has none. */
+/** The worker's answer to a request, of which there is one at a time; an error in words if it has none. */
 function ask(request) {
-  const id = nRequests++;
   return new Promise((resolve, reject) => {
-    pending.set(id, { resolve, reject });
-    worker.postMessage({ id, request });
+    worker.onmessage = ({ data }) => (data.error === undefined ? resolve(data.reply) : reject(data.error));
+    worker.onerror = ({ message }) => reject(`This browser cannot run the page: ${message ?? "no WebAssembly"}`);
+    worker.postMessage(request);
   });
 }
 
-const lists = new Promise((resolve, reject) => {
-  worker.onmessage = ({ data }) => {
-    if (data.lists) return resolve(data.lists);
-    const { resolve: done, reject: failed } = pending.get(data.id);
-    pending.delete(data.id);
-    return data.error === undefined ? done(data.reply) : failed(data.error);
-  };
-  worker.onerror = ({ message }) => reject(`This browser cannot run the page: ${message ?? "no WebAssembly"}`);
-});
-
-const RETURNS = [
-  ["", "ideal beams"],
-  ["strongest", "strongest"],
-  ["first", "first"],
-  ["last", "last"],
-  ["dual", "dual: last and strongest"],
-];
-const MODELS = [
-  ["edge-64", "edge-64: whole objects, 40 classes"],
-  ["shapes-rotational-64", "shapes-rotational-64: scans, 10 classes"],
-];
-const RUNS = [
-  ["auto", "GPU, or else the CPU"],
-  ["webgpu", "WebGPU"],
-  ["cpu", "CPU"],
-];
+const RETURNS = {
+  "": "ideal beams",
+  strongest: "strongest",
+  first: "first",
+  last: "last",
+  dual: "dual: last and strongest",
+};
+const MODELS = {
+  "edge-64": "edge-64: whole objects, 40 classes",
+  "shapes-rotational-64": "shapes-rotational-64: scans, 10 classes",
+};
+const RUNS = { auto: "GPU, or else the CPU", webgpu: "WebGPU", cpu: "CPU" };
 
 /** The settings: a name in the link, a label, and choices, or a range with its unit. */
 function fields({ sensors, subjects }) {
-  const same = (names) => names.map((name) => [name, name]);
+  const same = (names) => Object.fromEntries(names.map((name) => [name, name]));
   return [
     { name: "mesh", label: "Object", value: "chair", options: same(subjects) },
     { name: "sensor", label: "Sensor", value: "vlp32c", options: same(sensors) },
@@ -84,12 +68,13 @@ const settings = () => ({
   returns: chosen("returns") || null,
 });
 
+const choices = (options) =>
+  Object.entries(options).map(([value, textContent]) => tag("option", { value, textContent }));
+
 function drawFields(all) {
   const link = new URLSearchParams(location.hash.slice(1));
   const rows = all.map(({ name, label, value, options, unit, zero, ...range }) => {
-    const control = options
-      ? tag("select", {}, ...options.map(([key, text]) => tag("option", { value: key, textContent: text })))
-      : tag("input", { type: "range", ...range });
+    const control = options ? tag("select", {}, ...choices(options)) : tag("input", { type: "range", ...range });
     Object.assign(control, { id: name, name, value });
     control.dataset.usual = control.value;
     const wished = link.get(name);
@@ -153,10 +138,6 @@ function draw(reply, { subject: { name }, settings: { sensor } }, isNew) {
   const shown = { panes: [pane(reply, name, sensor)] };
   if (viewer) viewer.setData(shown, { fit: isNew });
   else viewer = EdgepuckViewer.createViewer($("viewer"), shown);
-  // All of an object, in the middle of the picture.
-  const { extent, navigation } = viewer;
-  const { middle, radius } = extent;
-  if (isNew && data.mesh?.index.length) navigation.fit({ middle, radius: 1.3 * radius, floor: middle[2] });
 }
 
 const whole = (number) => number.toLocaleString("en");
@@ -220,13 +201,18 @@ async function take(given) {
 }
 
 function listen() {
+  // A GPU opens a device for each value of these, so that only the one that is chosen counts.
+  const areEffects = [controls.noise, controls.rain, controls.fog];
   $("controls").addEventListener("input", ({ target }) => {
-    if (target === $("file")) return;
+    if (target === $("file") || areEffects.includes(target)) return;
     if (target === controls.mesh) file = undefined;
     update();
   });
-  // Not at each step of a slider: browsers limit how often.
-  $("controls").addEventListener("change", () => history.replaceState(null, "", link()));
+  $("controls").addEventListener("change", ({ target }) => {
+    // Not at each step of a slider: browsers limit how often.
+    history.replaceState(null, "", link());
+    if (areEffects.includes(target)) update();
+  });
   $("controls").addEventListener("submit", (event) => event.preventDefault());
   $("file").addEventListener("change", () => take($("file").files[0]));
   for (const kind of ["dragenter", "dragover", "dragleave", "drop"]) {
@@ -244,7 +230,7 @@ function listen() {
 }
 
 try {
-  drawFields(fields(await lists));
+  drawFields(fields(await ask({ lists: true })));
   listen();
   await update();
   document.body.dataset.firstPictureMs = performance.now();

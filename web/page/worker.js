@@ -53,7 +53,6 @@ async function timed(work) {
 }
 
 async function answer(request) {
-  await ready;
   await take(request);
   const [scanned, castMs] = await timed(() => simulator.scan(JSON.stringify(request.settings)));
   const [found, classMs] = await timed(() => simulator.classify(scanned));
@@ -67,20 +66,19 @@ async function answer(request) {
   return { scan, answer, castMs, classMs, place: has.place, warnings: has.warnings ?? [] };
 }
 
-let last = Promise.resolve();
-addEventListener("message", ({ data: { id, request } }) => {
-  const next = last.then(() => answer(request));
-  last = next.then(
-    (reply) => {
-      const arrays = Object.values(reply.scan).filter(ArrayBuffer.isView);
-      const transfer = arrays.map((array) => array.buffer);
-      postMessage({ id, reply }, transfer);
-    },
-    (error) => {
-      postMessage({ id, error: typeof error === "string" ? error : `This page has a fault: ${error}` });
-      // After a panic, or a device that was lost, nothing of it can be used.
-      if (typeof error !== "string" || error.startsWith("adapter ")) [has, simulator] = [{}, undefined];
-    },
-  );
+addEventListener("message", async ({ data: request }) => {
+  await ready;
+  try {
+    const lists = request.lists && { sensors: Simulator.sensors(), subjects: Simulator.built_ins() };
+    const reply = lists ?? (await answer(request));
+    const arrays = Object.values(reply.scan ?? {}).filter(ArrayBuffer.isView);
+    const transfer = arrays.map((array) => array.buffer);
+    postMessage({ reply }, transfer);
+  } catch (error) {
+    postMessage({ error: typeof error === "string" ? error : `This page has a fault: ${error}` });
+    // After a panic, or a device that was lost, nothing of it can be used.
+    if (typeof error !== "string" || error.startsWith("adapter ")) [has, simulator] = [{}, undefined];
+  }
 });
-postMessage({ lists: await ready.then(() => ({ sensors: Simulator.sensors(), subjects: Simulator.built_ins() })) });
+// Where it fails, the page hears of it as an error of the worker.
+await ready;

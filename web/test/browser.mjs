@@ -3,14 +3,14 @@
 import assert from "node:assert/strict";
 import { mkdir, readFile } from "node:fs/promises";
 import { join } from "node:path";
-import { open } from "./chromium.mjs";
+import { faultsOf, open } from "../../assets/view/test/chromium.mjs";
 import { serve } from "./server.mjs";
 
 const [page, traced] = process.argv.slice(2);
 const pictures = join(page, "../pictures");
 await mkdir(pictures, { recursive: true });
 const address = await serve({ page, traced });
-const browser = await open();
+const browser = await open(process.env.CHROMIUM);
 
 const failures = [];
 async function test(name, check) {
@@ -27,12 +27,7 @@ async function test(name, check) {
 async function tab(settings = {}) {
   const context = await browser.newContext(settings);
   const opened = await context.newPage();
-  const faults = [];
-  opened.on("console", (message) => message.type() === "error" && faults.push(message.text()));
-  opened.on("pageerror", (error) => faults.push(`${error}`));
-  opened.on("request", (request) => {
-    if (!/^(http:\/\/localhost:|blob:|data:)/.test(request.url())) faults.push(request.url());
-  });
+  const faults = faultsOf(opened, (url) => /^(http:\/\/localhost:|blob:|data:)/.test(url));
   return { opened, done: () => context.close().then(() => assert.deepEqual(faults, [])) };
 }
 
@@ -117,7 +112,13 @@ await test("the page names the chair that it begins with, and the link holds the
 
 await test("WebGPU casts where it is asked for, and is named", async () => {
   const { opened, done } = await show("#run=webgpu&mesh=airplane&noise=0.01");
-  assert.match(await text(opened, "facts"), /on WebGPU \(google swiftshader\)/);
+  // More devices than are kept: the first ones are destroyed meanwhile.
+  for (let i = 0; i < 6; i++) {
+    await opened.locator("#noise").press("ArrowRight");
+    await idle(opened);
+    assert.match(await text(opened, "facts"), /on WebGPU \(google swiftshader\)/);
+  }
+  assert.equal(new URL(opened.url()).hash, "#mesh=airplane&noise=0.016&run=webgpu");
   await done();
   return text(opened, "facts").catch(() => "");
 });
@@ -164,11 +165,16 @@ await test("a sensor that lacks what an effect needs is told in words", async ()
   await done();
 });
 
-await test("a phone shows all of the page", async () => {
+await test("a phone shows all of the page, and the object beside its legend", async () => {
   const settings = { viewport: { width: 390, height: 844 }, deviceScaleFactor: 2, isMobile: true, hasTouch: true };
   const { opened, done } = await show("#mesh=car", settings);
   const width = await opened.evaluate(() => document.documentElement.scrollWidth);
   assert.equal(width, 390);
+  const [picture, bar, legend] = await Promise.all(
+    ["canvas", ".bar", ".legend"].map((part) => opened.locator(part).boundingBox()),
+  );
+  assert.ok(legend.y - (bar.y + bar.height) > picture.height / 2, "the middle half of the picture is free");
+  assert.ok(await opened.locator("input[name=meshes]").isVisible());
   await opened.screenshot({ path: join(pictures, "phone.png"), fullPage: true });
   await done();
 });

@@ -2,13 +2,13 @@
 // the least of 41, on one thread: other programs only add to them.
 import { readdir, readFile } from "node:fs/promises";
 import { join } from "node:path";
-import { brotliCompressSync, constants } from "node:zlib";
-import { open } from "./chromium.mjs";
+import { brotliCompressSync } from "node:zlib";
+import { open } from "../../assets/view/test/chromium.mjs";
 import { serve } from "./server.mjs";
 
 const [page] = process.argv.slice(2);
 const address = await serve({ page });
-const browser = await open();
+const browser = await open(process.env.CHROMIUM);
 
 /** Runs in the browser: the milliseconds of a scan and of a classification. */
 async function times([adapter, mesh]) {
@@ -67,12 +67,8 @@ for (let i = 0; i < 5; i++) {
 console.log(`first picture after ${(pictures.sort((a, b) => a - b)[2] / 1000).toFixed(2)} s, the median of 5`);
 await browser.close();
 
-const settings = { params: { [constants.BROTLI_PARAM_QUALITY]: 11 } };
-const sizes = [];
-for (const file of await readdir(page)) {
-  if (file.endsWith("rotational-64.safetensors")) continue;
-  sizes.push([file, brotliCompressSync(await readFile(join(page, file)), settings).length]);
-}
-for (const [file, bytes] of sizes) console.log(`${file}: ${bytes} bytes by brotli -q 11`);
-const total = sizes.reduce((sum, [, bytes]) => sum + bytes, 0);
-console.log(`in all: ${(total / 1e6).toFixed(2)} MB`);
+// The network for scans is only loaded where it is chosen.
+const files = (await readdir(page)).filter((file) => !file.endsWith("rotational-64.safetensors"));
+const contents = await Promise.all(files.map((file) => readFile(join(page, file))));
+const total = contents.reduce((sum, content) => sum + brotliCompressSync(content).length, 0);
+console.log(`${files.join(", ")}: ${(total / 1e6).toFixed(2)} MB by brotli -q 11`);

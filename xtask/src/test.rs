@@ -89,7 +89,7 @@ fn run_all(args: &Args, summary: &mut Summary) {
             smallest_lints(&mut summary);
             summary.step("dependencies", |_| infer_cpu_is_light());
             targets::run(&mut summary, install);
-            page::run(&mut summary);
+            page::run(&mut summary, install);
             let with_pytorch = args.peers == peers::Which::All;
             let wheel = python::run(&mut summary, wheel, with_pytorch);
             docs::run_blocks(&mut summary, &wheel);

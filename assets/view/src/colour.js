@@ -25,7 +25,7 @@ export function classColour(name) {
 export const nameOf = (column, value) => column.names?.[value] ?? `${value}`;
 
 /** How a column's values become colours, by `look`: from `low` to `high`, or each of `entries` its own. */
-export const scaleOf = (column) => (column.kind === "number" ? rampOf(column.values) : entriesOf(column));
+export const scaleOf = (column, span) => (column.kind === "number" ? rampOf(span) : entriesOf(column));
 
 function entriesOf(column) {
   const counts = new Map();
@@ -39,12 +39,17 @@ function entriesOf(column) {
   return { entries, look: (value) => colours.get(value) };
 }
 
-/** Without the least and the greatest values: a few far ones would take all colours. */
-function rampOf(values) {
-  const step = Math.ceil(values.length / MOST_SAMPLED);
-  const sample = values.filter((value, i) => i % step === 0 && Number.isFinite(value)).sort();
-  const [first, last] = [0.02, 0.96].map((share) => sample[Math.round(share * (sample.length - 1))] ?? 0);
-  const [low, high] = last > first ? [first, last] : [first - 0.5, first + 0.5];
+/** The span of the colours of these columns without the least and the greatest values: a few far ones would
+ * take all colours. */
+export function spanOf(columns) {
+  const step = Math.ceil(columns.reduce((sum, { values }) => sum + values.length, 0) / MOST_SAMPLED);
+  const isSampled = (value, i) => i % step === 0 && Number.isFinite(value);
+  const sample = Float64Array.from(columns.flatMap(({ values }) => [...values.filter(isSampled)])).sort();
+  const [low, high] = [0.02, 0.96].map((share) => sample[Math.round(share * (sample.length - 1))] ?? 0);
+  return high > low ? [low, high] : [low - 0.5, low + 0.5];
+}
+
+function rampOf([low, high]) {
   const shades = Array.from({ length: SHADES }, (_, i) => {
     const place = (i / (SHADES - 1)) * (ramp.length - 1);
     const [left, right] = [ramp[Math.floor(place)], ramp[Math.ceil(place)]];

@@ -21,7 +21,7 @@ export function scaleHtml(column) {
   if (!scale.entries) {
     const marks = [scale.low, (scale.low + scale.high) / 2, scale.high].map((x) => Number(x.toPrecision(3)));
     const ramp = `<div class="ramp" style="background:${rampCss}"></div>`;
-    return `${title}${ramp}<div class="marks"><span>${marks.join("</span><span>")}</span></div>`;
+    return `${title}<div>${ramp}<div class="marks"><span>${marks.join("</span><span>")}</span></div></div>`;
   }
   const entries = scale.entries.slice(0, MOST_ENTRIES).map(({ value, count }) => {
     return entry(scale.look(value), nameOf(column, value), count.toLocaleString("en"));

@@ -18,15 +18,16 @@ export class Navigation {
     });
   }
 
-  /** Looks at an extent from behind and above. */
-  fit({ middle, radius, floor }) {
-    const target = new Vector3(middle[0], middle[1], Math.max(floor, middle[2] - radius / 4));
+  /** Looks at an extent from behind and above: at all of an object, at what is low and near of a sweep. */
+  fit({ middle, radius, floor, isSweep }) {
+    const [height, distance] = isSweep ? [Math.max(floor, middle[2] - radius / 4), 1.75] : [middle[2], 2.3];
+    const target = new Vector3(middle[0], middle[1], height);
     this.radius = radius;
     this.camera.near = radius / 500;
     this.camera.far = radius * 200;
     this.camera.position
       .copy(target)
-      .addScaledVector(new Vector3(-0.82, -0.55, 0.62), (1.75 * radius) / Math.min(1, this.camera.aspect));
+      .addScaledVector(new Vector3(-0.82, -0.55, 0.62), (distance * radius) / Math.min(1, this.camera.aspect));
     this.orbit.target.copy(target);
     this.camera.updateProjectionMatrix();
     this.orbit.update();

@@ -117,15 +117,15 @@ export function extentOf(frame) {
   for (const mesh of frame.meshes ?? []) add(mesh.position);
   for (const { pose } of frame.meshes?.length ? (frame.sensors ?? []) : []) add([pose[3], pose[7], pose[11]]);
   for (const box of axes[0].length ? [] : (frame.boxes ?? [])) add(corners(box).flat());
-  if (!axes[0].length) return { middle: [0, 0, 0], radius: 5, floor: 0 };
+  if (!axes[0].length) return { middle: [0, 0, 0], radius: 5, floor: 0, isSweep: false };
   for (const axis of axes) axis.sort((a, b) => a - b);
   const at = (axis, share) => axes[axis][Math.round(share * (axes[axis].length - 1))];
-  const isSweep = !frame.meshes?.length && at(0, 0.5) !== undefined && frame.sensors?.length;
+  const isSweep = !frame.meshes?.length && frame.sensors?.length > 0;
   // Of a sweep, the near part matters; of an object all.
   const [low, high] = isSweep ? [0.1, 0.9] : [0, 1];
   const middle = [0, 1, 2].map((axis) => (at(axis, low) + at(axis, high)) / 2);
   const half = [0, 1, 2].map((axis) => (at(axis, high) - at(axis, low)) / 2);
-  return { middle, radius: Math.max(Math.hypot(...half), 1e-3), floor: at(2, 0.01) };
+  return { middle, radius: Math.max(Math.hypot(...half), 1e-3), floor: at(2, 0.01), isSweep };
 }
 
 /** The columns by which points can be coloured: those of the file, the height and the range. */
@@ -189,17 +189,17 @@ export class Stage {
     this.scene.add(object);
   }
 
-  /** Colours the points by the column of this name; returns the column and its scale. */
-  colourBy(name) {
+  /** Colours the points by the column of this name, with the span of its colours; returns it and its scale. */
+  colourBy(name, spanOf) {
     const column = this.columns.find((one) => one.name === name) ?? this.columns[0];
     if (!column) return undefined;
-    column.scale ??= scaleOf(column);
+    const scale = scaleOf(column, spanOf(column));
     const { array } = this.tints;
     column.values.forEach((value, i) => {
-      [array[3 * i], array[3 * i + 1], array[3 * i + 2]] = column.scale.look(value);
+      [array[3 * i], array[3 * i + 1], array[3 * i + 2]] = scale.look(value);
     });
     this.tints.needsUpdate = true;
-    return column;
+    return { ...column, scale };
   }
 
   dispose() {

@@ -1,9 +1,9 @@
 import * as THREE from "three";
-import { css } from "./colour.js";
+import { css, spanOf } from "./colour.js";
 import { boxesHtml, escaped, factsHtml, scaleHtml, shown, titleOf } from "./legend.js";
 import { Navigation } from "./navigation.js";
 import { pick } from "./picking.js";
-import { boxColour, extentOf, pointMaterial, Stage } from "./stage.js";
+import { boxColour, columnsOf, extentOf, pointMaterial, Stage } from "./stage.js";
 import style from "./viewer.css";
 
 /**
@@ -12,7 +12,6 @@ import style from "./viewer.css";
  *     const viewer = EdgepuckViewer.createViewer(element, data);
  *     viewer.setData(data);            // the camera and the chosen colour stay
  *     viewer.setData(data, { fit: true });
- *     viewer.dispose();
  *
  * `data` is `{ panes: [pane] }`, with one pane or two side by side. Lengths are in metres, z is up.
  * All but the names, `frames`, `position` and `columns` may be left out.
@@ -88,8 +87,7 @@ class Viewer {
     canvas.addEventListener("keyup", ({ key }) => this.navigation.key(key.toLowerCase(), false));
     this.root.addEventListener("input", ({ target }) => this.#change(target));
     this.root.addEventListener("click", ({ target }) => this.#press(target.name));
-    this.resizes = new ResizeObserver(() => this.#resize());
-    this.resizes.observe(this.root);
+    new ResizeObserver(() => this.#resize()).observe(this.root);
   }
 
   #press(what) {
@@ -116,7 +114,7 @@ class Viewer {
   }
 
   setData(data, { fit = false } = {}) {
-    this.data = data;
+    [this.data, this.spans] = [data, {}];
     this.nFrames = Math.max(1, ...data.panes.map((pane) => pane.frames.length));
     this.time.hidden = this.nFrames < 2;
     // The first turn of a capture may have only a few points.
@@ -151,7 +149,7 @@ class Viewer {
   /** Colours the points by the column of this name. */
   colourBy(name) {
     this.colour = name;
-    for (const pane of this.panes) pane.column = pane.stage.colourBy(name);
+    for (const pane of this.panes) pane.column = pane.stage.colourBy(name, (column) => this.#spanOf(column));
     const columns = this.panes.map(({ column }) => column).filter(Boolean);
     const scales = columns.map(scaleHtml);
     const boxes = boxesHtml(
@@ -161,6 +159,14 @@ class Viewer {
     const grid = `<small>grid ${shown(this.panes[0]?.stage.gridStep ?? 1)} m</small>`;
     this.legend.innerHTML = [...new Set(scales), boxes, grid].join("");
     this.invalidate();
+  }
+
+  /** A colour means the same in all frames and panes. */
+  #spanOf({ name, kind }) {
+    const frames = this.data.panes.flatMap((pane) => pane.frames);
+    const isOf = (other) => other.name === name && other.kind === kind;
+    if (kind === "number") this.spans[name] ??= spanOf(frames.flatMap((frame) => columnsOf(frame).filter(isOf)));
+    return this.spans[name];
   }
 
   /** Shows the frame with this number of each pane. */
@@ -283,15 +289,12 @@ class Viewer {
         add(pane, top, "box", words, facts, css(boxColour(box)));
       }
       for (const sensor of this.hidden.has("sensors") ? [] : (frame.sensors ?? [])) {
-        add(
-          pane,
-          [3, 7, 11].map((i) => sensor.pose[i]),
-          "sensor",
-          sensor.name,
-        );
+        const at = [3, 7, 11].map((i) => sensor.pose[i]);
+        add(pane, at, "sensor", sensor.name);
       }
       const count = frame.points ? `, ${countOf(frame).toLocaleString("en")} points` : "";
-      const label = Object.assign(document.createElement("span"), { className: "title", textContent: name + count });
+      const className = this.panes.length > 1 ? "title" : "title only";
+      const label = Object.assign(document.createElement("span"), { className, textContent: name + count });
       label.style.left = `${(pane + 0.5) * width}px`;
       made.push({ label, depth: -1 });
     });
@@ -335,16 +338,5 @@ class Viewer {
   #showFacts(title, facts) {
     this.facts.innerHTML = factsHtml(title, facts);
     this.facts.hidden = false;
-  }
-
-  /** Removes the viewer and frees its memory. */
-  dispose() {
-    clearInterval(this.playing);
-    cancelAnimationFrame(this.request);
-    this.resizes.disconnect();
-    for (const { stage } of this.panes) stage.dispose();
-    this.navigation.orbit.dispose();
-    this.renderer.dispose();
-    this.root.remove();
   }
 }

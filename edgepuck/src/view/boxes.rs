@@ -3,9 +3,10 @@
 use super::frame::Placed;
 use formats::FormatError;
 use formats::foreign::read_text;
-use glam::{DQuat, DVec3};
 use serde::Deserialize;
-use sim_gpu::{Pose, glam};
+use serde_json::Value;
+use sim_gpu::Pose;
+use std::fmt::Display;
 use std::path::Path;
 
 /// A file of one sweep.
@@ -34,6 +35,9 @@ struct Object {
     position_m: Option<[f64; 3]>,
     size_m: Option<[f64; 3]>,
     yaw_deg: Option<f64>,
+    /// Of `gen-drive`; of `live` that of the last point.
+    #[serde(alias = "last_s")]
+    time_s: Option<f64>,
 }
 
 #[derive(Clone, Copy, Deserialize)]
@@ -43,41 +47,59 @@ struct Cuboid {
     yaw_deg: f64,
 }
 
+/// The truth of the sweep that `gen-scenes` describes in `file`; none if the file is another's.
+pub fn described(file: &Path) -> Result<Vec<Placed>, FormatError> {
+    let text = read_text(file, u64::MAX).map_err(|source| FormatError::io(file, source))?;
+    match serde_json::from_str::<Value>(&text) {
+        Ok(other) if other.get("sensor_pose").is_none() => Ok(Vec::new()),
+        _ => read(file),
+    }
+}
+
 /// Reads the boxes in `file`: an object of JSON with all, or a line of JSON for each.
 pub fn read(file: &Path) -> Result<Vec<Placed>, FormatError> {
     let text = read_text(file, u64::MAX).map_err(|source| FormatError::io(file, source))?;
-    let flaw = |key: &str, error: serde_json::Error| {
+    let flaw = |key: &str, error: &dyn Display| {
         let cause = format!("expected boxes as of detect, live, gen-scenes or gen-drive: {error}");
         FormatError::malformed(file, key, cause)
     };
     if file.extension().is_some_and(|found| found.eq_ignore_ascii_case("jsonl")) {
-        let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
-        let objects = lines.map(|(i, line)| {
-            let key = format!("line {}", i + 1);
-            let object: Object = serde_json::from_str(line).map_err(|error| flaw(&key, error))?;
-            Ok((object.frame.as_deref() != Some("sensor"), object))
+        let lines = (1..).zip(text.lines()).filter(|(_, line)| !line.trim().is_empty());
+        let placed = lines.map(|(number, line)| {
+            let key = format!("line {number}");
+            let object: Object = serde_json::from_str(line).map_err(|error| flaw(&key, &error))?;
+            let in_world = object.frame.as_deref() != Some("sensor");
+            object.placed(in_world).map_err(|cause| flaw(&key, &cause))
         });
-        let objects = objects.collect::<Result<Vec<_>, FormatError>>()?;
-        return Ok(objects.into_iter().filter_map(|(world, of)| of.placed(world)).collect());
+        return placed.collect();
     }
     let OfSweep { objects, sensor_pose } =
-        serde_json::from_str(&text).map_err(|error| flaw("objects", error))?;
+        serde_json::from_str(&text).map_err(|error| flaw("objects", &error))?;
     let is_seen = |object: &Object| sensor_pose.is_none() || object.points != Some(0);
-    let objects = objects.into_iter().filter(is_seen).filter_map(|object| object.placed(false));
-    Ok(match sensor_pose {
-        Some(pose) => objects.map(|placed| seen_from(pose, placed)).collect(),
-        None => objects.collect(),
-    })
+    let objects = (0..).zip(objects).filter(|(_, object)| is_seen(object));
+    let placed = objects.map(|(i, object): (usize, Object)| {
+        let placed = object.placed(false);
+        let placed = placed.map_err(|cause| flaw(&format!("objects[{i}]"), &cause))?;
+        Ok(match sensor_pose {
+            Some(pose) => truth_seen_from(pose, placed),
+            None => placed,
+        })
+    });
+    placed.collect()
 }
 
 impl Object {
-    fn placed(self, in_world: bool) -> Option<Placed> {
+    fn placed(self, in_world: bool) -> Result<Placed, &'static str> {
         let own = || {
             let (centre_m, size_m) = (self.position_m?, self.size_m?);
             Some(Cuboid { centre_m, size_m, yaw_deg: self.yaw_deg? })
         };
-        let Cuboid { centre_m, size_m, yaw_deg } = self.whole_box.or(self.r#box).or_else(own)?;
-        Some(Placed {
+        let Cuboid { centre_m, size_m, yaw_deg } =
+            self.whole_box.or(self.r#box).or_else(own).ok_or(
+                "found neither `whole_box` nor `box`, nor the three of `position_m`, `size_m` and \
+                 `yaw_deg`",
+            )?;
+        Ok(Placed {
             class: self.class,
             centre: centre_m,
             size: size_m,
@@ -87,15 +109,14 @@ impl Object {
             truth: false,
             turn: self.turn,
             in_world,
+            time_s: self.time_s,
         })
     }
 }
 
 /// The truth of a box with this base in the street's frame, from the sensor.
-fn seen_from(pose: Pose, placed: Placed) -> Placed {
-    let back = pose.rotation.inverse();
-    let middle = DVec3::from(placed.centre) + 0.5 * placed.size[2] * DVec3::Z;
-    let ahead = back * (DQuat::from_rotation_z(placed.yaw) * DVec3::X);
-    let centre = (back * (middle - pose.position_m)).to_array();
-    Placed { centre, yaw: libm::atan2(ahead.y, ahead.x), truth: true, ..placed }
+fn truth_seen_from(pose: Pose, placed: Placed) -> Placed {
+    let [x, y, z] = placed.centre;
+    let centre = [x, y, z + 0.5 * placed.size[2]];
+    Placed { centre, truth: true, ..placed }.seen_from(pose)
 }

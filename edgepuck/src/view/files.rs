@@ -6,9 +6,9 @@ use super::frame::{Frame, Labels, Placed, Points};
 use super::scene;
 use crate::points::{PointsArgs, warn_of_packets};
 use crate::{Usage, colours};
-use anyhow::ensure;
+use anyhow::{Context, bail, ensure};
 use formats::cloud_file::{CloudFormat, must_be_scan};
-use formats::labelled::read_labelled;
+use formats::labelled::{is_labelled, read_labelled};
 use formats::turns::read_turns;
 use formats::{FormatError, Scan, Senders, ouster};
 use sim_gpu::internals::import::Format;
@@ -36,6 +36,11 @@ pub fn read(file: &Path, points: &PointsArgs) -> anyhow::Result<Content> {
         "json" | "jsonl" => return Ok(Content::Boxes(boxes::read(file)?)),
         _ if points.is_capture(file) => turns(file, points)?,
         "toml" | "urdf" => vec![scene::read(file)?],
+        "tar" => bail!(Usage(format!(
+            "{}: expected points, meshes or boxes, found a tar: unpack it with `tar -xf`, and show a \
+             file of it",
+            file.display()
+        ))),
         "ply" if !has_faces(file) => vec![cloud(file, points)?],
         _ if Format::from_path(file).is_some() => vec![scene::read(file)?],
         _ if MeshFormat::from_path(file).is_some() => vec![scene::of_mesh(file)?],
@@ -61,11 +66,21 @@ fn cloud(file: &Path, points: &PointsArgs) -> anyhow::Result<Frame> {
     let scan = points.read(file)?;
     let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let mut labels = semantic_labels(file, scan.len())?;
-    // Another file of this name is no description of a sweep.
-    let described = boxes::read(&file.with_extension("json")).unwrap_or_default();
-    let truth: Vec<_> = described.into_iter().filter(|placed| placed.truth).collect();
+    let truth = description(file)?;
     labels.extend(scan.object.as_ref().filter(|_| !truth.is_empty()).map(|of| classes(of, &truth)));
     Ok(Frame { boxes: truth, ..Frame::of_scan(name, scan, labels) })
+}
+
+/// What `gen-scenes` describes beside the sweep.
+fn description(sweep: &Path) -> anyhow::Result<Vec<Placed>> {
+    let beside = sweep.with_extension("json");
+    if !beside.is_file() {
+        return Ok(Vec::new());
+    }
+    boxes::described(&beside).with_context(|| {
+        let (sweep, beside) = (sweep.display(), beside.display());
+        format!("{sweep}: expected its description in {beside}: write it again, or move it away")
+    })
 }
 
 /// The class of each point by the number of its object.
@@ -129,7 +144,13 @@ fn semantic_labels(file: &Path, n_points: usize) -> anyhow::Result<Vec<Labels>> 
 
 /// A packed set, a frame for each cloud; or else a cloud.
 fn set(file: &Path, points: &PointsArgs) -> anyhow::Result<Vec<Frame>> {
-    let Ok(set) = read_labelled(file) else { return Ok(vec![cloud(file, points)?]) };
+    let set = match read_labelled(file) {
+        Ok(set) => set,
+        Err(flaw) => match cloud(file, points) {
+            Err(_) if is_labelled(file) => return Err(flaw.into()),
+            cloud => return Ok(vec![cloud?]),
+        },
+    };
     let shown = set.len().min(MOST_FRAMES);
     if shown < set.len() {
         let file = file.display();

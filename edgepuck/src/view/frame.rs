@@ -1,23 +1,32 @@
 //! What a page shows, in the form that the viewer's JavaScript takes (`createViewer` in
 //! assets/view/src/viewer.js).
 
-use anyhow::ensure;
+use anyhow::{Context, ensure};
 use base64::display::Base64Display;
 use base64::engine::general_purpose::STANDARD;
 use bytemuck::cast_slice;
-use formats::Scan;
 use formats::scan::{Attribute, Column};
+use formats::trajectory::check_cover;
+use formats::{FormatError, Scan};
+use glam::{DQuat, DVec3};
 use serde::ser::{SerializeMap, SerializeStruct};
 use serde::{Serialize, Serializer};
-use std::path::Path;
+use sim_gpu::{Pose, Trajectory, glam};
+use std::path::{Path, PathBuf};
 
 use crate::Usage;
+
+/// The time between poses in KITTI's format, which has no times: seconds.
+const KITTI_S: f64 = 0.1;
 
 /// A file, or a drive or a folder of sweeps.
 #[derive(Serialize)]
 pub struct Pane {
     name: String,
     pub frames: Vec<Frame>,
+    /// Where the sensor's poses would be, if it moves: `gen-drive` writes them beside a capture.
+    #[serde(skip)]
+    poses: PathBuf,
 }
 
 /// What is seen at once.
@@ -85,12 +94,16 @@ pub struct Placed {
     /// Whether its frame is the world's, and not the sensor's.
     #[serde(skip)]
     pub in_world: bool,
+    /// When it was there: Unix time in seconds.
+    #[serde(skip)]
+    pub time_s: Option<f64>,
 }
 
 impl Pane {
     pub fn new(file: &Path, frames: Vec<Frame>) -> Self {
         let name = file.file_name().unwrap_or(file.as_os_str());
-        Self { name: name.to_string_lossy().into_owned(), frames }
+        let poses = file.with_extension("tum");
+        Self { name: name.to_string_lossy().into_owned(), frames, poses }
     }
 
     pub fn is_empty(&self) -> bool {
@@ -120,14 +133,10 @@ impl Pane {
             self.frames = turns.into_iter().map(frame).collect();
         }
         let has_points = self.frames.iter().any(|frame| frame.n_points() > 0);
-        ensure!(
-            !has_points || boxes.iter().all(|placed| !placed.in_world),
-            Usage(format!(
-                "{}: expected boxes in the sensor's frame, as its points are, found boxes in the \
-                 world's: show them alone, or of `live` without --poses",
-                file.display()
-            ))
-        );
+        let boxes = match has_points && boxes.iter().any(|placed| placed.in_world) {
+            true => self.seen_from_sensor(boxes, file)?,
+            false => boxes,
+        };
         for (number, frame) in (0..).zip(&mut self.frames) {
             let is_of = |placed: &&Placed| {
                 placed.turn.is_none_or(|turn| turn == frame.turn.unwrap_or(number))
@@ -141,6 +150,31 @@ impl Pane {
             frame.boxes.extend(boxes);
         }
         Ok(())
+    }
+
+    /// The boxes in `file` from the sensor, by its poses.
+    fn seen_from_sensor(&self, boxes: Vec<Placed>, file: &Path) -> anyhow::Result<Vec<Placed>> {
+        let (file, poses) = (file.display(), self.poses.display());
+        ensure!(
+            self.poses.is_file(),
+            Usage(format!(
+                "{file}: expected boxes in the sensor's frame, as its points are, found boxes in the \
+                 world's, and no poses of the sensor in {poses}: copy them there, or show the boxes \
+                 alone, or those of `live` without --poses"
+            ))
+        );
+        let motion = Trajectory::load(&self.poses, KITTI_S)?;
+        let seen = boxes.into_iter().map(|placed| {
+            if !placed.in_world {
+                return Ok(placed);
+            }
+            let lack = || format!("{file}: expected `time_s` or `last_s` of each box, found none");
+            let time_s = placed.time_s.with_context(lack)?;
+            check_cover(motion.known_s(), [time_s; 2])
+                .map_err(|cause| FormatError::malformed(&self.poses, "times", cause))?;
+            Ok(placed.seen_from(motion.at(time_s)))
+        });
+        seen.collect()
     }
 
     /// Keeps so few frames, evenly, and so few points of each, evenly, that there are about `most`
@@ -166,6 +200,16 @@ impl Pane {
                 }
             }
         }
+    }
+}
+
+impl Placed {
+    /// The box in the frame of a sensor with this pose.
+    pub fn seen_from(self, pose: Pose) -> Self {
+        let back = pose.rotation.inverse();
+        let ahead = back * (DQuat::from_rotation_z(self.yaw) * DVec3::X);
+        let centre = (back * (DVec3::from(self.centre) - pose.position_m)).to_array();
+        Self { centre, yaw: libm::atan2(ahead.y, ahead.x), ..self }
     }
 }
 

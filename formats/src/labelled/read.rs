@@ -54,6 +54,12 @@ pub fn read_labelled(path: &Path) -> Result<LabelledSet, FormatError> {
     })
 }
 
+/// Whether the NPZ archive at `path` has labels or offsets, as labelled sets do, damaged ones too.
+#[must_use]
+pub fn is_labelled(path: &Path) -> bool {
+    NpzReader::open(path).is_ok_and(|npz| npz.has("labels") || npz.has("offsets"))
+}
+
 /// The `count` values of `key`; `None` if the file does not have it, or without a count.
 fn column<T>(
     npz: &mut NpzReader,

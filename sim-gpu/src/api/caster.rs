@@ -5,7 +5,7 @@ use crate::cast_error::CastError;
 use crate::caster::{AdapterRequest, OpenCaster};
 use crate::effects::Effects;
 use std::fmt;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Pipelines of a GPU that are kept, each with its buffers.
 const MOST_OPEN: usize = 4;
@@ -27,6 +27,8 @@ pub struct Caster {
     why_no_gpu: Option<String>,
     skipped: Vec<String>,
     opened: Mutex<Vec<Arc<OpenCaster>>>,
+    /// Held while one opens.
+    opening: Mutex<()>,
 }
 
 impl fmt::Debug for Caster {
@@ -127,7 +129,8 @@ impl Caster {
     /// The adapter does not open.
     #[doc(hidden)]
     pub fn for_effects(&self, effects: &Effects) -> Result<Arc<OpenCaster>, CastError> {
-        pollster::block_on(self.for_effects_async(effects))
+        let request = AdapterRequest::Named(self.name.clone());
+        self.open_once(effects, || OpenCaster::open(&request, effects))
     }
 
     /// As [`Caster::for_effects`], in a browser too.
@@ -136,24 +139,46 @@ impl Caster {
     /// As [`Caster::for_effects`].
     #[doc(hidden)]
     pub async fn for_effects_async(&self, effects: &Effects) -> Result<Arc<OpenCaster>, CastError> {
+        // Only a browser's adapters answer later. A page has one thread, which must not wait for itself.
+        if !cfg!(target_family = "wasm") {
+            return self.for_effects(effects);
+        }
         if let Some(caster) = self.opened(effects) {
             return Ok(caster);
         }
         let request = AdapterRequest::Named(self.name.clone());
-        let caster = OpenCaster::open_async(&request, effects).await?;
-        // Another thread may have opened one meanwhile.
-        Ok(self.opened(effects).unwrap_or_else(|| {
-            let caster = Arc::new(caster);
-            let mut opened = self.opened.lock().unwrap_or_else(PoisonError::into_inner);
-            opened.insert(0, Arc::clone(&caster));
-            opened.truncate(MOST_OPEN);
-            caster
-        }))
+        Ok(self.keep(OpenCaster::open_async(&request, effects).await?))
+    }
+
+    /// The caster that models `effects`. If it is not open, one thread calls `open`; the others wait and
+    /// find what it opened.
+    fn open_once(
+        &self,
+        effects: &Effects,
+        open: impl FnOnce() -> Result<OpenCaster, CastError>,
+    ) -> Result<Arc<OpenCaster>, CastError> {
+        if let Some(caster) = self.opened(effects) {
+            return Ok(caster);
+        }
+        let _opening = lock(&self.opening);
+        match self.opened(effects) {
+            Some(caster) => Ok(caster),
+            None => Ok(self.keep(open()?)),
+        }
+    }
+
+    /// Keeps `caster` in place of the one that was opened before all others that are kept.
+    fn keep(&self, caster: OpenCaster) -> Arc<OpenCaster> {
+        let caster = Arc::new(caster);
+        let mut opened = lock(&self.opened);
+        opened.insert(0, Arc::clone(&caster));
+        opened.truncate(MOST_OPEN);
+        caster
     }
 
     /// The caster that models `effects`, if it is open. The CPU's always is.
     fn opened(&self, effects: &Effects) -> Option<Arc<OpenCaster>> {
-        let opened = self.opened.lock().unwrap_or_else(PoisonError::into_inner);
+        let opened = lock(&self.opened);
         if let Some(caster) = opened.iter().find(|caster| caster.effects() == effects) {
             return Some(Arc::clone(caster));
         }
@@ -168,6 +193,41 @@ impl Caster {
             why_no_gpu: None,
             skipped: Vec::new(),
             opened: Mutex::new(vec![Arc::new(caster)]),
+            opening: Mutex::new(()),
         }
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Barrier;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    #[test]
+    fn one_thread_opens_and_the_others_find_what_it_opened() {
+        const N: usize = 8;
+        let caster = Caster { opened: Mutex::default(), ..Caster::cpu() };
+        let (start, n_opened) = (Barrier::new(N), AtomicUsize::new(0));
+        let open = || {
+            n_opened.fetch_add(1, Ordering::Relaxed);
+            // Long enough that the others come meanwhile.
+            std::thread::sleep(std::time::Duration::from_millis(50));
+            Ok(OpenCaster::Cpu(Effects::default()))
+        };
+        let found: Vec<_> = std::thread::scope(|scope| {
+            let find = || {
+                start.wait();
+                caster.open_once(&Effects::default(), open).unwrap()
+            };
+            let threads: Vec<_> = (0..N).map(|_| scope.spawn(find)).collect();
+            threads.into_iter().map(|thread| thread.join().unwrap()).collect()
+        });
+        assert_eq!(n_opened.into_inner(), 1);
+        assert!(found.iter().all(|one| one.effects() == &Effects::default()));
     }
 }

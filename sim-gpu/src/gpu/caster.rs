@@ -139,6 +139,13 @@ impl GpuCaster {
     }
 }
 
+impl Drop for Core {
+    /// A browser would keep the device until it collects garbage.
+    fn drop(&mut self) {
+        self.pipeline.device.destroy();
+    }
+}
+
 impl Core {
     fn check(&self) -> Result<(), CastError> {
         match &*lock(&self.failure) {
