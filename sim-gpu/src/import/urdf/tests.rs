@@ -194,7 +194,6 @@ fn what_is_wrong_is_named_with_its_line() {
     }
 }
 
-/// Each byte by others, and elements in elements: an error or a robot, and no panic.
 #[test]
 fn tags_in_tags_without_end_are_an_error() {
     let deep = format!("<robot>{}{}</robot>", "<a>".repeat(200_000), "</a>".repeat(200_000));
