@@ -125,7 +125,8 @@ mod tests {
         let mut network = reference(&file).unwrap();
         let flat = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
         let deep = [[0.0, 0.0, 1.0], [0.0, 0.5, 1.0]];
-        let [flat, deep] = [flat, deep].map(|cloud| log_probabilities(&mut network, &cloud).unwrap());
+        let [flat, deep] =
+            [flat, deep].map(|cloud| log_probabilities(&mut network, &cloud).unwrap());
         // Far above the tolerances of any arithmetic.
         assert!(worst(&flat, &deep, false).unwrap() > 0.1);
     }
