@@ -40,14 +40,6 @@ pub struct AdviseArgs {
     /// Lowest acceptable accuracy, from 0 to 1
     #[arg(long, value_name = "SHARE", value_parser = share)]
     min_accuracy: Option<f64>,
-
-    /// Largest acceptable size of the weights, megabytes
-    #[arg(long, value_name = "MB", value_parser = positive)]
-    max_mb: Option<f64>,
-
-    /// Largest number of threads
-    #[arg(long, value_name = "N")]
-    max_threads: Option<usize>,
 }
 
 /// A line of the record: a setting that classified `clouds` clouds, `right` of them correctly.
@@ -59,8 +51,6 @@ struct Measurement {
     sampler: String,
     points: usize,
     precision: String,
-    /// The T-Nets that run; empty if the model has none.
-    t_nets: String,
     threads: usize,
     /// `None` for numbers of threads that the machine lacks.
     ms_here: Option<f64>,
@@ -95,9 +85,6 @@ impl fmt::Display for Measurement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { model, sampler, points, precision, .. } = self;
         write!(f, "{model}, {sampler} {points}, {precision}")?;
-        if !self.t_nets.is_empty() {
-            write!(f, ", T-Nets {}", self.t_nets)?;
-        }
         write!(f, ", {} thread{}", self.threads, if self.threads == 1 { "" } else { "s" })
     }
 }
@@ -123,17 +110,15 @@ fn advise(args: &AdviseArgs, rows: &[Measurement]) -> Result<String> {
         rows.iter().filter_map(|row| Some((row.ms(args.device)?, row))).collect();
     let fitting: Vec<Timed> = timed.iter().copied().filter(|timed| args.allow(timed)).collect();
     let Some(&chosen) = fitting.iter().max_by(|a, b| args.compare(a, b)) else {
-        bail!("{}", args.none_fits(&timed));
+        bail!("{}", none_fits(&timed));
     };
     Ok(args.text(chosen, &fitting, &timed))
 }
 
 impl AdviseArgs {
     fn check(&self) -> Result<()> {
-        let limits = [self.max_ms, self.min_accuracy, self.max_mb];
-        if limits.iter().all(Option::is_none) && self.max_threads.is_none() {
-            let cause =
-                "expected at least one limit: --max-ms, --min-accuracy, --max-mb or --max-threads";
+        if self.max_ms.is_none() && self.min_accuracy.is_none() {
+            let cause = "expected at least one limit: --max-ms or --min-accuracy";
             return Err(Usage(cause.to_owned()).into());
         }
         Ok(())
@@ -141,14 +126,12 @@ impl AdviseArgs {
 
     /// Whether accuracy counts before time. With a limit on accuracy alone, time counts first.
     fn accuracy_first(&self) -> bool {
-        self.max_ms.is_some() || self.min_accuracy.is_none()
+        self.max_ms.is_some()
     }
 
     fn allow(&self, &(ms, row): &Timed) -> bool {
         self.max_ms.is_none_or(|most| ms <= most)
             && self.min_accuracy.is_none_or(|least| row.accuracy() >= least)
-            && self.max_mb.is_none_or(|most| row.megabytes <= most)
-            && self.max_threads.is_none_or(|most| row.threads <= most)
     }
 
     /// Orders settings so that the better one is greater; of equal ones, the one with fewer
@@ -158,22 +141,6 @@ impl AdviseArgs {
         let speed = b.0.total_cmp(&a.0);
         let first = if self.accuracy_first() { accuracy.then(speed) } else { speed.then(accuracy) };
         first.then(b.1.threads.cmp(&a.1.threads))
-    }
-
-    /// The message if no setting meets the limits: it names the nearest ones.
-    fn none_fits(&self, timed: &[Timed]) -> String {
-        let mut text = "no measured setting meets these limits".to_owned();
-        let fastest = timed.iter().min_by(|a, b| a.0.total_cmp(&b.0));
-        let best = timed.iter().max_by(|a, b| a.1.accuracy().total_cmp(&b.1.accuracy()));
-        let smallest = timed.iter().min_by(|a, b| a.1.megabytes.total_cmp(&b.1.megabytes));
-        let smallest = smallest.filter(|_| self.max_mb.is_some());
-        for (what, timed) in [("fastest", fastest), ("most accurate", best), ("smallest", smallest)]
-        {
-            if let Some(timed) = timed {
-                let _ = write!(text, "\n  the {what}: {}", one_line(*timed));
-            }
-        }
-        text
     }
 
     fn text(&self, chosen: Timed, fitting: &[Timed], timed: &[Timed]) -> String {
@@ -227,6 +194,19 @@ impl AdviseArgs {
     }
 }
 
+/// The message if no setting meets the limits: it names the nearest ones.
+fn none_fits(timed: &[Timed]) -> String {
+    let mut text = "no measured setting meets these limits".to_owned();
+    let fastest = timed.iter().min_by(|a, b| a.0.total_cmp(&b.0));
+    let best = timed.iter().max_by(|a, b| a.1.accuracy().total_cmp(&b.1.accuracy()));
+    for (what, timed) in [("fastest", fastest), ("most accurate", best)] {
+        if let Some(timed) = timed {
+            let _ = write!(text, "\n  the {what}: {}", one_line(*timed));
+        }
+    }
+    text
+}
+
 fn one_line((ms, row): Timed) -> String {
     let (low, high) = row.interval();
     format!(
@@ -271,7 +251,6 @@ mod tests {
             sampler: "fps".to_owned(),
             points: 64,
             precision: "f32".to_owned(),
-            t_nets: String::new(),
             threads,
             ms_here: None,
             ms_pi5: Some(ms_pi5),
@@ -292,8 +271,7 @@ mod tests {
     }
 
     fn asked(max_ms: Option<f64>, min_accuracy: Option<f64>) -> AdviseArgs {
-        let (max_mb, max_threads) = (None, None);
-        AdviseArgs { device: Device::Pi5, max_ms, min_accuracy, max_mb, max_threads }
+        AdviseArgs { device: Device::Pi5, max_ms, min_accuracy }
     }
 
     #[test]

@@ -1,6 +1,5 @@
 use anyhow::Context;
 use sim_gpu::Caster;
-use sim_gpu::internals::job::Culling;
 
 pub const HOW_TO_GET_VULKAN: &str = "a GPU needs a Vulkan driver, which on Debian or Ubuntu \
      `apt-get install mesa-vulkan-drivers` installs for those of AMD and Intel";
@@ -12,10 +11,6 @@ pub struct CasterArgs {
     /// name, as `edgepuck adapters` lists them
     #[arg(long, default_value = "auto", value_name = "ADAPTER")]
     adapter: String,
-
-    /// Also cast the beams that cannot hit any object; this is slower and gives the same output
-    #[arg(long)]
-    no_cull: bool,
 }
 
 impl CasterArgs {
@@ -30,9 +25,5 @@ impl CasterArgs {
             }
         }
         Ok(caster)
-    }
-
-    pub fn culling(&self) -> Culling {
-        if self.no_cull { Culling::Off } else { Culling::On }
     }
 }

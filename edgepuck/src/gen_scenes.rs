@@ -107,7 +107,6 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let meshes = args.meshes.as_deref();
     let caster = args.caster.caster()?;
     let stage = Stage::with_caster(recipe, &args.recipe, meshes, args.seed, &caster)?;
-    let stage = stage.with_culling(args.caster.culling());
     stage.warnings().iter().for_each(|warning| formats::say!("warning: {warning}"));
     args.overwrite.clear(outputs(), is_written)?;
     for file in [&preview, &record].into_iter().filter(|file| file.exists()) {

@@ -19,10 +19,6 @@ pub struct Args {
     #[command(flatten)]
     points: PointsArgs,
 
-    /// Second scan, drawn below the first
-    #[arg(long, value_name = "SCAN")]
-    noisy: Option<PathBuf>,
-
     /// PNG file to write
     #[arg(long, default_value = "scan.png", value_name = "PNG")]
     out: PathBuf,
@@ -39,8 +35,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         formats::say!("{}: expected points to draw, found none", args.scan.display());
         return Ok(Outcome::SomeRefused);
     };
-    let noisy = args.noisy.clone().or_else(|| noisy_twin(&args.scan));
-    let noisy = noisy.map(|file| args.points.read(&file)).transpose()?;
+    let noisy = noisy_twin(&args.scan).map(|file| args.points.read(&file)).transpose()?;
     let title = args.scan.file_stem().unwrap_or_default().to_string_lossy();
     preview::draw(&clean.scan, clean.labels.first(), noisy.as_ref(), &title, &args.out)?;
     formats::say!("{} points: {}", clean.scan.len(), args.out.display());

@@ -137,12 +137,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let files: Vec<PathBuf> = scene.sensors.iter().map(file).collect();
     args.overwrite.check(files.iter().map(PathBuf::as_path))?;
     let caster = args.caster.caster()?;
-    let scan =
-        |number| scene.scan_mounted(number).with(&caster).culling(args.caster.culling()).run();
-    let scans: Vec<Scan> = (0..scene.sensors.len())
-        .map(scan)
-        .collect::<Result<_, _>>()
-        .with_context(|| what.clone())?;
+    let scans = scene.scan_all(&caster).with_context(|| what.clone())?;
     tell_objects(&scene);
     for ((scan, mounted), file) in scans.iter().zip(&scene.sensors).zip(&files) {
         let sensor = &mounted.name;

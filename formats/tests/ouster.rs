@@ -5,11 +5,10 @@ use std::fs;
 use std::path::Path;
 
 use formats::Senders;
-use formats::ouster::{Decoder, Header, Metadata, PacketError, Profile, read_frame};
+use formats::ouster::{Decoder, Header, Metadata, Profile, read_frame};
 use formats::returns::{Kind, Return};
 use formats::turns::read_turns;
 use formats::velodyne;
-use proptest::prelude::*;
 use serde_json::{Value, json};
 use test_support::{need, shared_data};
 
@@ -510,32 +509,6 @@ fn a_capture_without_a_whole_frame_is_named() {
     let expected = "packets: expected a whole frame of 25 columns, found 0 at most among \
                     1 UDP packets, beside 1 without all fragments";
     assert_eq!(read(&fragments, &metadata).unwrap_err(), expected);
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(64))]
-
-    #[test]
-    fn no_payload_makes_the_decoder_panic(
-        changes in prop::collection::vec((0usize..400, any::<u8>()), 0..400), profile in 0usize..4,
-    ) {
-        let profile = Profile::ALL[profile];
-        let decoder = decoder(profile);
-        let size = decoder.packet_size();
-        let mut payload = packet(profile, 3, 4);
-        for (at, byte) in changes {
-            payload[at % size] = byte;
-        }
-        let (mut n, mut finite) = (0, true);
-        let decoded = decoder.decode(&payload, |found| {
-            n += 1;
-            finite &= found.point_m.iter().all(|x| x.is_finite());
-        });
-        prop_assert!(finite && n <= 4 * 3 * 2);
-        prop_assert!(decoded.is_ok() || n == 0);
-        let short = decoder.decode(&payload[1..], |_| ());
-        prop_assert_eq!(short, Err(PacketError::Length { expected: size, found: size - 1 }));
-    }
 }
 
 /// Turns are those of the returns' own azimuths, over frames and a gap of two packets.

@@ -48,12 +48,10 @@ pub fn load(
 fn loaded<T: Format>(
     file: &mut WeightsFile,
     card: ModelCard,
-    &Options { threads, t_nets, .. }: &Options,
+    &Options { threads, .. }: &Options,
     kernels: &'static Kernels,
 ) -> Result<Loaded, Error> {
-    let mut layers = layers::pack::<T>(file, &card, kernels)?;
-    layers.stn.take_if(|_| !t_nets.runs_input());
-    layers.fstn.take_if(|_| !t_nets.runs_feature());
+    let layers = layers::pack::<T>(file, &card, kernels)?;
     let parts = layers.parts();
     let engine = Engine::new(Arc::new(layers), kernels, threads, false);
     let team = Team::new(engine, threads).map_err(|source| Error::Threads { threads, source })?;

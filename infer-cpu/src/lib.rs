@@ -100,7 +100,7 @@ pub use formats::cloud_file::read_cloud;
 pub use formats::model_card::{ModelCard, Normalization};
 #[doc(hidden)]
 pub use normalize::{normalize, to_unit_sphere};
-pub use options::{Options, TNets, UpAxis};
+pub use options::{Options, UpAxis};
 pub use precision::Precision;
 #[doc(hidden)]
 pub use prediction::energy;

@@ -7,33 +7,6 @@ use crate::precision::Precision;
 use crate::sampler::SamplerSpec;
 
 formats::named! {
-    /// The T-Nets that are run; an omitted one counts as the identity.
-    #[derive(Default)]
-    #[non_exhaustive]
-    pub enum TNets: "choice of T-Nets" {
-        /// All that the model has.
-        #[default]
-        Both = "both",
-        /// Only the T-Net of the coordinates.
-        Input = "input",
-        /// Only the T-Net of the features.
-        Feature = "feature",
-        /// No T-Net.
-        Neither = "none",
-    }
-}
-
-impl TNets {
-    pub(crate) fn runs_input(self) -> bool {
-        matches!(self, Self::Both | Self::Input)
-    }
-
-    pub(crate) fn runs_feature(self) -> bool {
-        matches!(self, Self::Both | Self::Feature)
-    }
-}
-
-formats::named! {
     /// The axis of a cloud that points up.
     #[derive(Default)]
     pub enum UpAxis: "up axis" {
@@ -82,8 +55,6 @@ pub struct Options {
     pub kernel: Option<KernelName>,
     /// The number of threads, including the caller's.
     pub threads: usize,
-    /// The T-Nets to run.
-    pub t_nets: TNets,
     /// The sampler that chooses the points for the network; as in training if `None`.
     pub sampler: Option<SamplerSpec>,
     /// The largest activation of each layer, for int8. If `None`, the model's own calibration, or
@@ -118,7 +89,6 @@ impl Default for Options {
             precision: Precision::F32,
             kernel: None,
             threads: 1,
-            t_nets: TNets::Both,
             sampler: None,
             activation_ranges: None,
             normalization: None,

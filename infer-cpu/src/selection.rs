@@ -17,8 +17,6 @@ pub struct Selection {
     /// All points, sorted by geometry, each once.
     cloud: CanonicalOrder,
     critical: CriticalPoints,
-    /// The points of the cloud that a secondary pass pools.
-    left: Vec<[f32; 3]>,
     rows: Vec<u32>,
     kept: Vec<[f32; 3]>,
     /// The points for the network: the kept ones, sorted by geometry, each once.
@@ -42,7 +40,6 @@ impl Selection {
             front,
             cloud: CanonicalOrder::default(),
             critical: CriticalPoints::default(),
-            left: Vec::new(),
             rows: Vec::new(),
             kept: Vec::new(),
             distinct: CanonicalOrder::default(),
@@ -76,7 +73,7 @@ impl Selection {
     }
 
     /// Chooses from `points` and returns the chosen indices: M of them, or as many as the sampler
-    /// yields, repetitions included.
+    /// yields.
     pub fn select(
         &mut self,
         points: &[[f32; 3]],
@@ -107,22 +104,10 @@ impl Selection {
             unreachable!("invariant: a classifier gives critical points a front end");
         };
         let cloud = &self.cloud.points;
-        let pool = |points: &[[f32; 3]], scratch: &mut Scratch| {
-            network.pool_winners(front, &Input { points, cloud, pooled_stn: false }, scratch);
-        };
-        pool(cloud, scratch);
+        network.pool_winners(front, &Input { points: cloud, cloud, pooled_stn: false }, scratch);
         self.pooled_stn = front == Pass::Stn;
         self.critical.rank(&scratch.values, &scratch.winners);
-        // The T-Net needs the pooling of the whole cloud, which a second pooling overwrites.
-        while let Some(rows) = self.critical.next_pass(self.cloud.points.len(), &self.spec) {
-            self.pooled_stn = false;
-            self.left.clear();
-            self.left.extend(rows.iter().map(|&row| self.cloud.points[row as usize]));
-            pool(&self.left, scratch);
-            self.critical.rank_next(&scratch.values, &scratch.winners);
-        }
-        let CriticalPoints { rows, scores, .. } = &self.critical;
-        self.spec.resize.apply(rows, scores, self.spec.points, &mut self.rows);
+        self.rows.extend(self.critical.rows.iter().take(self.spec.points));
     }
 
     pub fn reserve(
@@ -136,11 +121,8 @@ impl Selection {
         let cloud: Vec<[f32; 3]> = (0..n).map(|i| [i as f32, (i % 7) as f32, 0.0]).collect();
         self.cloud.sort(&cloud);
         self.distinct.sort(&cloud);
-        // Only a Critical Points Layer repeats points.
-        let most = if self.spec.kind == SamplerKind::Cpl { n.max(self.spec.points) } else { n };
-        self.kept.reserve(most);
-        self.left.reserve(n);
-        self.rows.reserve(most);
+        self.kept.reserve(n);
+        self.rows.reserve(n);
         self.sampler.select(&cloud, kernels)?;
         if let Some(front) = self.front {
             let channels = network.channels(front);

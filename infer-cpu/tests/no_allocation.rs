@@ -15,7 +15,7 @@ use std::path::Path;
 
 use formats::model_card::ModelCard;
 use formats::rng::StreamKey;
-use infer_cpu::sampler::{Resize, SamplerKind, SamplerSpec};
+use infer_cpu::sampler::{SamplerKind, SamplerSpec};
 use infer_cpu::{Classifier, ClassifierTeam, Options, Precision};
 use test_support::IS_EMULATED;
 use test_support::allocations::{self, Counting};
@@ -66,13 +66,6 @@ fn main() {
     let spec = |kind| SamplerSpec { kind, points: 32, ..SamplerSpec::default() };
     let mut specs: Vec<_> = SamplerKind::ALL.map(spec).to_vec();
     specs.push(SamplerSpec { voxel_size: Some(0.1), ..spec(SamplerKind::Voxel) });
-    specs.extend(Resize::ALL.map(|resize| SamplerSpec {
-        resize,
-        passes: 2,
-        // Some clouds have fewer points.
-        points: 64,
-        ..spec(SamplerKind::Cpl)
-    }));
     let mut found = Vec::new();
     // A team includes the code of one thread.
     let teams: &[usize] = if IS_EMULATED { &[3] } else { &[1, 3] };

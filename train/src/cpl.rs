@@ -8,11 +8,8 @@ use serde::{Deserialize, Serialize};
 pub struct Cpl {
     /// Output widths of the encoder's point-wise layers. The last layer is pooled.
     pub front: Vec<usize>,
-    /// The number of selected points.
+    /// The number of selected points; fewer, if fewer are critical.
     pub keep: usize,
-    /// How a selection of another size is brought to this size: `truncate`, `cyclic`, `nearest` or
-    /// `weighted`.
-    pub resize: String,
     /// The weight of the encoder's own loss.
     pub weight: f64,
     /// Whether the network's input T-Net is the encoder. Its pooling over all points then selects
@@ -27,8 +24,7 @@ pub struct Cpl {
 impl Default for Cpl {
     /// The paper's encoder and its 64 points (Meyer and Reitmann 2026).
     fn default() -> Self {
-        let resize = "truncate".to_owned();
         let front = vec![64, 128, 1024];
-        Self { front, keep: 64, resize, weight: 1.0, shared: false, gumbel: false }
+        Self { front, keep: 64, weight: 1.0, shared: false, gumbel: false }
     }
 }

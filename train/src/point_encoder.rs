@@ -5,8 +5,8 @@
 //! reach the encoder, unless the selection is relaxed ([`crate::gumbel`]). Therefore the encoder
 //! has its own classification loss: in training, a linear layer classifies its pooled features. The
 //! gradient of this loss flows through the maximum to the points that won channels, which are the
-//! critical points. A trained encoder can also serve alone, as a sampler. The code of infer-cpu
-//! ranks and resizes the selection.
+//! critical points, which the code of infer-cpu ranks. A trained encoder can also serve alone, as a
+//! sampler.
 
 use crate::batch::Batch;
 use crate::cpl::Cpl;
@@ -31,15 +31,16 @@ pub struct PointEncoder {
 
 impl PointEncoder {
     /// A point encoder with random weights.
-    pub fn new(cpl: &Cpl, n_classes: usize, seed: u64) -> Result<Self, String> {
+    #[must_use]
+    pub fn new(cpl: &Cpl, n_classes: usize, seed: u64) -> Self {
         let widths = [&[3], &cpl.front[..]].concat();
         let pooled = widths[widths.len() - 1];
-        Ok(Self {
+        Self {
             mlp: SharedMlp::new("cpl.", &widths, 1, true, seed),
             classes: Linear::new(TRAINING_ONLY, pooled, n_classes, seed),
-            selector: CriticalPointSelector::new(cpl, seed)?,
+            selector: CriticalPointSelector::new(cpl, seed),
             weight: cpl.weight as f32,
-        })
+        }
     }
 
     /// Selects the critical points of `batch`.

@@ -424,11 +424,6 @@ impl Recipe {
                     "expected `network.input_transform`, whose T-Net is shared",
                 ),
                 (!(cpl.gumbel && cpl.shared), "cpl.gumbel", "expected false with `cpl.shared`"),
-                (
-                    !cpl.gumbel || cpl.resize == "truncate",
-                    "cpl.gumbel",
-                    "expected `cpl.resize` to be truncate, because each point is drawn once",
-                ),
                 non_negative("cpl.weight", cpl.weight),
             ]);
         }

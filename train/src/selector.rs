@@ -1,8 +1,7 @@
-//! Selects the critical points of the clouds in a batch. The code of infer-cpu ranks and resizes
-//! the selection.
+//! Selects the critical points of the clouds in a batch, which the code of infer-cpu ranks.
 
 use formats::streams::Stream;
-use infer_cpu::sampler::{CriticalPoints, Resize};
+use infer_cpu::sampler::CriticalPoints;
 
 use crate::batch::Batch;
 use crate::cpl::Cpl;
@@ -14,7 +13,6 @@ use crate::matrix::Matrix;
 #[derive(Clone, Copy, Debug)]
 pub struct CriticalPointSelector {
     keep: usize,
-    resize: Resize,
     gumbel: bool,
     seed: u64,
 }
@@ -30,9 +28,9 @@ pub struct Selection {
 
 impl CriticalPointSelector {
     /// A selector with the settings of `cpl`.
-    pub fn new(cpl: &Cpl, seed: u64) -> Result<Self, String> {
-        let resize = cpl.resize.parse().map_err(|error| format!("{error}"))?;
-        Ok(Self { keep: cpl.keep, resize, gumbel: cpl.gumbel, seed })
+    #[must_use]
+    pub fn new(cpl: &Cpl, seed: u64) -> Self {
+        Self { keep: cpl.keep, gumbel: cpl.gumbel, seed }
     }
 
     /// Whether the selection has a gradient.
@@ -41,30 +39,27 @@ impl CriticalPointSelector {
         self.gumbel
     }
 
-    /// Selects the points of `batch` that win channels of `pooled`, the pooling of all points. The
-    /// weight of a point is the number of its copies in the selection. A relaxed selection draws
-    /// new noise in each `step`.
+    /// Selects the points of `batch` that win channels of `pooled`, the pooling of all points. A
+    /// relaxed selection draws new noise in each `step`.
     #[must_use]
     pub fn select(self, pooled: &PooledLayer, batch: &Batch, step: u64) -> Selection {
         let mut chosen = Batch { starts: vec![0], ..Batch::default() };
         let mut origin = Vec::new();
         let mut critical = CriticalPoints::default();
-        let mut rows = Vec::new();
         for (cloud, maxima) in pooled.base.output().rows().into_iter().enumerate() {
             let maxima = maxima.to_slice().expect("invariant: rows are contiguous");
             let first = batch.starts[cloud] as u32;
             critical.rank(maxima, &within(pooled.winners(cloud), first));
-            if self.gumbel {
+            let mut rows = if self.gumbel {
                 let stream = Stream::Gumbel { step, cloud: cloud as u32 }.key(self.seed);
-                rows = gumbel::top(&critical.rows, &critical.scores, self.keep, stream);
+                gumbel::top(&critical.rows, &critical.scores, self.keep, stream)
             } else {
-                self.resize.apply(&critical.rows, &critical.scores, self.keep, &mut rows);
-            }
+                critical.rows.iter().copied().take(self.keep).collect()
+            };
             rows.sort_unstable();
-            for same in rows.chunk_by(|a, b| a == b) {
-                let row = same[0] + first;
+            for row in rows.into_iter().map(|row| row + first) {
                 chosen.coordinates.push(batch.coordinates[row as usize]);
-                chosen.weights.push(same.len() as f32);
+                chosen.weights.push(1.0);
                 origin.push(row);
             }
             chosen.starts.push(chosen.coordinates.len());
@@ -127,8 +122,7 @@ mod tests {
         let batch =
             Batch { coordinates, weights: vec![1.0; 4], starts: vec![0, 2, 4], ..Batch::default() };
         pooled.forward(batch.points(), batch.rows(), 0.1);
-        let chosen =
-            CriticalPointSelector::new(&Cpl::default(), 0).unwrap().select(&pooled, &batch, 0);
+        let chosen = CriticalPointSelector::new(&Cpl::default(), 0).select(&pooled, &batch, 0);
         assert_eq!(chosen.rows, [0, 2]);
         assert_eq!(chosen.batch.coordinates[1], batch.coordinates[2]);
     }
@@ -144,8 +138,7 @@ mod tests {
         pooled.forward(batch.points(), batch.rows(), 0.1);
         let cpl = Cpl { gumbel: true, keep: 8, ..Cpl::default() };
         let chosen = |step| {
-            let rows =
-                CriticalPointSelector::new(&cpl, 0).unwrap().select(&pooled, &batch, step).rows;
+            let rows = CriticalPointSelector::new(&cpl, 0).select(&pooled, &batch, step).rows;
             rows.into_iter().partition::<Vec<u32>, _>(|row| *row < 40)
         };
         let (first, second) = chosen(0);

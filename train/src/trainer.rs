@@ -57,7 +57,6 @@ pub struct EpochSummary {
 impl Trainer {
     /// A network with random weights for `n_classes` classes.
     pub fn new(recipe: Recipe, n_classes: usize) -> Result<Self, Error> {
-        let refuse = |cause| Error::Recipe { key: "cpl.resize", cause };
         if !recipe.network.abstractions.is_empty() {
             let network = SetNetwork::new(&recipe.network, n_classes, recipe.seed);
             let network = Network::Sets(Box::new(network));
@@ -66,11 +65,10 @@ impl Trainer {
         let mut network = PointNet::new(&recipe.network, n_classes, recipe.seed);
         let encoder = match &recipe.cpl {
             Some(cpl) if cpl.shared => {
-                network
-                    .select_by_t_net(CriticalPointSelector::new(cpl, recipe.seed).map_err(refuse)?);
+                network.select_by_t_net(CriticalPointSelector::new(cpl, recipe.seed));
                 None
             }
-            Some(cpl) => Some(PointEncoder::new(cpl, n_classes, recipe.seed).map_err(refuse)?),
+            Some(cpl) => Some(PointEncoder::new(cpl, n_classes, recipe.seed)),
             None => None,
         };
         Ok(Self::of(recipe, Model { encoder, network: Network::PointNet(Box::new(network)) }))

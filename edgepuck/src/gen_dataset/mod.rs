@@ -144,7 +144,6 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
             (_, true) => Begin::Overwrite,
             _ => Begin::Fresh,
         },
-        culling: args.caster.culling(),
         ..Plan::new(&out, &config, &meshes)
     };
     let made = if are_tars {

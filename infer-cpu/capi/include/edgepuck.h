@@ -108,13 +108,8 @@ typedef struct EdgepuckOptions {
    */
   size_t threads;
   /**
-   * The T-Nets that are run: "both", "input", "feature" or "none"; an omitted one counts as the
-   * identity. Null: all T-Nets of the model.
-   */
-  const char *t_nets;
-  /**
    * The sampler that chooses points for the network: "all", "first", "random", "fps", "voxel" or
-   * "cpl". Null: as in training; the next seven fields must then have their defaults.
+   * "cpl". Null: as in training; the next five fields must then have their defaults.
    */
   const char *sampler;
   /**
@@ -134,15 +129,6 @@ typedef struct EdgepuckOptions {
    * allows.
    */
   double voxel_size;
-  /**
-   * How "cpl" resizes its points to the requested number: "truncate", "cyclic", "nearest" or
-   * "weighted". Null: "cyclic".
-   */
-  const char *resize;
-  /**
-   * How often "cpl" may pool again while it has fewer points than requested.
-   */
-  size_t passes;
   /**
    * The layers whose features "cpl" pools: "auto", "own", "stn" or "trunk". Null: "auto".
    */

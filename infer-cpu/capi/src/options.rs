@@ -22,11 +22,8 @@ pub struct EdgepuckOptions {
     pub kernel: *const c_char,
     /// The number of threads, including the caller's; 0 counts as 1.
     pub threads: usize,
-    /// The T-Nets that are run: "both", "input", "feature" or "none"; an omitted one counts as the
-    /// identity. Null: all T-Nets of the model.
-    pub t_nets: *const c_char,
     /// The sampler that chooses points for the network: "all", "first", "random", "fps", "voxel" or
-    /// "cpl". Null: as in training; the next seven fields must then have their defaults.
+    /// "cpl". Null: as in training; the next five fields must then have their defaults.
     pub sampler: *const c_char,
     /// The number of points that the sampler keeps. 0: 1024.
     pub points: usize,
@@ -37,11 +34,6 @@ pub struct EdgepuckOptions {
     /// The edge of a voxel for "voxel", in the units of a normalised cloud. 0: as fine as points
     /// allows.
     pub voxel_size: f64,
-    /// How "cpl" resizes its points to the requested number: "truncate", "cyclic", "nearest" or
-    /// "weighted". Null: "cyclic".
-    pub resize: *const c_char,
-    /// How often "cpl" may pool again while it has fewer points than requested.
-    pub passes: usize,
     /// The layers whose features "cpl" pools: "auto", "own", "stn" or "trunk". Null: "auto".
     pub front: *const c_char,
     /// The normalisation of clouds: "unit-sphere", "metric", "metric-sight" or "none". Null: as in
@@ -68,14 +60,11 @@ pub extern "C" fn edgepuck_options_default() -> EdgepuckOptions {
         precision: null(),
         kernel: null(),
         threads: options.threads,
-        t_nets: null(),
         sampler: null(),
         points: 0,
         seed: 0,
         fps_start: null(),
         voxel_size: 0.0,
-        resize: null(),
-        passes: 0,
         front: null(),
         normalization: null(),
         drop_invalid: options.drop_invalid,
@@ -107,7 +96,6 @@ impl EdgepuckOptions {
                 precision: word("precision", self.precision)?.unwrap_or_default(),
                 kernel: word("kernel", self.kernel)?,
                 threads: self.threads.max(1),
-                t_nets: word("t_nets", self.t_nets)?.unwrap_or_default(),
                 sampler: self.sampler()?,
                 activation_ranges: None,
                 normalization: word("normalization", self.normalization)?,
@@ -133,8 +121,6 @@ impl EdgepuckOptions {
                 seed: self.seed,
                 fps_start: word("fps_start", self.fps_start)?.unwrap_or_default(),
                 voxel_size: (self.voxel_size != 0.0).then_some(self.voxel_size),
-                resize: word("resize", self.resize)?.unwrap_or_default(),
-                passes: self.passes,
                 front: word("front", self.front)?.unwrap_or_default(),
             };
             (word("sampler", self.sampler)?, spec)

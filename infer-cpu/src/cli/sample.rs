@@ -1,6 +1,5 @@
 //! `infer-cpu sample`: reduces a cloud by a sampler.
 
-use std::collections::BTreeSet;
 use std::io::{Write, stdout};
 use std::path::PathBuf;
 
@@ -25,9 +24,8 @@ Examples:
   infer-cpu sample --sampler cpl --points 64 --model model.safetensors in.npz out.xyz
 
 The output holds the chosen points with the coordinates of the input. cpl
-normalizes the cloud as in training before it chooses points. If it repeats points
-to reach M, the output repeats them, too. The extension of the output file
-determines its format: PLY, NPZ, NPY, PCD, XYZ, CSV, .bin, LAS.")]
+normalizes the cloud as in training before it chooses points. The extension of the
+output file determines its format: PLY, NPZ, NPY, PCD, XYZ, CSV, .bin, LAS.")]
 pub struct SampleArgs {
     /// Sampler that chooses the points: all, first, random, fps, voxel, cpl
     #[arg(long, value_name = "NAME")]
@@ -78,13 +76,8 @@ pub fn run(args: &SampleArgs) -> anyhow::Result<Outcome> {
     let indices = choose(args, &points)?;
     let chosen: Vec<[f64; 3]> = indices.iter().map(|&index| points[index as usize]).collect();
     write_cloud(&args.output, &chosen)?;
-    let n_distinct = indices.iter().collect::<BTreeSet<_>>().len();
-    let repeated = match n_distinct < chosen.len() {
-        true => format!(" ({n_distinct} distinct)"),
-        false => String::new(),
-    };
     let (n, of) = (chosen.len(), points.len());
-    writeln!(stdout(), "{}: {n} of {of} points{repeated}", args.output.display())?;
+    writeln!(stdout(), "{}: {n} of {of} points", args.output.display())?;
     Ok(Outcome::Success)
 }
 

@@ -1,4 +1,4 @@
-use crate::sampler::{FpsStart, FrontChoice, Resize, SamplerKind, SamplerSpec};
+use crate::sampler::{FpsStart, FrontChoice, SamplerKind, SamplerSpec};
 
 use super::Usage;
 
@@ -24,16 +24,6 @@ pub struct SamplerArgs {
     #[arg(long, value_name = "LENGTH", conflicts_with = "points")]
     voxel_size: Option<f64>,
 
-    /// Rule by which cpl resizes its set of critical points to M points: truncate, cyclic, nearest,
-    /// weighted [default: cyclic]
-    #[arg(long, value_name = "RULE")]
-    resize: Option<Resize>,
-
-    /// Number of additional max poolings of cpl over the points that it has not yet chosen
-    /// [default: 0]
-    #[arg(long, value_name = "K")]
-    passes: Option<usize>,
-
     /// Layers whose features cpl pools: `own` is the model's own front end, `stn` the trunk of its
     /// input T-Net, `trunk` its trunk, and `auto` the first of these that the model has [default:
     /// auto]
@@ -56,20 +46,16 @@ impl SamplerArgs {
             seed: self.seed.unwrap_or(trained.seed),
             fps_start: self.fps_start.unwrap_or(trained.fps_start),
             voxel_size: self.voxel_size.or(trained.voxel_size),
-            resize: self.resize.unwrap_or(trained.resize),
-            passes: self.passes.unwrap_or(trained.passes),
             front: self.front.unwrap_or(trained.front),
         })
     }
 
     fn check_flags(&self, kind: SamplerKind) -> Result<(), Usage> {
         use SamplerKind::{Cpl, First, Fps, Random, Voxel};
-        let flags: [(_, _, &[SamplerKind]); 6] = [
+        let flags: [(_, _, &[SamplerKind]); 4] = [
             ("--points", self.points.is_some(), &[First, Random, Fps, Voxel, Cpl]),
             ("--fps-start", self.fps_start.is_some(), &[Fps]),
             ("--voxel-size", self.voxel_size.is_some(), &[Voxel]),
-            ("--resize", self.resize.is_some(), &[Cpl]),
-            ("--passes", self.passes.is_some(), &[Cpl]),
             ("--front", self.front.is_some(), &[Cpl]),
         ];
         match flags.iter().find(|(_, is_given, kinds)| *is_given && !kinds.contains(&kind)) {
@@ -114,8 +100,8 @@ mod tests {
             error,
             "--points does not apply to the sampler all; it applies to first, random, fps, voxel, cpl"
         );
-        let passes = SamplerArgs { passes: Some(2), ..SamplerArgs::default() };
-        assert!(passes.apply(Some(SamplerKind::Fps), SamplerSpec::default()).is_err());
-        assert!(passes.apply(Some(SamplerKind::Cpl), SamplerSpec::default()).is_ok());
+        let front = SamplerArgs { front: Some(FrontChoice::Own), ..SamplerArgs::default() };
+        assert!(front.apply(Some(SamplerKind::Fps), SamplerSpec::default()).is_err());
+        assert!(front.apply(Some(SamplerKind::Cpl), SamplerSpec::default()).is_ok());
     }
 }

@@ -5,33 +5,24 @@
 //! Rows are points in canonical order (`canonical`). Features may precede their ReLU, since maxima
 //! that are not positive count as 0.
 
-use super::SamplerSpec;
 use super::hash::{Map, reset};
 
 /// Ranks critical points, and reuses its memory for each cloud.
 #[derive(Default)]
 pub struct CriticalPoints {
-    /// The chosen rows, each once: pass by pass, in each the best first.
+    /// The critical rows, each once, the best first.
     pub rows: Vec<u32>,
-    /// For each row, the sum of the maxima that it won in its pass.
+    /// For each row, the sum of the maxima that it won.
     pub scores: Vec<f64>,
     /// The index of each row in `ranking`.
     ranks: Map<u32>,
-    /// The scores and rows of a pass.
+    /// Scores and rows.
     ranking: Vec<(f64, u32)>,
-    /// The rows that the current secondary pass pools, ascending.
-    left: Vec<u32>,
-    /// The rows chosen so far, ascending.
-    taken: Vec<u32>,
-    n_passes: usize,
-    /// Whether the last pass chose no row.
-    is_exhausted: bool,
 }
 
 impl CriticalPoints {
-    /// Begins with the pooling of all points: `winners` holds the row that attains each of
-    /// `maxima`. If several rows attain it, the pooling must decide by geometry, not by the order
-    /// of the input.
+    /// Ranks the points of a pooling: `winners` holds the row that attains each of `maxima`. If
+    /// several rows attain it, the pooling must decide by geometry, not by the order of the input.
     ///
     /// The score of a point is the sum of the maxima that it wins, in f64, in the order of
     /// channels. The ranking descends by score; the lower row (the lesser point) wins a tie. No row
@@ -39,64 +30,6 @@ impl CriticalPoints {
     /// point with score 0 is not critical. If no channel is positive, the first row is chosen, with
     /// score 0.
     pub fn rank(&mut self, maxima: &[f32], winners: &[u32]) {
-        self.rows.clear();
-        self.scores.clear();
-        self.n_passes = 0;
-        self.is_exhausted = false;
-        self.pool(maxima, winners);
-        // The network needs at least one point.
-        if self.ranking.is_empty() {
-            self.ranking.push((0.0, 0));
-        }
-        self.append(|row| row);
-    }
-
-    /// The rows that a secondary pass must pool, ascending: all of `n_rows` that are not chosen
-    /// yet. `None` if `spec` requests no more points or passes, if no point is left, or if the last
-    /// pass chose none.
-    pub fn next_pass(&mut self, n_rows: usize, spec: &SamplerSpec) -> Option<&[u32]> {
-        let has_enough = self.rows.len() >= spec.points.min(n_rows);
-        if has_enough || self.n_passes == spec.passes || self.is_exhausted {
-            return None;
-        }
-        self.n_passes += 1;
-        // `rows` must stay in the order of the ranking, so a copy is sorted.
-        self.taken.clear();
-        self.taken.extend(&self.rows);
-        self.taken.sort_unstable();
-        self.left.clear();
-        let mut first = 0;
-        for &taken in &self.taken {
-            self.left.extend(first..taken);
-            first = taken + 1;
-        }
-        self.left.extend(first..n_rows as u32);
-        Some(&self.left)
-    }
-
-    /// Appends the critical points of a secondary pass, ranked among themselves. `winners` are
-    /// indices into the rows of [`Self::next_pass`].
-    pub fn rank_next(&mut self, maxima: &[f32], winners: &[u32]) {
-        self.pool(maxima, winners);
-        self.is_exhausted = self.ranking.is_empty();
-        // Moved out, because `append` borrows `self`.
-        let left = std::mem::take(&mut self.left);
-        self.append(|place| left[place as usize]);
-        self.left = left;
-    }
-
-    /// Allocates memory for poolings of `channels` channels over `n_rows` rows.
-    pub fn reserve(&mut self, channels: usize, n_rows: usize) {
-        self.rows.reserve(n_rows);
-        self.scores.reserve(n_rows);
-        self.taken.reserve(n_rows);
-        self.left.reserve(n_rows);
-        self.ranking.reserve(channels);
-        reset(&mut self.ranks, channels);
-    }
-
-    /// Ranks the winners of one pooling.
-    fn pool(&mut self, maxima: &[f32], winners: &[u32]) {
         reset(&mut self.ranks, maxima.len());
         self.ranking.clear();
         for (&maximum, &winner) in maxima.iter().zip(winners) {
@@ -110,13 +43,24 @@ impl CriticalPoints {
                 self.ranking[rank].0 += f64::from(maximum);
             }
         }
+        // The network needs at least one point.
+        if self.ranking.is_empty() {
+            self.ranking.push((0.0, 0));
+        }
         // Rows are distinct, so the order is total, and an unstable sort is deterministic.
         self.ranking.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        self.rows.clear();
+        self.rows.extend(self.ranking.iter().map(|&(_, row)| row));
+        self.scores.clear();
+        self.scores.extend(self.ranking.iter().map(|&(score, _)| score));
     }
 
-    fn append(&mut self, row: impl Fn(u32) -> u32) {
-        self.rows.extend(self.ranking.iter().map(|&(_, place)| row(place)));
-        self.scores.extend(self.ranking.iter().map(|&(score, _)| score));
+    /// Allocates memory for poolings of `channels` channels over `n_rows` rows.
+    pub fn reserve(&mut self, channels: usize, n_rows: usize) {
+        self.rows.reserve(n_rows);
+        self.scores.reserve(n_rows);
+        self.ranking.reserve(channels);
+        reset(&mut self.ranks, channels);
     }
 }
 
@@ -126,6 +70,7 @@ mod tests {
     use super::super::testing::{any_cloud, gather, shuffled};
     use super::*;
     use proptest::prelude::*;
+    use std::collections::BTreeSet;
 
     fn ranked(maxima: &[f32], winners: &[u32]) -> CriticalPoints {
         let mut critical = CriticalPoints::default();
@@ -167,70 +112,36 @@ mod tests {
     }
 
     /// Pools a row for each point, whose channels are its coordinates and their negatives.
-    fn pool(points: &[[f32; 3]], rows: &[u32]) -> (Vec<f32>, Vec<u32>) {
+    fn pooled(points: &[[f32; 3]]) -> CriticalPoints {
         let channel = |channel: usize| {
             let sign = if channel < 3 { 1.0 } else { -1.0 };
-            let features = rows.iter().map(|&row| sign * points[row as usize][channel % 3]);
             let mut best = (f32::NEG_INFINITY, 0);
-            for (place, feature) in features.enumerate() {
+            for (row, point) in (0..).zip(points) {
+                let feature = sign * point[channel % 3];
                 if feature > best.0 {
-                    best = (feature, place as u32);
+                    best = (feature, row);
                 }
             }
             best
         };
-        (0..6).map(channel).unzip()
-    }
-
-    fn with_passes(points: &[[f32; 3]], spec: &SamplerSpec) -> CriticalPoints {
-        let all: Vec<u32> = (0..points.len() as u32).collect();
-        let (maxima, winners) = pool(points, &all);
-        let mut critical = ranked(&maxima, &winners);
-        while let Some(left) = critical.next_pass(points.len(), spec) {
-            let (maxima, winners) = pool(points, left);
-            critical.rank_next(&maxima, &winners);
-        }
-        critical
-    }
-
-    #[test]
-    fn a_secondary_pass_chooses_among_the_points_left() {
-        let line: Vec<[f32; 3]> = (0..10u8).map(|i| [f32::from(i), 0.0, 0.0]).collect();
-        let chosen = |points, passes| {
-            with_passes(&line, &SamplerSpec { points, passes, ..SamplerSpec::default() }).rows
-        };
-        assert_eq!(chosen(4, 0), [9]);
-        assert_eq!(chosen(4, 2), [9, 8, 7]);
-        assert_eq!(chosen(2, 9), [9, 8]);
-        // The point at 0 wins no positive channel.
-        assert_eq!(chosen(99, 99), [9, 8, 7, 6, 5, 4, 3, 2, 1]);
+        let (maxima, winners): (Vec<f32>, Vec<u32>) = (0..6).map(channel).unzip();
+        ranked(&maxima, &winners)
     }
 
     proptest! {
         #[test]
-        fn the_order_of_the_input_does_not_matter(
+        fn each_point_is_ranked_once_whatever_the_order_of_the_input(
             cloud in any_cloud().prop_filter("needs a point", |cloud| !cloud.is_empty()),
             seed in any::<u32>(),
-            passes in 0usize..4,
         ) {
-            let spec = SamplerSpec { points: 20, passes, ..SamplerSpec::default() };
             let choose = |cloud: &[[f32; 3]]| {
                 let mut order = CanonicalOrder::default();
                 order.sort(cloud);
-                let critical = with_passes(&order.points, &spec);
-                (gather(&order.points, &critical.rows), critical.scores)
+                let CriticalPoints { rows, scores, .. } = pooled(&order.points);
+                prop_assert_eq!(rows.iter().collect::<BTreeSet<_>>().len(), rows.len());
+                Ok((gather(&order.points, &rows), scores))
             };
-            prop_assert_eq!(choose(&cloud), choose(&shuffled(&cloud, seed)));
-        }
-
-        #[test]
-        fn no_row_is_chosen_twice(cloud in any_cloud(), passes in 0usize..9) {
-            let spec = SamplerSpec { passes, ..SamplerSpec::default() };
-            let mut rows = with_passes(&cloud, &spec).rows;
-            let n = rows.len();
-            rows.sort_unstable();
-            rows.dedup();
-            prop_assert_eq!(rows.len(), n);
+            prop_assert_eq!(choose(&cloud)?, choose(&shuffled(&cloud, seed))?);
         }
     }
 }

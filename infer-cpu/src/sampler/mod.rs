@@ -2,8 +2,8 @@
 //!
 //! A [`SamplerSpec`] describes a sampler. [`choose`](crate::choose) runs those that need only
 //! coordinates. A Critical Points Layer runs inside a [`Classifier`](crate::Classifier): a front end
-//! computes features of the distinct points, `CriticalPoints` ranks the points that win its maxima,
-//! and [`Resize`] brings their number to M.
+//! computes features of the distinct points, and `CriticalPoints` ranks the points that win its
+//! maxima, of which the M best are kept.
 //!
 //! Samplers allocate memory only for a cloud that is larger than all before.
 
@@ -13,7 +13,6 @@ mod fps;
 mod hash;
 mod outliers;
 mod random;
-mod resize;
 mod spec;
 #[cfg(test)]
 mod testing;
@@ -32,8 +31,7 @@ pub use fps::FarthestPoints;
 pub use outliers::OutlierFilter;
 #[doc(hidden)]
 pub use random::RandomSubset;
-use spec::MOST_CRITICAL;
-pub use spec::{FpsStart, FrontChoice, Resize, SamplerKind, SamplerSpec};
+pub use spec::{FpsStart, FrontChoice, SamplerKind, SamplerSpec};
 use voxel::VoxelGrid;
 
 /// Errors of sampling.
@@ -43,9 +41,6 @@ pub enum SamplerError {
     /// The number of points to keep is 0.
     #[error("expected a sampler that keeps 1 point or more, found 0")]
     NoPointsWanted,
-    /// The number of points is so large that repetitions would fill memory.
-    #[error("expected a Critical Points Layer of at most {MOST_CRITICAL} points, found {0}")]
-    TooManyCritical(usize),
     /// The voxel size is not a positive number.
     #[error("expected a voxel size above 0, found {0}")]
     VoxelSize(f64),

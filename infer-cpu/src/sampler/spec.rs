@@ -5,9 +5,6 @@ use formats::model_card::ModelCard;
 
 use super::SamplerError;
 
-/// The largest M of a Critical Points Layer, which repeats points to reach it.
-pub const MOST_CRITICAL: usize = 1 << 24;
-
 formats::named! {
     /// A sampling method.
     #[derive(Default)]
@@ -24,7 +21,7 @@ formats::named! {
         Fps = "fps",
         /// One point for each cell of a grid.
         Voxel = "voxel",
-        /// A Critical Points Layer.
+        /// A Critical Points Layer: the M points that win most of a max-pooling, or fewer.
         Cpl = "cpl",
     }
 }
@@ -40,24 +37,6 @@ formats::named! {
         Farthest = "farthest",
         /// The first point of the cloud, as in reference implementations.
         First = "first",
-    }
-}
-
-formats::named! {
-    /// How a Critical Points Layer resizes its ranked points to M.
-    #[derive(Default)]
-    #[non_exhaustive]
-    pub enum Resize: "rule of resizing" {
-        /// The M best; fewer, if there are fewer.
-        Truncate = "truncate",
-        /// The M best; all in turn, over and over, if there are fewer.
-        #[default]
-        Cyclic = "cyclic",
-        /// The ranking, stretched or shrunk to M by nearest neighbours, as the layer's authors do.
-        Nearest = "nearest",
-        /// The same for a ranking in which each point is repeated in proportion to its score: the
-        /// weighted layer (WCPL) of the same authors.
-        Weighted = "weighted",
     }
 }
 
@@ -92,11 +71,6 @@ pub struct SamplerSpec {
     pub fps_start: FpsStart,
     /// The edge of a voxel in the units of the cloud; if `None`, the grid is as fine as M allows.
     pub voxel_size: Option<f64>,
-    /// How `cpl` resizes its points to M.
-    pub resize: Resize,
-    /// How often `cpl` may pool again over the points that are not chosen yet, while it has fewer
-    /// than M; 0 is the plain layer.
-    pub passes: usize,
     /// The layers whose features `cpl` pools.
     pub front: FrontChoice,
 }
@@ -109,8 +83,6 @@ impl Default for SamplerSpec {
             seed: 0,
             fps_start: FpsStart::default(),
             voxel_size: None,
-            resize: Resize::default(),
-            passes: 0,
             front: FrontChoice::default(),
         }
     }
@@ -148,9 +120,6 @@ impl SamplerSpec {
             (_, Some(size)) => Err(SamplerError::VoxelSize(size)),
             (SamplerKind::All, None) => Ok(()),
             (_, None) if self.points == 0 => Err(SamplerError::NoPointsWanted),
-            (SamplerKind::Cpl, None) if self.points > MOST_CRITICAL => {
-                Err(SamplerError::TooManyCritical(self.points))
-            }
             _ => Ok(()),
         }
     }
@@ -179,9 +148,6 @@ mod tests {
             assert_eq!(spec.check().is_ok(), kind == SamplerKind::All, "{kind}");
             assert_eq!(SamplerSpec { points: 1, ..spec }.check(), Ok(()));
         }
-        let spec =
-            SamplerSpec { kind: SamplerKind::Cpl, points: usize::MAX, ..SamplerSpec::default() };
-        assert_eq!(spec.check(), Err(SamplerError::TooManyCritical(usize::MAX)));
         for size in [0.0, -0.5, f64::NAN, f64::INFINITY] {
             let kind = SamplerKind::Voxel;
             let spec = SamplerSpec { kind, voxel_size: Some(size), ..SamplerSpec::default() };

@@ -38,16 +38,14 @@ fn a_voxel_size_is_in_the_cloud_s_unit_wherever_it_lies() {
 }
 
 #[test]
-fn critical_points_need_a_model_and_may_repeat() {
+fn critical_points_need_a_model_and_may_be_fewer() {
     let folder = Folder::new();
     folder.cloud("in.xyz", &strip(30));
     let line = "sample --model m.safetensors --sampler cpl --points 64 in.xyz out.xyz";
     let ran = folder.run(line);
-    assert!(ran.out.starts_with("out.xyz: 64 of 30 points ("), "{}{}", ran.out, ran.err);
-    assert!(ran.out.ends_with(" distinct)\n"), "{}", ran.out);
-    assert_eq!(read_cloud(&folder.path("out.xyz")).unwrap().len(), 64);
-    let ran = folder.run(&format!("{line} --resize truncate --overwrite"));
-    assert!(ran.out.ends_with(" of 30 points\n"), "{}", ran.out);
+    let n = read_cloud(&folder.path("out.xyz")).unwrap().len();
+    assert!((1..=30).contains(&n), "{n}");
+    assert_eq!(ran.out, format!("out.xyz: {n} of 30 points\n"), "{}", ran.err);
 }
 
 #[test]

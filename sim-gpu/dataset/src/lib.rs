@@ -77,7 +77,6 @@ pub use verify::{Problem, Report, verify};
 pub use formats::hash::Hashing;
 pub use formats::scan_file::ScanFormat;
 pub use formats::vlp32c::Returns;
-pub use sim_gpu::internals::job::Culling;
 pub use sim_gpu::internals::material::ColourSource;
 pub use sim_gpu::internals::mesh::frame::{Normalize, Unit, Up};
 pub use sim_gpu::internals::mesh::tree::{MeshEntry, discover, doubts};

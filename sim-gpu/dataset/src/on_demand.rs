@@ -12,7 +12,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use sim_gpu::internals::bvh::Builder;
 use sim_gpu::internals::config::InvalidValue;
-use sim_gpu::internals::job::{CastJob, Culling};
+use sim_gpu::internals::job::CastJob;
 use sim_gpu::internals::mesh::tree::MeshEntry;
 use sim_gpu::internals::scan::ObjectHits;
 use sim_gpu::internals::sensor::BeamPattern;
@@ -246,7 +246,7 @@ impl Clouds {
         let config = &DatasetConfig { seed, ..self.config.clone() };
         let caster = caster.for_effects(&self.config.cast_effects())?;
         let (patterns, cast_effects) = (&self.patterns, caster.effects());
-        let rig = Rig { config, patterns, cast_effects, culling: Culling::On };
+        let rig = Rig { config, patterns, cast_effects };
         let aimed: Vec<Result<Aimed, DatasetError>> =
             indices.par_iter().map(|&index| self.aim(rig, index)).collect();
         let jobs: Vec<CastJob> = aimed.iter().flatten().map(|aimed| aimed.job.clone()).collect();

@@ -60,7 +60,7 @@ pub(crate) fn scan_all(
 ) -> Result<Scanned, DatasetError> {
     let caster = caster.for_effects(&plan.config.cast_effects())?;
     let (patterns, cast_effects) = (&patterns(plan.config)?, caster.effects());
-    let rig = Rig { config: plan.config, patterns, cast_effects, culling: plan.culling };
+    let rig = Rig { config: plan.config, patterns, cast_effects };
     let shared = Shared {
         run: Run { plan, rig, progress, kept: AtomicUsize::new(0) },
         journal: Journal::at(plan.out),

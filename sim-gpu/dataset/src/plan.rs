@@ -1,5 +1,4 @@
 use crate::config::DatasetConfig;
-use sim_gpu::internals::job::Culling;
 use sim_gpu::internals::mesh::tree::MeshEntry;
 use std::path::Path;
 
@@ -16,9 +15,6 @@ pub struct Plan<'a> {
     pub part: Option<(u32, u32)>,
     /// How a dataset that is in the folder already is treated. It is refused by default.
     pub begin: Begin,
-    /// Whether beams that cannot hit a mesh are cast as well. They are not by default; the bytes
-    /// are the same.
-    pub culling: Culling,
 }
 
 /// How a dataset that is in the folder already is treated.
@@ -38,6 +34,6 @@ impl<'a> Plan<'a> {
     /// not hold a dataset yet.
     #[must_use]
     pub fn new(out: &'a Path, config: &'a DatasetConfig, meshes: &'a [MeshEntry]) -> Self {
-        Self { out, config, meshes, part: None, begin: Begin::Fresh, culling: Culling::On }
+        Self { out, config, meshes, part: None, begin: Begin::Fresh }
     }
 }

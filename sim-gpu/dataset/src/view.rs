@@ -7,7 +7,7 @@ use formats::vlp32c::Revolution;
 use glam::DVec3;
 use sim_gpu::effects::Effects;
 use sim_gpu::internals::config::InvalidValue;
-use sim_gpu::internals::job::{Cast, CastJob, Culling};
+use sim_gpu::internals::job::{Cast, CastJob};
 use sim_gpu::internals::material::Materials;
 use sim_gpu::internals::packets;
 use sim_gpu::internals::pose::Pose;
@@ -25,8 +25,6 @@ pub(crate) struct Rig<'a> {
     pub config: &'a DatasetConfig,
     pub patterns: &'a [Arc<BeamPattern>],
     pub cast_effects: &'a Effects,
-    /// Whether beams that cannot hit the mesh are cast.
-    pub culling: Culling,
 }
 
 pub(crate) struct View<'a> {
@@ -73,7 +71,7 @@ impl<'a> Rig<'a> {
 
     /// View `number` of set number `set` of the mesh `id`, from `pose`.
     pub fn view(self, set: usize, number: u32, pose: Pose, id: &str) -> View<'a> {
-        let Self { config, patterns, culling, .. } = self;
+        let Self { config, patterns, .. } = self;
         let (set, pattern) = (&config.sets[set], &patterns[set]);
         let mut request = ScanRequest::new(set.sensor.profile(), pattern, pose);
         let trajectory = config.effects.motion.as_deref();
@@ -81,7 +79,6 @@ impl<'a> Rig<'a> {
         request.motion = trajectory.map(Arc::new);
         request.stream = set.stream(config.seed, id, number);
         request.attributes = config.attributes.clone();
-        request.culling = culling;
         View { set, number, rig: self, request }
     }
 }

@@ -8,7 +8,6 @@ use glam::{DQuat, DVec3};
 use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel};
 use sim_gpu::internals::caster::OpenCaster;
 use sim_gpu::internals::config::InvalidValue;
-use sim_gpu::internals::job::Culling;
 use sim_gpu::internals::sensor::SensorProfile;
 use sim_gpu::{Caster, Glass, InstanceId, Mesh, Pose, Scene, Sensor};
 
@@ -23,7 +22,6 @@ pub struct Stage {
     seed: u64,
     classes: Vec<String>,
     pub(crate) sensors: Vec<StageSensor>,
-    pub(crate) culling: Culling,
     /// By entry of the recipe and by variant; built-in models are built when first used.
     models: Vec<Vec<OnceLock<Model>>>,
     user_files: UserFiles,
@@ -88,8 +86,8 @@ impl Stage {
             None => user_models(objects, meshes, seed, &mut user_files),
         });
         let models = models.collect::<Result<_, SceneError>>()?;
-        let (classes, culling) = (recipe.classes(), Culling::On);
-        Ok(Self { classes, recipe, seed, sensors, culling, models, user_files })
+        let classes = recipe.classes();
+        Ok(Self { classes, recipe, seed, sensors, models, user_files })
     }
 
     /// What is doubtful about the files of the user's meshes.
@@ -102,13 +100,6 @@ impl Stage {
     #[must_use]
     pub fn mesh_files(&self) -> &[PathBuf] {
         &self.user_files.files
-    }
-
-    /// The same stage with another `culling`, which changes the time of a sweep, not its points.
-    #[doc(hidden)]
-    #[must_use]
-    pub fn with_culling(self, culling: Culling) -> Self {
-        Self { culling, ..self }
     }
 
     /// The recipe.

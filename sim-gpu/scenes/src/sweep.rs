@@ -83,7 +83,6 @@ impl Stage {
         let pattern = sensor.rays(caster.effects())?;
         let mut request = ScanRequest::new(sensor.profile(), &pattern, scene.pose);
         request.attributes.clone_from(&world.attributes);
-        request.culling = self.culling;
         request.motion = scene.motion(pattern.last_s()).map(Arc::new);
         request.stream = self.stream(scene, u32::MAX);
         let scan = scan_objects(caster, placed, &request)?.scan;

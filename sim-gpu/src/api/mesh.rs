@@ -108,12 +108,6 @@ impl Mesh {
         Self::try_from(TriangleMesh { vertices, triangles }.in_metres(unit))
     }
 
-    /// The same mesh of a file whose y axis points up: (x, y, z) becomes (x, -z, y).
-    #[must_use]
-    pub fn y_up(&self) -> Self {
-        Self::upright(self.triangle_mesh().clone(), Up::Y)
-    }
-
     /// The same mesh, scaled about its origin: 0.001 for a file in millimetres.
     ///
     /// # Errors

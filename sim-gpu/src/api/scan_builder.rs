@@ -4,7 +4,6 @@ use super::{Caster, Error, Instance, Scan, Scene, Sensor};
 use crate::caster::OpenCaster;
 use crate::config::{InvalidValue, within};
 use crate::effects::{Effects, Intensity};
-use crate::job::Culling;
 use crate::pose::{Pose, Trajectory};
 use crate::scan::{PlacedTarget, ScanRequest, Scanned, scan_objects_async};
 use crate::scene::{check_motion, check_object, check_start};
@@ -29,7 +28,6 @@ pub struct ScanBuilder<'a> {
     pub(super) effects: Effects,
     pub(super) attributes: AttributeSet,
     seed: u64,
-    culling: Culling,
 }
 
 /// What a scan needs of its sensor and effects.
@@ -90,7 +88,6 @@ impl<'a> ScanBuilder<'a> {
             effects: scene.effects.clone(),
             attributes: scene.attributes.clone(),
             seed: scene.seed,
-            culling: Culling::On,
         }
     }
 
@@ -134,12 +131,6 @@ impl<'a> ScanBuilder<'a> {
 
     pub(super) fn at(self, pose: Pose) -> Self {
         Self { pose, ..self }
-    }
-
-    /// Whether beams that cannot hit are cast; the scan is the same.
-    #[doc(hidden)]
-    pub fn culling(self, culling: Culling) -> Self {
-        Self { culling, ..self }
     }
 
     /// Makes the scan.
@@ -196,7 +187,6 @@ impl<'a> ScanBuilder<'a> {
         request.deskew = self.deskew;
         request.attributes.clone_from(&self.attributes);
         request.stream = self.stream(self.key.name);
-        request.culling = self.culling;
         request
     }
 

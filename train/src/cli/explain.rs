@@ -8,7 +8,7 @@ use formats::atomic;
 use formats::cloud_file::{Unlike, judge_object};
 use formats::outcome::say;
 use formats::outputs::{Overwrite, need_extension};
-use infer_cpu::sampler::{Resize, SamplerKind, SamplerSpec};
+use infer_cpu::sampler::{SamplerKind, SamplerSpec};
 use infer_cpu::{Classifier, Normalization, Options};
 
 use super::compare_points::read_finite;
@@ -58,12 +58,8 @@ pub fn run(args: &ExplainArgs) -> anyhow::Result<()> {
     if unlike == Some(Unlike::Sweep) {
         say(format!("warning: {} {}", file(), Unlike::Sweep));
     }
-    let spec = SamplerSpec {
-        kind: SamplerKind::Cpl,
-        points: args.points,
-        resize: Resize::Truncate,
-        ..SamplerSpec::default()
-    };
+    let spec =
+        SamplerSpec { kind: SamplerKind::Cpl, points: args.points, ..SamplerSpec::default() };
     // The network sees all points; the sampler only finds the critical points.
     let whole = SamplerSpec { kind: SamplerKind::All, ..SamplerSpec::default() };
     // A cloud with parts removed must keep the normalisation of the whole cloud.

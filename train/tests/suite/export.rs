@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use formats::model_card::ModelCard;
-use infer_cpu::sampler::{Resize, SamplerKind, SamplerSpec};
+use infer_cpu::sampler::{SamplerKind, SamplerSpec};
 use infer_cpu::{Classifier, Evaluation, Options};
 use train::augment;
 use train::clouds::Clouds;
@@ -207,8 +207,7 @@ fn neighbors_are_searched_among_all_points_whatever_the_sampler_kept() {
         (SamplerKind::Random, 1),
         (SamplerKind::Cpl, 3),
     ] {
-        let resize = Resize::Truncate;
-        let sampler = Some(SamplerSpec { kind, points: 8, resize, ..SamplerSpec::default() });
+        let sampler = Some(SamplerSpec { kind, points: 8, ..SamplerSpec::default() });
         let normalization = Some("none".parse().unwrap());
         let options = Options { sampler, threads, normalization, ..Options::default() };
         let mut classifier = Classifier::load(&path, &options).unwrap();

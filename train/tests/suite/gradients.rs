@@ -191,7 +191,7 @@ fn gradients_of_a_shared_t_net_are_its_losses_differences() {
     let shape = shape(true, false);
     let cpl = Cpl { keep: 3, shared: true, ..Cpl::default() };
     let mut network = PointNet::new(&shape, CLASSES, 11);
-    network.select_by_t_net(CriticalPointSelector::new(&cpl, 0).unwrap());
+    network.select_by_t_net(CriticalPointSelector::new(&cpl, 0));
     let batch = batch();
     network.learn(&batch, Some(kept()), RATES);
     let gradients = gradients(&mut network);

@@ -140,7 +140,7 @@ static void options_are_followed(const char *model)
     memcpy(cloud, LONG_IN_Y, sizeof LONG_IN_Y);
     cloud[12] = cloud[13] = cloud[14] = INFINITY;
     options.threads = 2;
-    options.t_nets = "none";
+    options.normalization = "unit-sphere";
     options.sampler = "fps";
     options.points = 2;
     options.fps_start = "first";

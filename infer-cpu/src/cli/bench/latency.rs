@@ -8,7 +8,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use crate::network::open;
-use crate::{Classifier, ClassifierTeam, Options, Precision, TNets};
+use crate::{Classifier, ClassifierTeam, Options, Precision};
 use anyhow::Context;
 use formats::streams::Stream;
 use serde::Serialize;
@@ -27,7 +27,6 @@ struct Record {
 #[derive(Serialize)]
 struct Timing {
     sampler: String,
-    t_nets: &'static str,
     points: usize,
     /// The number of points of the classified clouds.
     from: usize,
@@ -43,7 +42,6 @@ struct Timing {
 
 struct Setting<'a> {
     sampler: &'a Variant,
-    t_nets: TNets,
     /// The number of points that the network processes.
     points: usize,
     threads: usize,
@@ -57,13 +55,11 @@ pub fn run(args: &BenchArgs, model: &Path) -> anyhow::Result<()> {
     precisions.sort_unstable();
     let mut rows = Vec::new();
     for sampler in &args.sampler {
-        for &t_nets in &args.t_nets {
-            for &points in &args.points {
-                for &threads in &args.threads {
-                    for &precision in &precisions {
-                        let setting = Setting { sampler, t_nets, points, threads, precision };
-                        rows.push(measure(args, model, &setting, &ranges)?);
-                    }
+        for &points in &args.points {
+            for &threads in &args.threads {
+                for &precision in &precisions {
+                    let setting = Setting { sampler, points, threads, precision };
+                    rows.push(measure(args, model, &setting, &ranges)?);
                 }
             }
         }
@@ -76,7 +72,6 @@ pub fn run(args: &BenchArgs, model: &Path) -> anyhow::Result<()> {
     let cells = |row: &Timing| {
         vec![
             ("sampler", row.sampler.clone()),
-            ("T-Nets", row.t_nets.to_owned()),
             ("precision", row.precision.to_owned()),
             ("kernel", row.kernel.to_owned()),
             ("from", row.from.to_string()),
@@ -90,7 +85,7 @@ pub fn run(args: &BenchArgs, model: &Path) -> anyhow::Result<()> {
     let (_, card) = open(model)?;
     let untrained = if card.trained { "" } else { ", untrained: its weights are random" };
     writeln!(stdout(), "{}{untrained}", record.model)?;
-    table::print(4, &record.rows.iter().map(cells).collect::<Vec<_>>())?;
+    table::print(3, &record.rows.iter().map(cells).collect::<Vec<_>>())?;
     Ok(())
 }
 
@@ -100,13 +95,12 @@ fn measure(
     setting: &Setting<'_>,
     ranges: &Option<BTreeMap<String, f32>>,
 ) -> anyhow::Result<Timing> {
-    let &Setting { sampler, t_nets, points, threads, precision } = setting;
+    let &Setting { sampler, points, threads, precision } = setting;
     let from = if sampler.takes_all() { points } else { args.from };
     let mut options = Options {
         precision,
         kernel: args.kernel,
         threads,
-        t_nets,
         capacity: from,
         activation_ranges: ranges.clone(),
         ..Options::default()
@@ -134,7 +128,6 @@ fn measure(
     };
     Ok(Timing {
         sampler: sampler.to_string(),
-        t_nets: t_nets.name(),
         points,
         from,
         precision: precision.name(),

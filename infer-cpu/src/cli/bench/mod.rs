@@ -8,7 +8,7 @@ mod variant;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use crate::{Precision, TNets};
+use crate::Precision;
 #[cfg(feature = "npz")]
 use formats::labelled::read_labelled;
 
@@ -43,10 +43,6 @@ pub struct BenchArgs {
     /// Samplers to measure; for `all`, the clouds have as many points as the network sees
     #[arg(long, value_delimiter = ',', default_value = "all")]
     sampler: Vec<Variant>,
-
-    /// T-Nets to run: both, input, feature, none
-    #[arg(long, value_delimiter = ',', default_value = "both")]
-    t_nets: Vec<TNets>,
 
     /// Numbers of threads to measure
     #[arg(long, value_delimiter = ',', value_parser = at_least_one, default_value = "1,2,4")]

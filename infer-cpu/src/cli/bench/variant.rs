@@ -41,16 +41,13 @@ impl FromStr for Variant {
         for word in words {
             if let Ok(front) = word.parse() {
                 variant.spec.front = front;
-            } else if let Ok(resize) = word.parse() {
-                variant.spec.resize = resize;
             } else if let Some(Ok(votes)) = word.strip_prefix("votes").map(str::parse) {
                 variant.votes = votes;
             } else if word == "turned" {
                 variant.rotations = true;
             } else {
                 return Err(format!(
-                    "unknown word `{word}` after the sampler, expected a front end, a resize \
-                     rule, votesN or turned"
+                    "unknown word `{word}` after the sampler, expected a front end, votesN or turned"
                 ));
             }
         }
@@ -66,16 +63,15 @@ impl fmt::Display for Variant {
 
 #[cfg(test)]
 mod tests {
-    use crate::sampler::{FrontChoice, Resize};
+    use crate::sampler::FrontChoice;
 
     use super::*;
 
     #[test]
     fn a_variant_says_what_follows_the_sampler() {
-        let variant: Variant = "cpl:stn:truncate".parse().unwrap();
+        let variant: Variant = "cpl:stn".parse().unwrap();
         assert_eq!(variant.spec.kind, SamplerKind::Cpl);
         assert_eq!(variant.spec.front, FrontChoice::Stn);
-        assert_eq!(variant.spec.resize, Resize::Truncate);
         let variant: Variant = "random:votes5:turned".parse().unwrap();
         assert_eq!((variant.votes, variant.rotations), (5, true));
         assert!("fps:votes".parse::<Variant>().unwrap_err().contains("unknown word `votes`"));

@@ -194,17 +194,8 @@ fn what_is_wrong_is_named_with_its_line() {
     }
 }
 
-/// Each byte by others, and elements in elements: an error or a robot, and no panic.
 #[test]
-fn damage_anywhere_is_an_error_or_a_robot() {
-    for at in 0..ARM.len() {
-        for byte in *b"\0 9-e\"<>/&" {
-            let mut bytes = ARM.as_bytes().to_vec();
-            bytes[at] = byte;
-            let _ = read_at(std::str::from_utf8(&bytes).unwrap(), &[]);
-        }
-        let _ = read_at(&ARM[..at], &[]);
-    }
+fn tags_in_tags_without_end_are_an_error() {
     let deep = format!("<robot>{}{}</robot>", "<a>".repeat(200_000), "</a>".repeat(200_000));
     assert!(read_at(&deep, &[]).is_err());
 }

@@ -379,27 +379,3 @@ fn wrong_animation_is_named_with_its_place() {
         assert!(error.contains(expected), "{expected}: {error}");
     }
 }
-
-/// Each byte by others, digits and signs among them: an error, or a mesh or a scene, and no panic.
-#[test]
-fn damage_anywhere_is_an_error_or_a_mesh() {
-    let moved: &[&[f32]] = &[&[0.0; 3], &[1.0, 2.0, 3.0]];
-    let file = animated(
-        r#"{"mesh": 0, "children": [1]}, {"mesh": 0}"#,
-        &[
-            (0, "translation", "LINEAR", &[0.0, 1.0], moved),
-            (1, "rotation", "STEP", &[1.0, 2.0, 3.0], QUARTERS),
-        ],
-    );
-    for at in 0..file.len() {
-        for byte in *b"\0\x019-7e\"{[\xff" {
-            let mut bytes = file.clone();
-            bytes[at] = byte;
-            let _ = parse(&bytes, None);
-            let _ = assemble(&bytes, None, DAffine3::IDENTITY);
-        }
-    }
-    for end in 0..file.len() {
-        assert!(assemble(&file[..end], None, DAffine3::IDENTITY).is_err());
-    }
-}

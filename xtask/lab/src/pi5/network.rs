@@ -1,7 +1,7 @@
 //! The layers of a model file, and a stand-in for a trained model: the baseline network
 //! with random weights.
 
-use crate::measure::reference::{STACKS, drawn};
+use crate::measure::baseline::{STACKS, drawn};
 use anyhow::{Context, Result, ensure};
 use formats::model_card::{ModelCard, Normalization};
 use formats::rng::StreamKey;

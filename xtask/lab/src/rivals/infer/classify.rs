@@ -3,10 +3,11 @@
 use super::candidate::{Arithmetic, Candidate, Job};
 use super::comparison::{Entry, compare};
 use super::model::{shortfall, worst};
+use super::ours::log_probabilities;
 use super::speed_tables::show;
 use crate::measure::clock::Spread;
-use crate::measure::reference::Network;
 use anyhow::Result;
+use infer_cpu::Classifier;
 
 /// Tolerance of log-probabilities in f32. Engines sum in different orders; over this model's layers
 /// that gives some 1e-6.
@@ -23,14 +24,14 @@ pub fn classify_all(
     points: &[usize],
     threads: &[usize],
     rounds: usize,
-    (reference, cloud): (&Network, &[[f32; 3]]),
+    (reference, cloud): (&mut Classifier, &[[f32; 3]]),
 ) -> Result<Vec<Entry>> {
     let mut entries = Vec::new();
     for &threads in threads {
         let jobs: Vec<Job> = points.iter().map(|&n| Job { points: n, setting: threads }).collect();
         for &job in &jobs {
             eprintln!("{} points, {}", job.points, in_words(threads));
-            let truth = reference.log_probabilities(&cloud[..job.points])?;
+            let truth = log_probabilities(reference, &cloud[..job.points])?;
             let range = Spread::of(truth.iter().copied());
             let tolerance = |arithmetic| match arithmetic {
                 Arithmetic::F32 => F32_TOLERANCE,

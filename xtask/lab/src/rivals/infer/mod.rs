@@ -11,7 +11,6 @@ mod roster;
 mod speed_tables;
 
 use crate::measure::machine::Machine;
-use crate::measure::reference::Network;
 use anyhow::Result;
 use candidate::Candidate;
 use clap::Args;
@@ -76,7 +75,7 @@ pub fn run(args: &InferArgs) -> Result<()> {
         model::write_random(&random)?;
     }
     let material = Material { model: args.model.clone().unwrap_or(random), folder };
-    let reference = Network::read(&material.model)?;
+    let mut reference = ours::reference(&material.model)?;
     let cloud = model::cloud(args.points.iter().copied().fold(classify::MOST_POINTS, usize::max));
     model::write_cloud(&cloud, &material.cloud())?;
 
@@ -94,7 +93,7 @@ pub fn run(args: &InferArgs) -> Result<()> {
     };
     if !classifiers.is_empty() {
         let (points, threads) = (&args.points, &args.threads);
-        let reference = (&reference, &cloud[..]);
+        let reference = (&mut reference, &cloud[..]);
         report.classifying =
             classify::classify_all(&mut classifiers, points, threads, args.rounds, reference)?;
     }

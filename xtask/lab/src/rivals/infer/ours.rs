@@ -3,7 +3,7 @@
 use super::candidate::{Arithmetic, Candidate, Engine, Job};
 use crate::measure::clock::{Cost, measured};
 use anyhow::{Context, Result};
-use infer_cpu::kernel::{self, Kernels};
+use infer_cpu::kernel::{self, KernelName, Kernels};
 use infer_cpu::sampler::{FarthestPoints, FpsStart};
 use infer_cpu::{Classifier, Normalization, Options, Precision};
 use std::hint::black_box;
@@ -13,6 +13,20 @@ use std::path::{Path, PathBuf};
 const UNCOUNTED: usize = 3;
 
 const SAMPLER: &str = "ours";
+
+/// The classifier with whose answers those of all engines are compared: one thread, and the scalar
+/// kernels, which the tests of infer-cpu compare with PyTorch.
+pub fn reference(model: &Path) -> Result<Classifier> {
+    let kernel = Some(KernelName::Scalar);
+    let normalization = Some(Normalization::None);
+    Ok(Classifier::load(model, &Options { kernel, normalization, ..Options::default() })?)
+}
+
+/// The log-probabilities of all classes.
+pub fn log_probabilities(classifier: &mut Classifier, points: &[[f32; 3]]) -> Result<Vec<f64>> {
+    let prediction = classifier.classify(points)?;
+    Ok((0..prediction.logits.len()).map(|class| prediction.log_probability(class)).collect())
+}
 
 fn name(precision: Precision) -> String {
     format!("ours-{precision}")
@@ -133,9 +147,7 @@ impl Engine for Classifying {
 
     fn answer(&mut self) -> Result<Vec<f64>> {
         let (classifier, points) = self.loaded()?;
-        let prediction = classifier.classify(points)?;
-        let classes = 0..prediction.logits.len();
-        Ok(classes.map(|class| prediction.log_probability(class)).collect())
+        log_probabilities(classifier, points)
     }
 
     fn time(&mut self, repeats: usize) -> Result<Vec<Cost>> {

@@ -6,7 +6,7 @@ use anyhow::Result;
 use formats::interval::wilson;
 use formats::split::Split;
 use infer_cpu::Options;
-use infer_cpu::sampler::{Resize, SamplerKind, SamplerSpec};
+use infer_cpu::sampler::{SamplerKind, SamplerSpec};
 use std::path::{Path, PathBuf};
 use train::clouds::Clouds;
 use train::cpl::Cpl;
@@ -67,8 +67,7 @@ fn tested_at(context: &ExperimentContext) -> Result<Table> {
     let largest = held.set.smallest_cloud();
     for &points in context.plan.tested_points.iter().filter(|&&n| n <= largest) {
         let at = |kind| {
-            let resize = Resize::Truncate;
-            let sampler = SamplerSpec { kind, points, resize, ..SamplerSpec::default() };
+            let sampler = SamplerSpec { kind, points, ..SamplerSpec::default() };
             accuracy(&model, &held, Some(sampler))
         };
         push(&mut table, points.to_string(), [SamplerKind::Random, SamplerKind::Fps].map(at))?;
