@@ -1,8 +1,10 @@
-"""A PointNet to train in PyTorch, and its export to `infer-cpu`. Only this module imports PyTorch."""
+"""Networks to train in PyTorch, and their export to `infer-cpu`. Only this module imports PyTorch."""
 
 from __future__ import annotations
 
+import json
 import os
+import re
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -55,14 +57,157 @@ class PointNet(nn.Module):
         return logits
 
 
+class SetNetwork(nn.Module):
+    """A network of separable set abstractions (Qian et al. 2021, "ASSANet"), for clouds of shape [batch, n, 3].
+
+    Layers that all points share come first. Each level then takes the maximum over the neighborhood of each of its
+    centres, which are farthest points, and applies more shared layers to it. The maximum and the mean over the last
+    level's centres go to dense layers. Names and arithmetic are those of `edgepuck train --recipe set-64`.
+
+    Args:
+        n_classes: The number of classes.
+        widths: The widths of the layers before the first level.
+        levels: The number of centres, the radius, and the widths of the layers of each level.
+        head: The widths of the hidden dense layers.
+        dropout: The probability of dropout in the last hidden layer.
+
+    A cloud needs as many different points as the first level has centres: repeated centres would count twice in the
+    mean. `farthest` and `winners` may be replaced by kernels with the same results.
+
+    Raises:
+        ValueError: A level has more centres than the one before it.
+    """
+
+    def __init__(
+        self,
+        n_classes: int,
+        widths: Sequence[int] = (64, 128),
+        levels: Sequence[tuple[int, float, Sequence[int]]] = ((256, 0.2, (256, 256)), (64, 0.4, (512, 512, 1024))),
+        head: Sequence[int] = (256,),
+        dropout: float = 0.4,
+    ) -> None:
+        super().__init__()
+        if any(fewer[0] > more[0] for more, fewer in zip(levels, levels[1:], strict=False)):
+            raise ValueError(f"expected no more centres than in the level before, found {[n for n, _, _ in levels]}")
+        self.levels, self.dropout = tuple(levels), dropout
+        self.farthest, self.winners = farthest, winners
+        self.feat = _shared(3, widths)
+        width = widths[-1]
+        for number, (_, _, after) in enumerate(levels, 1):
+            level = _shared(width, after, first=2)
+            level.add_module("conv1", nn.Linear(4, width))
+            level.add_module("bn1", nn.BatchNorm1d(width))
+            with torch.no_grad():
+                level.conv1.weight[:, 0] = 1.0
+            self.add_module(f"sa{number}", level)
+            width = after[-1]
+        dense = (2 * width, *head, n_classes)
+        self.n_dense = len(dense) - 1
+        for i, (inputs, outputs) in enumerate(zip(dense, dense[1:], strict=False), 1):
+            self.add_module(f"fc{i}", nn.Linear(inputs, outputs))
+            if i < self.n_dense:
+                self.add_module(f"bn{i}", nn.BatchNorm1d(outputs))
+
+    def forward(self, clouds: Tensor) -> Tensor:
+        """The logits, [batch, n_classes], of `clouds`, [batch, n, 3]."""
+        points, features = clouds, _apply(self.feat, clouds)
+        # The first of farthest points are farthest points of fewer: each level's centres begin the last one's.
+        chosen = self.farthest(points, self.levels[0][0])
+        for number, (n_centres, radius, _) in enumerate(self.levels, 1):
+            level = self.get_submodule(f"sa{number}")
+            centres = _rows(points, chosen[:, :n_centres])
+            features = _apply(level, self._pooled(level, features, points, centres, radius), first=2)
+            points = centres
+            chosen = torch.arange(n_centres, device=clouds.device).expand(len(clouds), -1)
+        x = torch.cat([torch.amax(features, 1), torch.mean(features, 1)], 1)
+        for i in range(1, self.n_dense):
+            x = self.get_submodule(f"fc{i}")(x)
+            if i + 1 == self.n_dense:
+                x = nn.functional.dropout(x, self.dropout, self.training)
+            x = torch.relu(self.get_submodule(f"bn{i}")(x))
+        logits: Tensor = self.get_submodule(f"fc{self.n_dense}")(x)
+        return logits
+
+    def _pooled(self, level: nn.Module, u: Tensor, points: Tensor, centres: Tensor, radius: float) -> Tensor:
+        """relu(norm(max over the neighbors q of each centre p of (a u_q + v (q - p) / radius + b)))."""
+        linear, norm = level.get_submodule("conv1"), level.get_submodule("bn1")
+        with torch.no_grad():
+            # A norm of negative scale turns the order round: its largest output is of the smallest input.
+            weight = torch.where(norm.weight < 0, -1.0, 1.0)[:, None] * linear.weight
+            winner = self.winners(u, points, centres, weight, radius)
+        batch, n, channels = winner.shape
+        where = winner.reshape(batch, n * channels)
+        offset = (_rows(points, where).reshape(batch, n, channels, 3) - centres[:, :, None]) / radius
+        z = linear.weight[:, 0] * u.gather(1, winner) + (offset * linear.weight[:, 1:]).sum(3) + linear.bias
+        pooled: Tensor = torch.relu(norm(z.reshape(batch * n, channels))).reshape(batch, n, channels)
+        return pooled
+
+
+def farthest(points: Tensor, n: int) -> Tensor:
+    """The indices, [batch, n], of farthest points of `points`, [batch, m, 3]: first the one farthest from the mean."""
+    every = torch.arange(len(points), device=points.device)
+    pick = (points - points.mean(1, keepdim=True)).square().sum(2).argmax(1)
+    picked, nearest = [pick], torch.full(points.shape[:2], torch.inf, device=points.device)
+    for _ in range(n - 1):
+        nearest = torch.minimum(nearest, (points - points[every, pick][:, None]).square().sum(2))
+        pick = nearest.argmax(1)
+        picked.append(pick)
+    return torch.stack(picked, 1)
+
+
+def winners(u: Tensor, points: Tensor, centres: Tensor, weight: Tensor, radius: float) -> Tensor:
+    """For each centre p and channel c, the point q within `radius` whose a_c u_qc + v_c q / radius is largest.
+
+    Args:
+        u: The features of the points, [batch, m, channels].
+        points: Their coordinates, [batch, m, 3].
+        centres: The coordinates of the centres, [batch, n, 3].
+        weight: a and v of each channel, [channels, 4].
+        radius: The radius of the neighborhoods.
+
+    Returns:
+        The indices of the points, [batch, n, channels].
+    """
+    products = weight[:, 0] * u + points @ weight[:, 1:].T / radius
+    is_far = torch.cdist(centres, points, compute_mode="donot_use_mm_for_euclid_dist") > radius
+    # One cloud at a time: [n, m, channels] is large.
+    found = [torch.where(far[:, :, None], -torch.inf, own).argmax(1) for far, own in zip(is_far, products, strict=False)]
+    return torch.stack(found)
+
+
+def _shared(inputs: int, widths: Sequence[int], first: int = 1) -> nn.Module:
+    """The layers `conv{i}` and `bn{i}` of these `widths`, numbered from `first`."""
+    layers = nn.Module()
+    for i, outputs in enumerate(widths, first):
+        layers.add_module(f"conv{i}", nn.Linear(inputs, outputs))
+        layers.add_module(f"bn{i}", nn.BatchNorm1d(outputs))
+        inputs = outputs
+    return layers
+
+
+def _apply(layers: nn.Module, x: Tensor, first: int = 1) -> Tensor:
+    """The layers from number `first` on, applied to `x`, [batch, n, channels], each followed by a ReLU."""
+    rows = x.reshape(-1, x.shape[2])
+    for i in range(first, len(layers._modules) // 2 + 1):
+        rows = torch.relu(layers.get_submodule(f"bn{i}")(layers.get_submodule(f"conv{i}")(rows)))
+    return rows.reshape(x.shape[0], x.shape[1], -1)
+
+
+def _rows(x: Tensor, indices: Tensor) -> Tensor:
+    """The rows `indices`, [batch, n], of `x`, [batch, m, channels]."""
+    return x.gather(1, indices[:, :, None].expand(-1, -1, x.shape[2]))
+
+
 def export(
-    model: PointNet,
+    model: PointNet | SetNetwork,
     path: str | os.PathLike[str],
     *,
     classes: Sequence[str],
-    sampler: str = "fps",
-    points: int = 64,
+    sampler: str | None = None,
+    points: int | None = None,
     training_set: str | None = None,
+    calibrate: str | os.PathLike[str] | None = None,
+    half: bool = False,
 ) -> None:
     """Write a model file for `edgepuck.Classifier` and `infer-cpu`.
 
@@ -70,19 +215,53 @@ def export(
         model: The network.
         path: The file, `.safetensors`.
         classes: The names of the classes in the order of the logits.
-        sampler: The sampler of points: all, random, fps, voxel or cpl.
-        points: The number of points that the sampler chooses.
+        sampler: The sampler of points: all, random, fps, voxel or cpl. The default is fps, or random for a
+            `SetNetwork`, which chooses its own farthest points.
+        points: The number of points that the sampler chooses. The default is 64, or 1,024 for a `SetNetwork`.
         training_set: The name of the training set.
+        calibrate: A packed NPZ file of clouds that the network was trained on, to measure the ranges that int8 needs.
+        half: Fold the batch norms into the layers before them, and write f16: half the size, about the same answers.
 
     Raises:
         Error: The file cannot be written, or the numbers of classes and logits differ.
     """
+    is_sets = isinstance(model, SetNetwork)
+    sampler, points = sampler or ("random" if is_sets else "fps"), points or (1024 if is_sets else 64)
     with tempfile.TemporaryDirectory() as folder:
-        checkpoint, names = Path(folder, "model.pth"), Path(folder, "classes.txt")
-        state = {name: value.cpu() for name, value in model.state_dict().items()}
+        checkpoint, names, table = (Path(folder, name) for name in ("model.pth", "classes.txt", "table.toml"))
+        state = _folded(model) if half else {name: value.cpu() for name, value in model.state_dict().items()}
         torch.save({"model_state_dict": state}, checkpoint)
         names.write_text("\n".join(classes) + "\n")
         words = ["import-weights", checkpoint, f"--out={os.fspath(path)}", f"--classes={names}"]
         words += [f"--sampler={sampler}", f"--points={points}", "--provenance=edgepuck.torch.export"]
         words += [f"--training-set={training_set}"] if training_set else []
+        words += [f"--calibrate={os.fspath(calibrate)}"] if calibrate else []
+        if isinstance(model, SetNetwork):
+            table.write_text(_table(model))
+            words += [f"--table={table}"]
         _edgepuck.run(["edgepuck", *map(str, words)])
+
+
+def _folded(model: nn.Module) -> dict[str, Tensor]:
+    """The weights in f16, with batch norms folded into the layers of the same number before them."""
+    layers, folded = dict(model.named_modules()), {}
+    for name, layer in layers.items():
+        if not isinstance(layer, nn.Linear | nn.Conv1d):
+            continue
+        norm = layers.get(re.sub(r"(conv|fc)(\d+)$", r"bn\2", name))
+        weight, bias = layer.weight.detach().double(), layer.bias.detach().double()
+        if isinstance(norm, nn.BatchNorm1d):
+            scale = norm.weight.detach().double() / torch.sqrt(norm.running_var.double() + norm.eps)
+            weight = weight * scale.reshape(-1, *[1] * (weight.ndim - 1))
+            bias = (bias - norm.running_mean.double()) * scale + norm.bias.detach().double()
+        folded[f"{name}.weight"], folded[f"{name}.bias"] = weight.half().cpu(), bias.half().cpu()
+    return folded
+
+
+def _table(model: SetNetwork) -> str:
+    """The importer's table for `model`, whose layers have the importer's names already."""
+    layers = sorted({name.rpartition(".")[0] for name in model.state_dict()})
+    lines = [f'"{layer}" = "{layer}"' for layer in layers]
+    abstractions = json.dumps([(n, radius) for n, radius, _ in model.levels])
+    card = [f'abstractions = "{abstractions}"', 'normalization = "unit-sphere"']
+    return "\n".join(['name = "edgepuck.torch.SetNetwork"', "[layers]", *lines, "[card]", *card]) + "\n"

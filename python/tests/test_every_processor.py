@@ -7,7 +7,6 @@ import hashlib
 import json
 import os
 import platform
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -22,9 +21,6 @@ GOLDEN = Path(__file__).parent / "golden/x86_64.json"
 # f16, which is worth 8 roundings of f16. In i8, an activation between two of its 127 steps may
 # become either, which is worth a step.
 TOLERANCES = {"f32": 1e-5, "f32-fc16": 1e-5, "f16": 8 * 2**-11, "i8": 1 / 127}
-
-# Scans take sines and logarithms from the system, and another C library may round them otherwise.
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="this system has other sines")
 
 
 @pytest.fixture(scope="module")

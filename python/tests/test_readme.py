@@ -27,24 +27,6 @@ def test_the_example_of_a_loader_casts_batches(shapes: Path, capsys: pytest.Capt
     assert capsys.readouterr().out == "30 1024 3\n" * 2
 
 
-def test_an_exported_network_answers_as_in_pytorch(shapes: Path, tmp_path: Path) -> None:
-    torch = pytest.importorskip("torch")
-    from edgepuck.torch import PointNet, export
-
-    torch.manual_seed(0)
-    test = ep.Dataset(shapes, split="test", points=64)
-    clouds, _ = test.batch(range(len(test)))
-    model = PointNet(len(test.classes))
-    # Batch norms that have seen clouds do not leave numbers as they are.
-    for _ in range(10):
-        model(torch.from_numpy(clouds))
-    export(model.eval(), tmp_path / "my.safetensors", classes=test.classes, points=64)
-    logits = model(torch.from_numpy(clouds)).detach().numpy()
-    classify = ep.Classifier(tmp_path / "my.safetensors", sampler="all")
-    found = np.stack([classify(cloud).logits for cloud in clouds])
-    np.testing.assert_allclose(found, logits, atol=1e-3 * np.abs(logits).max())
-
-
 def test_a_data_loader_gives_the_same_batches_to_any_workers(shapes: Path) -> None:
     torch = pytest.importorskip("torch")
     dataset = ep.Dataset(shapes, "vlp32c", points=64)

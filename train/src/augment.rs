@@ -25,8 +25,6 @@ pub struct TrainingCloud {
     pub first_weight: f32,
     /// The target share of each class.
     pub target: Vec<f32>,
-    /// The clouds of which it consists, with their shares: its own, and one that is mixed in.
-    pub parts: [(usize, f32); 2],
 }
 
 /// Augments cloud `i` of `clouds` for its draw number `turn`, counted from 0, in `epoch`.
@@ -76,8 +74,7 @@ pub fn augment(
         points = places.iter().map(|&place| neighborhood[place]).collect();
     }
     let first_weight = (n - points.len() + 1) as f32;
-    let parts = [(i, 1.0 - replaced), (other, replaced)];
-    TrainingCloud { points, neighborhood, first_weight, target, parts }
+    TrainingCloud { points, neighborhood, first_weight, target }
 }
 
 /// The validation clouds `held`, followed by a copy of each, varied and turned as in training, so
@@ -171,35 +168,6 @@ fn mix_ball(cloud: &mut [[f32; 3]], other: &[[f32; 3]], draws: &mut Draws) -> f3
     n as f32 / cloud.len() as f32
 }
 
-/// Scales, turns and shifts the surroundings of four random points of the cloud, each in its own
-/// way. Every point moves by the mean of the four, weighted by its distance to their centres.
-fn warp(points: &mut [[f32; 3]], most: f64, draws: &mut Draws) {
-    /// The standard deviation of the weights: half the radius of a cloud.
-    const REACH: f64 = 0.5;
-    let anchors = [(); 4].map(|()| {
-        let mut three = |most: f64| [(); 3].map(|()| draws.between(-most, most));
-        let (scale, turn, shift) = (three(most), three(most), three(0.5 * most));
-        (points[draws.below(points.len())].map(f64::from), scale, turn, shift)
-    });
-    for point in points {
-        let p = point.map(f64::from);
-        let (mut moved, mut total) = ([0.0; 3], 0.0);
-        for (anchor, scale, turn, shift) in &anchors {
-            let mut q = [0, 1, 2].map(|k| p[k] - anchor[k]);
-            let weight = libm::exp(-q.iter().map(|x| x * x).sum::<f64>() / (2.0 * REACH * REACH));
-            q = [0, 1, 2].map(|k| q[k] * (1.0 + scale[k]));
-            for (axis, angle) in turn.iter().enumerate() {
-                let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
-                let (sin, cos) = libm::sincos(*angle);
-                (q[a], q[b]) = (cos * q[a] - sin * q[b], sin * q[a] + cos * q[b]);
-            }
-            (0..3).for_each(|k| moved[k] += weight * (q[k] + anchor[k] + shift[k]));
-            total += weight;
-        }
-        *point = moved.map(|x| (x / total) as f32);
-    }
-}
-
 /// Drops points at random. The chance is the same for all points of a cloud, and uniform from 0 to
 /// `most`. The first point stays, because the baseline moves dropped points onto it.
 fn drop_points<T>(points: &mut Vec<T>, most: f64, draws: &mut Draws) {
@@ -213,9 +181,6 @@ fn drop_points<T>(points: &mut Vec<T>, most: f64, draws: &mut Draws) {
 }
 
 fn transform(points: &mut [[f32; 3]], augment: &Augment, draws: &mut Draws) {
-    if augment.warp > 0.0 {
-        warp(points, augment.warp, draws);
-    }
     let Augment { scale: [low, high], shift, stretch, rotate_degrees, .. } = *augment;
     let scale = draws.between(low, high);
     let shifts = [(); 3].map(|()| draws.between(-shift, shift));

@@ -21,19 +21,6 @@ pub struct Batch {
     pub neighborhood_starts: Vec<usize>,
     /// The target share of each class, `[clouds, classes]`.
     pub targets: Matrix,
-    /// What teachers say of the clouds, if there are any.
-    pub taught: Option<Taught>,
-}
-
-/// The answers of teachers to the clouds of a batch.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Taught {
-    /// The share of each class at the temperature, `[clouds, classes]`.
-    pub shares: Matrix,
-    /// The temperature of the shares.
-    pub temperature: f32,
-    /// The weight of the teachers in the loss; the targets have the rest.
-    pub weight: f32,
 }
 
 impl Batch {

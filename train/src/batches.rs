@@ -12,7 +12,6 @@ use crate::batch::Batch;
 use crate::clouds::Clouds;
 use crate::matrix::Matrix;
 use crate::recipe::Recipe;
-use crate::teachers::Teachers;
 
 /// Largest number of prepared batches that wait for the network.
 const AHEAD: usize = 3;
@@ -28,12 +27,10 @@ fn size(n: usize, recipe: &Recipe) -> usize {
     recipe.clouds_per_epoch.unwrap_or(n)
 }
 
-/// Starts preparing the batches of `epoch`, in an order that depends on the seed and the epoch, with
-/// what `teachers` say of them.
+/// Starts preparing the batches of `epoch`, in an order that depends on the seed and the epoch.
 pub fn start<'s>(
     scope: &'s Scope<'s, '_>,
     clouds: &'s Clouds,
-    teachers: Option<&'s Teachers>,
     recipe: &'s Recipe,
     epoch: u32,
 ) -> Receiver<Batch> {
@@ -43,8 +40,7 @@ pub fn start<'s>(
         for some in order.chunks_exact(recipe.batch) {
             let draw = |&(i, turn): &(usize, u32)| augment(clouds, i, (epoch, turn), recipe);
             let drawn: Vec<TrainingCloud> = some.par_iter().map(draw).collect();
-            let taught = teachers.map(|teachers| teachers.taught(&drawn));
-            if sender.send(Batch { taught, ..joined(&drawn) }).is_err() {
+            if sender.send(joined(&drawn)).is_err() {
                 // The receiver has stopped after an error.
                 break;
             }

@@ -161,7 +161,7 @@ impl Reader<'_> {
 /// the inputs of a layer depend on the batch norms before it.
 fn unfold(model: &mut Model, recipe: &Recipe, clouds: &Clouds) {
     let drawn = Recipe { batch: CLOUDS, clouds_per_epoch: Some(CLOUDS), ..recipe.clone() };
-    let batch = std::thread::scope(|scope| batches::start(scope, clouds, None, &drawn, 0).recv());
+    let batch = std::thread::scope(|scope| batches::start(scope, clouds, &drawn, 0).recv());
     let batch = batch.expect("invariant: an epoch of one batch");
     let rates = Rates { momentum: 1.0, orthogonality: 0.0, step: 0 };
     for place in 0..model.layers().len() {

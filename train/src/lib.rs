@@ -49,7 +49,6 @@ pub mod set_network;
 pub mod shape;
 mod svg;
 mod t_net;
-pub mod teachers;
 pub mod trainer;
 
 /// Compiles the example of the README.

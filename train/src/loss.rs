@@ -2,7 +2,6 @@
 
 use ndarray::parallel::prelude::*;
 
-use crate::batch::{Batch, Taught};
 use crate::matrix::Matrix;
 
 /// The loss of a batch.
@@ -14,22 +13,6 @@ pub struct Loss {
     pub orthogonality: f64,
     /// The number of clouds whose most probable class has the largest share of the target.
     pub correct: usize,
-}
-
-/// The cross entropy of `logits` and the targets of `batch`, mixed with that of the teachers if there
-/// are any: with α their share and T the temperature, (1 - α) CE + α T² CE at temperature T (Hinton
-/// et al. 2015). Also returns the gradient with respect to the logits.
-#[must_use]
-pub fn of_batch(logits: Matrix, batch: &Batch) -> (Loss, Matrix) {
-    let Some(Taught { shares, temperature, weight }) = &batch.taught else {
-        return cross_entropy(logits, &batch.targets);
-    };
-    let (softer, softer_gradient) = cross_entropy(&logits / *temperature, shares);
-    let (mut loss, gradient) = cross_entropy(logits, &batch.targets);
-    let scale = weight * temperature;
-    loss.total *= 1.0 - f64::from(*weight);
-    loss.total += f64::from(scale * temperature) * softer.total;
-    (loss, gradient * (1.0 - weight) + softer_gradient * scale)
 }
 
 /// The mean cross entropy of `logits` `[clouds, classes]` and `targets`, whose rows sum to 1, with

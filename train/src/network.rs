@@ -109,7 +109,7 @@ impl PointNet {
         let pooled = self.trunk.pooled.base.output().to_owned();
         let logits = self.head.forward(pooled.view(), kept, momentum);
 
-        let (mut loss, dlogits) = loss::of_batch(logits, batch);
+        let (mut loss, dlogits) = loss::cross_entropy(logits, &batch.targets);
         let dpooled = self.head.backward(pooled.view(), dlogits.view());
         let dfeatures = self.trunk.backward(features, dpooled, rows, true);
         let mut dstem = dfeatures.expect("invariant: `wants_input` is true");

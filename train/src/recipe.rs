@@ -82,9 +82,6 @@ pub struct Recipe {
     /// 10 / (1 - decay) steps. The model has the mean weights. With 0, it has those of the last step.
     #[serde(skip_serializing_if = "is_default")]
     pub average: f64,
-    /// Models from which the network learns, beside the labels.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub distillation: Option<Distillation>,
     /// The optimiser.
     pub adam: Adam,
     /// The schedule of the learning rate; by default `step`, every 20 epochs by a factor of 0.7.
@@ -120,7 +117,6 @@ impl Default for Recipe {
             orthogonality: 0.001,
             label_smoothing: 0.0,
             average: 0.0,
-            distillation: None,
             adam: Adam::default(),
             schedule: Schedule::default(),
             augment: Augment::default(),
@@ -218,27 +214,6 @@ impl Schedule {
     }
 }
 
-/// Knowledge distillation: the network also learns the answers of trained models, its teachers, to
-/// the clouds of the training set as they are, without augmentation. They are computed once, when
-/// a run begins or goes on.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Distillation {
-    /// Model files, or names of bundled models, of the data's classes. The mean of their
-    /// probabilities counts.
-    pub teachers: Vec<PathBuf>,
-    /// The temperature of the probabilities of teachers and network.
-    pub temperature: f64,
-    /// The weight of the teachers in the loss; the labels have the rest.
-    pub weight: f64,
-}
-
-impl Default for Distillation {
-    fn default() -> Self {
-        Self { teachers: Vec::new(), temperature: 4.0, weight: 0.7 }
-    }
-}
-
 /// The augmentation of clouds in training. A value of 0 disables its step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -272,11 +247,6 @@ pub struct Augment {
     /// ball's centre (after PointCutMix-K: Zhang et al. 2022). The choice of points follows, so that
     /// neighborhoods are those of the mixed cloud.
     pub cut_mix: f64,
-    /// How much the surroundings of four points are warped (after PointWOLF: Kim et al. 2021). With 0.1,
-    /// each is stretched by up to 10 %, turned by up to 0.1 radians about each axis, and shifted by up to
-    /// 0.05. What lies between them moves by a mean of the four.
-    #[serde(skip_serializing_if = "is_default")]
-    pub warp: f64,
 }
 
 /// A coordinate axis.
@@ -303,7 +273,6 @@ impl Default for Augment {
             up: Axis::Z,
             stretch: 0.0,
             cut_mix: 0.0,
-            warp: 0.0,
         }
     }
 }
@@ -401,18 +370,6 @@ impl Recipe {
                 "expected none beside T-Nets, edges or a Critical Points Layer",
             ),
         ]);
-        if let Some(Distillation { teachers, temperature, weight }) = &self.distillation {
-            checks.extend([
-                (!teachers.is_empty(), "distillation.teachers", "expected 1 model or more"),
-                positive("distillation.temperature", *temperature),
-                share("distillation.weight", *weight),
-                (
-                    self.negatives <= 0.0,
-                    "distillation",
-                    "expected no `negatives`, of which teachers say nothing",
-                ),
-            ]);
-        }
         if let Some(cpl) = &self.cpl {
             checks.extend([
                 layers("cpl.front", cpl.front.len(), 2),
@@ -473,12 +430,6 @@ impl Recipe {
             non_negative("augment.sensor_noise", augment.sensor_noise),
             share_below_1("augment.stretch", augment.stretch),
             share("augment.cut_mix", augment.cut_mix),
-            share_below_1("augment.warp", augment.warp),
-            (
-                augment.warp <= 0.0 || !is_metric,
-                "augment.warp",
-                "expected 0 with `normalization` metric, because its reach is that of unit spheres",
-            ),
             (
                 (0.0..=180.0).contains(&augment.rotate_degrees),
                 "augment.rotate_degrees",

@@ -15,7 +15,6 @@ use crate::error::Error;
 use crate::evaluate::{confusion, predictions};
 use crate::metrics::{Epoch, Metrics};
 use crate::recipe::{Recipe, Sampling};
-use crate::teachers::Teachers;
 use crate::trainer::{EpochSummary, Trainer};
 use crate::{accuracy_report, batches, checkpoint, init, model_file, negatives};
 
@@ -107,9 +106,6 @@ impl Job<'_> {
         fs::create_dir_all(&folder).map_err(|source| FormatError::io(&folder, source))?;
         atomic::sweep_leftovers(&folder)?;
         let mut run = Run::open(folder, &self, &clouds, report)?;
-        if let Some(distillation) = &recipe.distillation {
-            run.trainer.teachers = Some(Teachers::of(distillation, &clouds)?);
-        }
         while run.trainer.epoch < run.trainer.recipe.epochs {
             run.epoch(&clouds, &held)?;
         }

@@ -66,7 +66,7 @@ impl SetNetwork {
         self.forward(batch, rates.momentum);
         let (pooled, winners) = pool(features(&self.points, &self.levels, batch));
         let logits = self.head.forward(pooled.view(), kept, rates.momentum);
-        let (loss, dlogits) = loss::of_batch(logits, batch);
+        let (loss, dlogits) = loss::cross_entropy(logits, &batch.targets);
         let dpooled = self.head.backward(pooled.view(), dlogits.view());
         let last = features(&self.points, &self.levels, batch);
         let mut dy = unpool(&dpooled, &winners, last.starts);

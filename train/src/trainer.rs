@@ -18,7 +18,6 @@ use crate::point_encoder::PointEncoder;
 use crate::recipe::Recipe;
 use crate::selector::CriticalPointSelector;
 use crate::set_network::SetNetwork;
-use crate::teachers::Teachers;
 
 /// The share of a batch in running statistics: PyTorch's default.
 const MOMENTUM: f32 = 0.1;
@@ -37,8 +36,6 @@ pub struct Trainer {
     /// The running means of weights and statistics, by name. Empty before the first step, and if the
     /// recipe averages nothing.
     pub averages: BTreeMap<String, Tensor>,
-    /// What teachers say of the clouds.
-    pub teachers: Option<Teachers>,
 }
 
 /// The results of an epoch so far.
@@ -75,7 +72,7 @@ impl Trainer {
     }
 
     fn of(recipe: Recipe, model: Model) -> Self {
-        Self { recipe, model, step: 0, epoch: 0, averages: BTreeMap::new(), teachers: None }
+        Self { recipe, model, step: 0, epoch: 0, averages: BTreeMap::new() }
     }
 
     /// The tensors to save: the running means, or the last step's if the recipe averages nothing.
@@ -114,11 +111,11 @@ impl Trainer {
         mut report: impl FnMut(&EpochSummary),
     ) -> Result<EpochSummary, Error> {
         let begun = Instant::now();
-        let (recipe, teachers) = (self.recipe.clone(), self.teachers.take());
+        let recipe = self.recipe.clone();
         let steps = batches::count(clouds.len(), &recipe);
         let (mut loss, mut correct, mut summary) = (0.0, 0, EpochSummary::default());
         std::thread::scope(|scope| {
-            let batches = batches::start(scope, clouds, teachers.as_ref(), &recipe, self.epoch);
+            let batches = batches::start(scope, clouds, &recipe, self.epoch);
             for (batch, step) in batches.iter().zip(1..) {
                 let orthogonality = recipe.orthogonality as f32;
                 let rates = Rates { momentum: MOMENTUM, orthogonality, step: self.step };
@@ -145,7 +142,6 @@ impl Trainer {
             }
             Ok(())
         })?;
-        self.teachers = teachers;
         self.epoch += 1;
         Ok(summary)
     }

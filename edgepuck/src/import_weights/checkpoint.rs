@@ -47,6 +47,11 @@ impl Checkpoint {
         self.tensors.keys().map(String::as_str)
     }
 
+    /// Whether all tensors of the model are in f16.
+    pub fn is_half(&self) -> bool {
+        self.tensors.values().all(|tensor| *tensor.dtype() == DType::F16)
+    }
+
     /// Reads the tensors in `names`, which maps new names to names in the checkpoint.
     pub fn read(
         &self,

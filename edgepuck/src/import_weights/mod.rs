@@ -13,13 +13,13 @@ use formats::FormatError;
 use formats::labelled::read_labelled;
 use formats::model_card::ModelCard;
 use formats::outputs::Overwrite;
-use formats::weights::{Tensor, tensor_part, write_weights};
+use formats::weights::{Tensor, tensor_part, write_half_weights, write_weights};
 use infer_cpu::{Classifier, Options};
 use table::{Names, Table};
 
 #[derive(clap::Args)]
 pub struct ImportWeightsArgs {
-    /// Checkpoint file that torch.save wrote
+    /// Checkpoint file that torch.save wrote; if all its tensors are in f16, so are the model's
     #[arg(value_name = "CHECKPOINT")]
     checkpoint: PathBuf,
 
@@ -58,7 +58,8 @@ pub fn run(args: &ImportWeightsArgs) -> anyhow::Result<Outcome> {
     metadata.insert("widths".to_owned(), widths.clone());
     let ranges = check(args, &names, &tensors, &metadata)?;
     metadata.extend(ranges);
-    write_weights(&args.out, &tensors, &metadata)?;
+    let write = if checkpoint.is_half() { write_half_weights } else { write_weights };
+    write(&args.out, &tensors, &metadata)?;
     formats::say!("{widths}, named as by {}: {}", table.name, args.out.display());
     Ok(Outcome::Success)
 }

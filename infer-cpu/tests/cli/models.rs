@@ -32,7 +32,7 @@ fn bundled_models_are_known_by_name_in_any_folder() {
     assert_eq!((default.code, default.err.as_str()), (0, ""));
     assert_eq!(folder.run(named).out, default.out);
     let weights = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/weights");
-    for model in ["edge-64", "street-128", "shapes-rotational-64"] {
+    for model in ["edge-64", "set-64", "street-128", "shapes-rotational-64"] {
         let file = weights.join(model).with_extension("safetensors");
         fs::copy(file, folder.path("x.safetensors")).unwrap();
         let line = |model: &str| format!("classify --model {model} --json --precision i8 c.xyz");
@@ -40,7 +40,8 @@ fn bundled_models_are_known_by_name_in_any_folder() {
         assert_eq!(logits(model), logits("x.safetensors"));
         assert_eq!(folder.run(&format!("inspect {model}")).code, 0);
     }
-    let names = "expected a model file, or one of edge-64, street-128, shapes-rotational-64";
+    let names =
+        "expected a model file, or one of edge-64, set-64, street-128, shapes-rotational-64";
     let refused = folder.run("classify --model edge-65 c.xyz");
     refused.assert_refused(1, &format!("error: edge-65: name: {names}"));
 }

@@ -122,11 +122,10 @@ fn a_ball_of_points_is_mixed_in() {
         assert_eq!(drawn.points, drawn.neighborhood, "the surroundings are the mixed cloud's");
         let whole = clouds.set.cloud(0);
         let (kept, gone): (Vec<_>, Vec<_>) = whole.iter().partition(|p| drawn.points.contains(p));
-        let [own, (other, share)] = drawn.parts;
-        assert_eq!(own, (0, 1.0 - share));
         assert!((drawn.target.iter().sum::<f32>() - 1.0).abs() < 1e-6);
-        if other % 3 != 0 {
-            assert_eq!(drawn.target[other % 3], share);
+        let share = drawn.target[1] + drawn.target[2];
+        if share > 0.0 {
+            // Points of another class.
             assert_eq!(gone.len() as f32 / 32.0, share);
             assert_eq!(drawn.points.iter().filter(|p| !whole.contains(p)).count(), gone.len());
         }
@@ -138,26 +137,4 @@ fn a_ball_of_points_is_mixed_in() {
         };
         assert!(whole.iter().any(is_centre), "{epoch}");
     }
-}
-
-#[test]
-fn points_of_a_warped_cloud_move_in_proportion_to_its_strength() {
-    let clouds = crate::clouds(3);
-    let moves_of = |warp: f64| {
-        let recipe = Recipe { augment: Augment { warp, ..plain().augment }, ..plain() };
-        let drawn = augment::augment(&clouds, 0, (0, 0), &recipe);
-        let pairs = drawn.points.iter().zip(clouds.set.cloud(0));
-        let moves = pairs
-            .map(|(p, q)| f64::from((0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f32>().sqrt()));
-        moves.collect::<Vec<f64>>()
-    };
-    let (weak, strong) = (moves_of(0.005), moves_of(0.05));
-    assert!(weak.iter().all(|&by| by > 1e-5), "all points move: {weak:?}");
-    // At most a cube's diagonal from an anchor: stretched by 5 %, turned by 0.05 about three axes, and
-    // shifted by 0.025 along each.
-    let bound = 0.05 * 12f64.sqrt() * (1.0 + 3.0 * 1.05) + 0.025 * 3f64.sqrt();
-    assert!(strong.iter().all(|&by| by < bound), "{strong:?}");
-    // Turns and stretches multiply: second orders are about 0.05 of the first.
-    let ratio = strong.iter().sum::<f64>() / weak.iter().sum::<f64>();
-    assert!((9.0..11.0).contains(&ratio), "{ratio}");
 }

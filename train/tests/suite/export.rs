@@ -7,9 +7,8 @@ use train::augment;
 use train::clouds::Clouds;
 use train::cpl::Cpl;
 use train::model_file;
-use train::recipe::{Augment, Distillation, Recipe};
+use train::recipe::Recipe;
 use train::shape::{Abstraction, Edge};
-use train::teachers::Teachers;
 use train::trainer::Trainer;
 
 use crate::reference::{self, Reference};
@@ -227,36 +226,4 @@ fn neighbors_are_searched_among_all_points_whatever_the_sampler_kept() {
             }
         }
     }
-}
-
-/// The mean over the teachers, and for a mixed cloud over its parts.
-#[test]
-fn a_teacher_s_answers_are_its_softened_probabilities() {
-    let (clouds, folder) = (crate::clouds(60), tempfile::tempdir().unwrap());
-    let mut trainer = Trainer::new(recipe(false, false), 3).unwrap();
-    trainer.learn(&clouds, |_| {}).unwrap();
-    let path = folder.path().join("teacher.safetensors");
-    let card = ModelCard { classes: clouds.classes.clone(), ..ModelCard::default() };
-    model_file::write(&path, &mut trainer.model, &card).unwrap();
-    let teachers = vec![path.clone(), path.clone()];
-    let distillation = Distillation { teachers, ..Distillation::default() };
-    let teachers = Teachers::of(&distillation, &clouds).unwrap();
-    let augment = Augment { cut_mix: 1.0, ..Augment::default() };
-    let drawn =
-        augment::augment(&clouds, 7, (0, 0), &Recipe { points: 32, augment, ..Recipe::default() });
-    let mut classifier = Classifier::load(&path, &Options::default()).unwrap();
-    let mut expected = [0.0; 3];
-    for (part, share) in drawn.parts {
-        let logits = &classifier.classify(clouds.set.cloud(part)).unwrap().logits;
-        let odds: Vec<f32> = logits.iter().map(|x| (x / 4.0).exp()).collect();
-        (0..3).for_each(|c| expected[c] += share * odds[c] / odds.iter().sum::<f32>());
-    }
-    let taught = teachers.taught(&[drawn]);
-    for (found, expected) in taught.shares.iter().zip(expected) {
-        assert!((found - expected).abs() < 1e-6, "{found}, {expected}");
-    }
-    let mut other = clouds.clone();
-    other.classes.pop();
-    let error = Teachers::of(&distillation, &other).unwrap_err().to_string();
-    assert!(error.contains("expected a teacher of the 2 classes of the data"), "{error}");
 }
