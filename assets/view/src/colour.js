@@ -40,16 +40,17 @@ function entriesOf(column) {
 }
 
 /** The span of the colours of these columns without the least and the greatest values: a few far ones would
- * take all colours. */
+ * take all colours. Then, whether there are lesser and greater ones. */
 export function spanOf(columns) {
   const step = Math.ceil(columns.reduce((sum, { values }) => sum + values.length, 0) / MOST_SAMPLED);
   const isSampled = (value, i) => i % step === 0 && Number.isFinite(value);
   const sample = Float64Array.from(columns.flatMap(({ values }) => [...values.filter(isSampled)])).sort();
   const [low, high] = [0.02, 0.96].map((share) => sample[Math.round(share * (sample.length - 1))] ?? 0);
-  return high > low ? [low, high] : [low - 0.5, low + 0.5];
+  const span = high > low ? [low, high] : [low - 0.5, low + 0.5];
+  return [...span, sample[0] < span[0], sample.at(-1) > span[1]];
 }
 
-function rampOf([low, high]) {
+function rampOf([low, high, hasLess, hasMore]) {
   const shades = Array.from({ length: SHADES }, (_, i) => {
     const place = (i / (SHADES - 1)) * (ramp.length - 1);
     const [left, right] = [ramp[Math.floor(place)], ramp[Math.ceil(place)]];
@@ -57,5 +58,5 @@ function rampOf([low, high]) {
   });
   const factor = (SHADES - 1) / (high - low);
   const look = (value) => shades[Math.min(SHADES - 1, Math.max(0, Math.round((value - low) * factor)))] ?? GREY;
-  return { low, high, look };
+  return { low, high, hasLess, hasMore, look };
 }

@@ -2,6 +2,7 @@
 import { Vector3 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
+const BACK = new Vector3(-0.82, -0.55, 0.62).normalize();
 const KEYS = { w: [0, 1], s: [0, -1], a: [1, -1], d: [1, 1], q: [2, -1], e: [2, 1] };
 
 export class Navigation {
@@ -18,16 +19,36 @@ export class Navigation {
     });
   }
 
-  /** Looks at an extent from behind and above: at all of an object, at what is low and near of a sweep. */
-  fit({ middle, radius, floor, isSweep }) {
-    const [height, distance] = isSweep ? [Math.max(floor, middle[2] - radius / 4), 1.75] : [middle[2], 2.3];
-    const target = new Vector3(middle[0], middle[1], height);
-    this.radius = radius;
-    this.camera.near = radius / 500;
-    this.camera.far = radius * 200;
-    this.camera.position
-      .copy(target)
-      .addScaledVector(new Vector3(-0.82, -0.55, 0.62), (distance * radius) / Math.min(1, this.camera.aspect));
+  /**
+   * The target and the distance from which an extent is seen, from behind and above, or from `back` of it:
+   * all of an object within the shares `free` of the picture's width and height; of a sweep what is low and near.
+   */
+  viewOf({ middle, half, radius, floor, isSweep }, free, back = BACK) {
+    const { up, fov, aspect } = this.camera;
+    const target = new Vector3(...middle);
+    if (isSweep) {
+      target.z = Math.max(floor, middle[2] - radius / 4);
+      return { target, back, distance: (2 * radius) / Math.min(1, aspect) };
+    }
+    const right = new Vector3().crossVectors(up, back).normalize();
+    const above = new Vector3().crossVectors(back, right);
+    const slope = Math.tan((fov * Math.PI) / 360);
+    let distance = radius;
+    for (let i = 0; i < 8; i++) {
+      const corner = new Vector3(...half.map((x, axis) => ((i >> axis) & 1 ? x : -x)));
+      const wide = Math.abs(corner.dot(right)) / (slope * aspect * free[0]);
+      const high = Math.abs(corner.dot(above)) / (slope * free[1]);
+      distance = Math.max(distance, corner.dot(back) + Math.max(wide, high));
+    }
+    return { target, back, distance: 1.03 * distance };
+  }
+
+  /** Looks at what `viewOf` has found. */
+  fit({ target, back, distance }) {
+    this.radius = distance / 2;
+    this.camera.near = distance / 1000;
+    this.camera.far = distance * 100;
+    this.camera.position.copy(target).addScaledVector(back, distance);
     this.orbit.target.copy(target);
     this.camera.updateProjectionMatrix();
     this.orbit.update();

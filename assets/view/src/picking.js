@@ -4,10 +4,11 @@ import { Matrix4 } from "three";
 /**
  * The number of the point that the camera sees at `wished`, -1 to 1 in x and y, within `reach` pixels of a
  * picture whose half width and height are `half` pixels: of several the one nearest to the camera. -1 if
- * there is none.
+ * there is none. `world` places the points.
  */
-export function pick(camera, position, wished, half, reach) {
-  const m = new Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse).elements;
+export function pick(camera, world, position, wished, half, reach) {
+  const seen = new Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse);
+  const m = seen.multiply(world).elements;
   let [best, found] = [Number.POSITIVE_INFINITY, -1];
   for (let i = 0; i < position.length; i += 3) {
     const [x, y, z] = [position[i], position[i + 1], position[i + 2]];

@@ -62,13 +62,11 @@ function drawBoxes(boxes, settings) {
   return drawLines(positions, colours, settings);
 }
 
-function drawMesh(mesh, number, isOne) {
+function drawMesh(mesh) {
   const geometry = new THREE.BufferGeometry();
   geometry.setAttribute("position", new THREE.BufferAttribute(mesh.position, 3));
   geometry.setIndex(new THREE.BufferAttribute(mesh.index, 1));
-  const tint = mesh.class ? classColour(mesh.class) : isOne ? [176, 190, 205] : numberColour(number);
-  const colour = new THREE.Color().setRGB(...tint.map((x) => x / 255), THREE.SRGBColorSpace);
-  const settings = { color: colour, flatShading: true, side: THREE.DoubleSide };
+  const settings = { flatShading: true, side: THREE.DoubleSide };
   return new THREE.Mesh(geometry, new THREE.MeshLambertMaterial(settings));
 }
 
@@ -117,15 +115,20 @@ export function extentOf(frame) {
   for (const mesh of frame.meshes ?? []) add(mesh.position);
   for (const { pose } of frame.meshes?.length ? (frame.sensors ?? []) : []) add([pose[3], pose[7], pose[11]]);
   for (const box of axes[0].length ? [] : (frame.boxes ?? [])) add(corners(box).flat());
-  if (!axes[0].length) return { middle: [0, 0, 0], radius: 5, floor: 0, isSweep: false };
+  if (!axes[0].length) return { middle: [0, 0, 0], half: [3, 3, 3], radius: 5, floor: 0, isSweep: false };
   for (const axis of axes) axis.sort((a, b) => a - b);
   const at = (axis, share) => axes[axis][Math.round(share * (axes[axis].length - 1))];
-  const isSweep = !frame.meshes?.length && frame.sensors?.length > 0;
-  // Of a sweep, the near part matters; of an object all.
-  const [low, high] = isSweep ? [0.1, 0.9] : [0, 1];
-  const middle = [0, 1, 2].map((axis) => (at(axis, low) + at(axis, high)) / 2);
-  const half = [0, 1, 2].map((axis) => (at(axis, high) - at(axis, low)) / 2);
-  return { middle, radius: Math.max(Math.hypot(...half), 1e-3), floor: at(2, 0.01), isSweep };
+  const spanOf = (low, high) => {
+    const middle = [0, 1, 2].map((axis) => (at(axis, low) + at(axis, high)) / 2);
+    const half = [0, 1, 2].map((axis) => (at(axis, high) - at(axis, low)) / 2);
+    return { middle, half, radius: Math.max(Math.hypot(...half), 1e-3), floor: at(2, 0.01) };
+  };
+  const all = spanOf(0, 1);
+  // Of a sweep, in or at which the sensor is, the near part matters; of an object all.
+  const isNear = ({ pose }) =>
+    [0, 1].every((axis) => Math.abs(pose[4 * axis + 3] - all.middle[axis]) <= 1.25 * all.half[axis]);
+  const isSweep = !frame.meshes?.length && (frame.sensors ?? []).some(isNear);
+  return { ...(isSweep ? spanOf(0.1, 0.9) : all), isSweep };
 }
 
 /** The columns by which points can be coloured: those of the file, the height and the range. */
@@ -146,7 +149,7 @@ export function columnsOf(frame) {
   return columns;
 }
 
-/** One frame as a scene of three.js. `shown` says which of its parts are visible. */
+/** One frame as a scene of three.js. `world` has all but the lights. */
 export class Stage {
   constructor(frame, material, extent) {
     this.frame = frame;
@@ -154,7 +157,8 @@ export class Stage {
     this.scene.add(new THREE.HemisphereLight(0xffffff, 0x445566, 2.2));
     const sun = new THREE.DirectionalLight(0xffffff, 1.6);
     sun.position.set(-1, -2, 4);
-    this.scene.add(sun);
+    this.world = new THREE.Group();
+    this.scene.add(sun, this.world);
     this.columns = columnsOf(frame);
     this.parts = {};
     if (frame.points) {
@@ -167,9 +171,7 @@ export class Stage {
       this.parts.points[0].frustumCulled = false;
     }
     const { meshes = [], boxes = [], sensors = [] } = frame;
-    meshes.forEach((mesh, i) => {
-      this.#add("meshes", drawMesh(mesh, i, meshes.length === 1));
-    });
+    for (const mesh of meshes) this.#add("meshes", drawMesh(mesh));
     const [truth, found] = [boxes.filter((box) => box.truth), boxes.filter((box) => !box.truth)];
     if (found.length) this.#add("boxes", drawBoxes(found, { linewidth: 2.5 }));
     const dashes = { linewidth: 1.5, dashed: true, dashSize: 0.35, gapSize: 0.25, transparent: true };
@@ -186,12 +188,13 @@ export class Stage {
   #add(name, object) {
     this.parts[name] ??= [];
     this.parts[name].push(object);
-    this.scene.add(object);
+    this.world.add(object);
   }
 
   /** Colours the points by the column of this name, with the span of its colours; returns it and its scale. */
   colourBy(name, spanOf) {
     const column = this.columns.find((one) => one.name === name) ?? this.columns[0];
+    this.#colourMeshes(column?.name);
     if (!column) return undefined;
     const scale = scaleOf(column, spanOf(column));
     const { array } = this.tints;
@@ -200,6 +203,17 @@ export class Stage {
     });
     this.tints.needsUpdate = true;
     return { ...column, scale };
+  }
+
+  /** Beside points, the colours of meshes mean what those of the points do, or nothing. */
+  #colourMeshes(name) {
+    const { meshes = [] } = this.frame;
+    meshes.forEach((mesh, i) => {
+      const isNumbered = name === "object" || (!name && meshes.length > 1);
+      const tint = isNumbered ? numberColour(i) : [176, 190, 205];
+      const colour = mesh.class && (!name || name === "class") ? classColour(mesh.class) : tint;
+      this.parts.meshes[i].material.color.setRGB(...colour.map((x) => x / 255), THREE.SRGBColorSpace);
+    });
   }
 
   dispose() {

@@ -34,10 +34,25 @@ export function createViewer(element, data = { panes: [] }) {
   return viewer;
 }
 
-const PARTS = ["boxes", "truth", "labels", "meshes", "beams", "sensors", "grid"];
+const hasFound = ({ boxes }) => boxes?.some((box) => !box.truth);
+/** The parts that can be hidden, and whether a frame has them. */
+const PARTS = {
+  boxes: hasFound,
+  truth: ({ boxes }) => boxes?.some((box) => box.truth),
+  labels: hasFound,
+  meshes: ({ meshes }) => meshes?.length,
+  beams: ({ sensors }) => sensors?.some(({ rays }) => rays?.length),
+  sensors: ({ sensors }) => sensors?.length,
+  grid: () => true,
+};
 const USUAL_COLOURS = ["class", "cluster", "object", "range", "height"];
 const MOST_LABELS = 60;
 const PLAY_MS = 150;
+const TITLE_PIXELS = 36;
+/** Panes whose sizes differ by more are seen at a scale of their own. */
+const MOST_UNLIKE = 3;
+/** Here, keys mean something else. */
+const WRITES = "select, textarea, input:not([type=checkbox]), [contenteditable]";
 
 const countOf = (frame) => (frame?.points?.position.length ?? 0) / 3;
 
@@ -60,6 +75,7 @@ class Viewer {
     this.camera.up.set(0, 0, 1);
     this.navigation = new Navigation(this.camera, this.canvas, () => this.invalidate());
     [this.material, this.hidden, this.panes, this.frame] = [pointMaterial(), new Set(), [], 0];
+    this.views = [];
     this.marker = new THREE.Points(new THREE.BufferGeometry(), pointMaterial());
     this.marker.material.depthTest = false;
     this.marker.frustumCulled = false;
@@ -77,14 +93,14 @@ class Viewer {
       const moved = Math.hypot(offsetX - down[0], offsetY - down[1]);
       if (moved < 4 && button === 0) this.pick(offsetX, offsetY);
     });
-    canvas.addEventListener("keydown", (event) => {
-      const { key, repeat, ctrlKey, metaKey, altKey } = event;
-      if (ctrlKey || metaKey || altKey || (repeat && !key.startsWith("Arrow"))) return;
-      if (key.startsWith("Arrow")) event.preventDefault();
+    window.addEventListener("keydown", (event) => {
+      const { key, repeat, ctrlKey, metaKey, altKey, target } = event;
+      if (ctrlKey || metaKey || altKey || (repeat && !key.startsWith("Arrow")) || target.closest?.(WRITES)) return;
+      if (key.startsWith("Arrow") && target === canvas) event.preventDefault();
       this.#press(key.toLowerCase());
     });
-    canvas.addEventListener("blur", () => this.navigation.pressed.clear());
-    canvas.addEventListener("keyup", ({ key }) => this.navigation.key(key.toLowerCase(), false));
+    window.addEventListener("blur", () => this.navigation.pressed.clear());
+    window.addEventListener("keyup", ({ key }) => this.navigation.key(key.toLowerCase(), false));
     this.root.addEventListener("input", ({ target }) => this.#change(target));
     this.root.addEventListener("click", ({ target }) => this.#press(target.name));
     new ResizeObserver(() => this.#resize()).observe(this.root);
@@ -118,9 +134,10 @@ class Viewer {
     this.nFrames = Math.max(1, ...data.panes.map((pane) => pane.frames.length));
     this.time.hidden = this.nFrames < 2;
     // The first turn of a capture may have only a few points.
-    const frames = [...(data.panes[0]?.frames ?? [])].sort((a, b) => countOf(b) - countOf(a));
-    this.extent = extentOf(frames[0] ?? {});
+    const fullest = (frames) => frames.reduce((a, b) => (countOf(b) > countOf(a) ? b : a), frames[0] ?? {});
+    this.extents = data.panes.map(({ frames }) => extentOf(fullest(frames)));
     this.frame = Math.min(this.frame, this.nFrames - 1);
+    this.root.dataset.panes = data.panes.length;
     this.#stageFrames();
     this.#drawBar();
     this.#resize();
@@ -129,10 +146,14 @@ class Viewer {
 
   #stageFrames() {
     for (const { stage } of this.panes) stage.dispose();
-    this.panes = this.data.panes.map(({ name, frames }) => {
-      const frame = frames[Math.min(this.frame, frames.length - 1)] ?? {};
-      return { name, frame, stage: new Stage(frame, this.material, this.extent) };
+    const frames = this.data.panes.map(({ frames }) => frames[Math.min(this.frame, frames.length - 1)] ?? {});
+    const extents = this.extents.map((extent, i) => this.#extentFor(frames[i], extent));
+    const isElsewhere = extents.some((extent, i) => extent !== this.extents[i]);
+    this.extents = extents;
+    this.panes = this.data.panes.map(({ name }, i) => {
+      return { name, frame: frames[i], stage: new Stage(frames[i], this.material, extents[i]) };
     });
+    this.#align();
     const columns = this.panes.flatMap(({ stage }) => stage.columns);
     this.names = [...new Set(columns.map(({ name }) => name))];
     const most = Math.max(0, ...this.panes.map(({ frame }) => countOf(frame)));
@@ -144,6 +165,15 @@ class Viewer {
     const first = this.panes.some(({ stage }) => stage.parts.meshes && stage.parts.points) ? 3 : 0;
     const usual = USUAL_COLOURS.slice(first).find((name) => this.names.includes(name));
     this.colourBy(this.names.includes(this.colour) ? this.colour : usual);
+    return isElsewhere;
+  }
+
+  /** The extent that is shown, or that of the frame, if its points would be a speck there or cut off. */
+  #extentFor(frame, extent) {
+    if (extent.isSweep || !frame.points) return extent;
+    const own = extentOf(frame);
+    const away = Math.hypot(...own.middle.map((x, i) => x - extent.middle[i]));
+    return own.radius < extent.radius / 3 || away + own.radius > 1.2 * extent.radius ? own : extent;
   }
 
   /** Colours the points by the column of this name. */
@@ -151,14 +181,23 @@ class Viewer {
     this.colour = name;
     for (const pane of this.panes) pane.column = pane.stage.colourBy(name, (column) => this.#spanOf(column));
     const columns = this.panes.map(({ column }) => column).filter(Boolean);
-    const scales = columns.map(scaleHtml);
+    const scales = this.#scales();
     const boxes = boxesHtml(
       this.panes.flatMap(({ frame }) => frame.boxes ?? []),
       columns,
     );
-    const grid = `<small>grid ${shown(this.panes[0]?.stage.gridStep ?? 1)} m</small>`;
-    this.legend.innerHTML = [...new Set(scales), boxes, grid].join("");
+    const steps = new Set(this.panes.map(({ stage }) => `${shown(stage.gridStep)} m`));
+    const grid = `<small>grid ${[...steps].join(" and ")}</small>`;
+    this.legend.innerHTML = [...scales, boxes, grid].join("");
     this.invalidate();
+  }
+
+  /** The legends of the panes' colours, one if they are the same. */
+  #scales() {
+    const coloured = this.panes.filter(({ column }) => column);
+    const scales = coloured.map(({ column }) => scaleHtml(column));
+    if (new Set(scales).size < 2) return scales.slice(0, 1);
+    return scales.map((scale, i) => `<small>${escaped(coloured[i].name)}</small>${scale}`);
   }
 
   /** A colour means the same in all frames and panes. */
@@ -174,13 +213,47 @@ class Viewer {
     const frame = Math.min(this.nFrames - 1, Math.max(0, number));
     if (frame === this.frame) return;
     this.frame = frame;
-    this.#stageFrames();
+    if (this.#stageFrames()) this.fit(this.camera.getWorldDirection(new THREE.Vector3()).negate());
   }
 
-  /** Looks at all of the first pane. */
-  fit() {
-    this.navigation.fit(this.extent);
-    this.material.uniforms.focus.value = 1.8 * this.extent.radius;
+  /** Looks at all, from `back` of it. */
+  fit(back) {
+    const free = this.#centre();
+    this.views = this.extents.map((extent) => this.navigation.viewOf(extent, free, back));
+    if (!this.views.length) return;
+    this.navigation.fit(this.views[0]);
+    this.material.uniforms.focus.value = 0.8 * this.views[0].distance;
+    this.#align();
+  }
+
+  /** Brings panes of very different sizes or places to that of the first: one camera sees all of each. */
+  #align() {
+    const [first] = this.views;
+    this.panes.forEach(({ stage }, i) => {
+      const { target, distance } = this.views[i] ?? first ?? {};
+      if (!target) return;
+      const ratio = first.distance / distance;
+      const isFar = target.distanceTo(first.target) > first.distance / 2;
+      const isOwn = isFar || ratio > MOST_UNLIKE || ratio < 1 / MOST_UNLIKE;
+      stage.world.scale.setScalar(isOwn ? ratio : 1);
+      stage.world.position
+        .copy(first.target)
+        .addScaledVector(target, -ratio)
+        .multiplyScalar(isOwn ? 1 : 0);
+    });
+  }
+
+  /** Has the camera's target in the middle of what the bars leave free; returns that share of width and height. */
+  #centre() {
+    if (!this.size) return [1, 1];
+    const [width, height] = [this.size[0] / this.panes.length, this.size[1]];
+    const { bar, legend, time } = this;
+    const isWide = legend.offsetWidth > this.size[0] / 2;
+    const low = [time, isWide && legend].filter((part) => part?.offsetHeight).map((part) => part.offsetTop);
+    const [top, bottom] = [bar.offsetTop + bar.offsetHeight, Math.min(height, ...low) - TITLE_PIXELS];
+    this.camera.setViewOffset(width, height, 0, (height - top - bottom) / 2, width, height);
+    const aside = isWide ? 0 : Math.min(legend.offsetLeft + legend.offsetWidth, width / 5);
+    return [1 - (2 * aside) / width, Math.max(0.2, (bottom - top) / height)];
   }
 
   #hide() {
@@ -193,7 +266,8 @@ class Viewer {
   }
 
   #drawBar() {
-    const has = (name) => this.panes.some(({ stage }) => stage.parts[name === "labels" ? "boxes" : name]);
+    const frames = this.data.panes.flatMap((pane) => pane.frames);
+    const parts = Object.keys(PARTS).filter((name) => frames.some(PARTS[name]));
     const toggle = (name) => {
       const checked = this.hidden.has(name) ? "" : "checked";
       return `<label><input type="checkbox" name="${name}" ${checked}>${name}</label>`;
@@ -202,7 +276,7 @@ class Viewer {
     const points = `<label>colour <select name="colour">${this.names.map(option).join("")}</select></label>
       <label>size <input type="range" name="size" min="1" max="10" step="0.5" value="${this.pixels}"></label>`;
     const title = "F: turntable (drag, wheel) or flight (drag to look; keys W A S D Q E)";
-    const html = `${this.names.length ? points : ""}${PARTS.filter(has).map(toggle).join("")}
+    const html = `${this.names.length ? points : ""}${parts.map(toggle).join("")}
       <button name="fly" title="${title}">${this.navigation.flies ? "fly" : "turntable"}</button>
       <button name="reset" title="R: look at all">reset</button>`;
     // A list of colours that is open stays open while data change.
@@ -224,8 +298,7 @@ class Viewer {
     this.renderer.setPixelRatio(Math.min(2, window.devicePixelRatio));
     this.renderer.setSize(width, height, false);
     this.size = [width, height];
-    this.camera.aspect = width / Math.max(1, this.panes.length) / height;
-    this.camera.updateProjectionMatrix();
+    if (this.panes.length) this.#centre();
     this.invalidate();
   }
 
@@ -264,7 +337,8 @@ class Viewer {
   #placeLabels(width, height) {
     const made = [];
     const add = (pane, place, className, text, onclick, colour = "") => {
-      const at = new THREE.Vector3(...place).project(this.camera);
+      const at = new THREE.Vector3(...place).applyMatrix4(this.panes[pane].stage.world.matrixWorld);
+      at.project(this.camera);
       if (at.z > 1 || Math.abs(at.x) > 1 || Math.abs(at.y) > 1) return;
       const label = Object.assign(document.createElement("span"), { className, textContent: text, onclick });
       const [x, y] = [(pane + (at.x + 1) / 2) * width, ((1 - at.y) / 2) * height];
@@ -309,7 +383,8 @@ class Viewer {
     const wished = [(2 * (x % width)) / width - 1, 1 - (2 * y) / this.size[1]];
     const half = [width / 2, this.size[1] / 2];
     this.unpick();
-    this.picked = pick(this.camera, frame.points?.position ?? [], wished, half, Math.max(8, this.pixels));
+    const { matrixWorld } = stage.world;
+    this.picked = pick(this.camera, matrixWorld, frame.points?.position ?? [], wished, half, Math.max(8, this.pixels));
     if (this.picked >= 0) this.#showPoint(frame.points, stage);
     this.invalidate();
     return this.picked;
@@ -326,7 +401,7 @@ class Viewer {
     const at = position.slice(3 * number, 3 * number + 3);
     this.marker.geometry.setAttribute("position", new THREE.BufferAttribute(at, 3));
     this.marker.geometry.setAttribute("tint", new THREE.BufferAttribute(new Float32Array([1, 1, 1]), 3));
-    stage.scene.add(this.marker);
+    stage.world.add(this.marker);
     const place = ["x (m)", "y (m)", "z (m)"].map((name, i) => [name, (at[i] + origin[i]).toFixed(4)]);
     const columns = stage.columns.map((column) => {
       const value = column.values[number];
