@@ -46,7 +46,6 @@ pub struct AdviseArgs {
 #[derive(Clone, Deserialize)]
 struct Measurement {
     model: String,
-    model_file: String,
     /// The sampler, and after a colon the front end of `cpl`.
     sampler: String,
     points: usize,
@@ -220,8 +219,8 @@ fn one_line((ms, row): Timed) -> String {
 }
 
 fn command(row: &Measurement) -> String {
-    let Measurement { model_file, precision, points, threads, .. } = row;
-    let mut words = format!("infer-cpu classify --model {model_file}");
+    let Measurement { model, precision, points, threads, .. } = row;
+    let mut words = format!("infer-cpu classify --model {model}");
     let mut sampler = row.sampler.split(':');
     let _ = write!(words, " --sampler {}", sampler.next().unwrap_or_default());
     if let Some(front) = sampler.next() {
@@ -247,7 +246,6 @@ mod tests {
     fn row(model: &str, ms_pi5: f64, right: usize, threads: usize) -> Measurement {
         Measurement {
             model: model.to_owned(),
-            model_file: format!("{model}.safetensors"),
             sampler: "fps".to_owned(),
             points: 64,
             precision: "f32".to_owned(),
@@ -294,7 +292,7 @@ mod tests {
         let row = Measurement { precision: "i8".to_owned(), ..row };
         assert_eq!(
             command(&row),
-            "infer-cpu classify --model m.safetensors --sampler cpl --front own \
+            "infer-cpu classify --model m --sampler cpl --front own \
              --points 64 --precision i8 --threads 2 CLOUD"
         );
     }

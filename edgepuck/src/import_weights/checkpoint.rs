@@ -49,7 +49,7 @@ impl Checkpoint {
 
     /// Whether all tensors of the model are in f16.
     pub fn is_half(&self) -> bool {
-        self.tensors.values().all(|tensor| *tensor.dtype() == DType::F16)
+        self.tensors.values().all(|tensor| matches!(tensor.dtype(), DType::F16))
     }
 
     /// Reads the tensors in `names`, which maps new names to names in the checkpoint.

@@ -30,6 +30,7 @@ const MOST_FRAMES: usize = 500;
 
 /// Reads a file or a folder of any kind.
 pub fn read(file: &Path, points: &PointsArgs) -> anyhow::Result<Content> {
+    fs::metadata(file).map_err(|source| FormatError::io(file, source))?;
     let extension = file.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     Ok(Content::Frames(match &*extension {
         _ if file.is_dir() => folder(file, points)?,
@@ -63,9 +64,19 @@ pub fn first_points(file: &Path, points: &PointsArgs) -> anyhow::Result<Option<P
 /// The points in `file`; with the classes that labels beside it have, or with the objects that
 /// `gen-scenes` describes beside it.
 fn cloud(file: &Path, points: &PointsArgs) -> anyhow::Result<Frame> {
-    let scan = points.read(file)?;
+    let mut scan = points.read(file)?;
     let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let mut labels = semantic_labels(file, scan.len())?;
+    let is_finite = |i: &usize| scan.positions[*i].iter().all(|x| x.is_finite());
+    let finite: Vec<usize> = (0..scan.len()).filter(is_finite).collect();
+    if finite.len() < scan.len() {
+        let (n, all, file) = (scan.len() - finite.len(), scan.len(), file.display());
+        formats::say!("{file}: {n} of {all} points without finite coordinates are left out");
+        scan = scan.select(&finite);
+        for Labels { values, .. } in &mut labels {
+            *values = finite.iter().map(|&i| values[i]).collect();
+        }
+    }
     let truth = description(file)?;
     labels.extend(scan.object.as_ref().filter(|_| !truth.is_empty()).map(|of| classes(of, &truth)));
     Ok(Frame { boxes: truth, ..Frame::of_scan(name, scan, labels) })

@@ -8,7 +8,7 @@ mod scene;
 
 use crate::points::PointsArgs;
 use crate::{Outcome, Usage};
-use anyhow::ensure;
+use anyhow::{bail, ensure};
 use files::Content;
 use formats::hash::of_bytes;
 use formats::outputs::{Overwrite, need_extension};
@@ -51,8 +51,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let panes = panes(args)?;
     if panes.iter().all(Pane::is_empty) {
         let files = args.files.iter().map(|file| file.display().to_string()).collect::<Vec<_>>();
-        formats::say!("{}: expected something to show, found nothing", files.join(", "));
-        return Ok(Outcome::SomeRefused);
+        bail!("{}: expected something to show, found no point, mesh or box", files.join(", "));
     }
     let out = args.out.clone().unwrap_or_else(|| temporary(&args.files[0]));
     page::write(&panes, &out)?;

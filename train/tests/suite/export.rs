@@ -3,7 +3,6 @@ use std::path::Path;
 use formats::model_card::ModelCard;
 use infer_cpu::sampler::{SamplerKind, SamplerSpec};
 use infer_cpu::{Classifier, Evaluation, Options};
-use train::augment;
 use train::clouds::Clouds;
 use train::cpl::Cpl;
 use train::model_file;

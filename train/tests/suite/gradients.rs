@@ -6,7 +6,6 @@ use formats::rng::StreamKey;
 use train::batch::Batch;
 use train::cpl::Cpl;
 use train::layer::Module;
-use train::loss;
 use train::matrix::Matrix;
 use train::network::{PointNet, Rates};
 use train::recipe::Recipe;
