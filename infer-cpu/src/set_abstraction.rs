@@ -117,9 +117,8 @@ impl NeighborPool {
         for ((weights, products), features) in self.weights.iter().zip(products).zip(features) {
             let [own, axes @ ..] = weights.each_ref();
             let along = product::<FUSED, LANES>(axes, point);
-            for (c, out) in products[i].iter_mut().enumerate() {
-                *out = own[c] * features[c] + along[c];
-            }
+            // A store of all channels at once, which the compiler vectorises.
+            products[i] = std::array::from_fn(|c| own[c] * features[c] + along[c]);
         }
     }
 
@@ -134,9 +133,7 @@ impl NeighborPool {
         {
             let [_, axes @ ..] = weights.each_ref();
             let along = product::<FUSED, LANES>(axes, centre);
-            for (c, out) in out.iter_mut().enumerate() {
-                *out = (most[c] - along[c] + bias[c]).max(0.0);
-            }
+            *out = std::array::from_fn(|c| (most[c] - along[c] + bias[c]).max(0.0));
         }
     }
 }
