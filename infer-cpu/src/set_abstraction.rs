@@ -86,8 +86,15 @@ impl NeighborPool {
                 }
             }
             PoolStep::Raise { tile, products, centres, maxima } => {
+                let (least, most) = ends(tile.x);
                 for (centre, maxima) in centres.iter().zip(maxima.chunks_exact_mut(self.n_lanes()))
                 {
+                    // Points come sorted by x, so that most tiles are far from most centres. The
+                    // bound is at most the distances below, since rounding keeps the order.
+                    let gap = (least - centre[0]).max(centre[0] - most).max(0.0);
+                    if gap * gap > self.squared_radius {
+                        continue;
+                    }
                     let near = within(&tile.squared_distances(*centre), self.squared_radius);
                     if near != 0 {
                         for (most, products) in maxima.iter_mut().zip(products) {
@@ -117,9 +124,8 @@ impl NeighborPool {
         for ((weights, products), features) in self.weights.iter().zip(products).zip(features) {
             let [own, axes @ ..] = weights.each_ref();
             let along = product::<FUSED, LANES>(axes, point);
-            for (c, out) in products[i].iter_mut().enumerate() {
-                *out = own[c] * features[c] + along[c];
-            }
+            // A store of all channels at once, which the compiler vectorises.
+            products[i] = std::array::from_fn(|c| own[c] * features[c] + along[c]);
         }
     }
 
@@ -134,9 +140,19 @@ impl NeighborPool {
         {
             let [_, axes @ ..] = weights.each_ref();
             let along = product::<FUSED, LANES>(axes, centre);
-            for (c, out) in out.iter_mut().enumerate() {
-                *out = (most[c] - along[c] + bias[c]).max(0.0);
-            }
+            *out = std::array::from_fn(|c| (most[c] - along[c] + bias[c]).max(0.0));
         }
     }
+}
+
+/// The least and the greatest of a tile's coordinates.
+#[inline(always)]
+fn ends(of: &[f32; TILE]) -> (f32, f32) {
+    let (mut least, mut most) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
+    for part in of.as_chunks::<LANES>().0 {
+        least = std::array::from_fn(|i| least[i].min(part[i]));
+        most = std::array::from_fn(|i| most[i].max(part[i]));
+    }
+    let (least, most) = (least.into_iter(), most.into_iter());
+    (least.fold(f32::INFINITY, f32::min), most.fold(f32::NEG_INFINITY, f32::max))
 }

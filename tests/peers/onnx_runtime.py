@@ -42,7 +42,7 @@ def main():
         numpy.save(file, points)
     models = [NARROW / "tiny.safetensors", NARROW / "plain.safetensors"]
     models += [WEIGHTS / f"{name}.safetensors" for name in ("untrained-test", "pointnet-64")]
-    models += [WEIGHTS / f"{name}.safetensors" for name in ("pointnet-1024", "lidar-rotational-64")]
+    models += [WEIGHTS / f"{name}.safetensors" for name in ("pointnet-1024", "shapes-rotational-64")]
     ties = 0
     for model in models:
         compare_all_points(model, clouds, files)
@@ -50,6 +50,7 @@ def main():
     for name in ("edge-64", "cpl-64"):
         compare_surroundings(name, clouds, files)
         ties += compare_critical_points(WEIGHTS / f"{name}.safetensors", 64, clouds, files)
+    compare_set_abstractions(clouds, files)
     assert ties <= MOST_TIES, f"{ties} clouds got other critical points than infer-cpu's"
     print(f"onnx {onnx.__version__}, onnxruntime {onnxruntime.__version__}: all agree")
 
@@ -95,6 +96,44 @@ def compare_surroundings(name, clouds, files):
             (found,) = session.run(["logits"], seen)
             worst = max(worst, difference(f"{name}, {n_kept} points", found[0], expected))
     report(f"{name} with surroundings", worst)
+
+
+def compare_set_abstractions(clouds, files):
+    """All points, and as centres the farthest ones that infer-cpu chooses."""
+    model = network_of_sets(OUT / "sets.safetensors", n_centres := 100)
+    session = exported(model, model.stem)
+    worst = 0.0
+    for points, file, expected in zip(clouds, files, logits(model, files)):
+        chosen = OUT / "centres.npy"
+        infer("sample", "--sampler", "fps", "--points", n_centres, "--overwrite", file, chosen)
+        centres = numpy.load(chosen).astype(numpy.float32)
+        seen = {"points": points[None], "centres": centres[None]}
+        (found,) = session.run(["logits"], seen)
+        worst = max(worst, difference(f"{model.stem}, {len(points)} points", found[0], expected))
+    report("set abstractions", worst)
+
+
+def network_of_sets(file, n_centres):
+    """A model file of two set abstractions with random weights."""
+    random = numpy.random.default_rng(0)
+    widths = {"feat.conv": [3, 8, 16], "sa1.conv": [4, 16, 24], "sa2.conv": [4, 24, 70, 90],
+              "fc": [180, 32, 10]}
+    header, data = {"__metadata__": {"abstractions": json.dumps([[n_centres, 0.4], [33, 0.9]])}}, b""
+    for stem, channels in widths.items():
+        # A pooling takes 4 inputs: the feature of its channel, x, y and z.
+        for i, (n_in, n_out) in enumerate(zip(channels, channels[1:]), 1):
+            largest = (6 / n_in) ** 0.5
+            parts = {"weight": random.uniform(-largest, largest, (n_out, n_in)),
+                     "bias": random.uniform(-0.1, 0.1, n_out)}
+            for part, values in parts.items():
+                more = values.astype("<f4").tobytes()
+                header[f"{stem}{i}.{part}"] = {
+                    "dtype": "F32", "shape": values.shape,
+                    "data_offsets": [len(data), len(data) + len(more)]}
+                data += more
+    words = json.dumps(header).encode()
+    file.write_bytes(len(words).to_bytes(8, "little") + words + data)
+    return file
 
 
 def compare_critical_points(model, n_kept, clouds, files):

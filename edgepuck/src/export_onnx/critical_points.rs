@@ -21,13 +21,17 @@ pub fn add(
     cloud: &str,
     n_points: usize,
 ) -> anyhow::Result<NetInputs> {
+    if !net.abstractions.is_empty() {
+        bail!("it has set abstractions, which a Critical Points Layer cannot pool");
+    }
     let (features, is_stn) = front(graph, net, cloud)?;
     let pooled = pool(graph, "cpl.pool", &features);
     let score = scores(graph, cloud, &features, &pooled);
     best(graph, cloud, &score, n_points);
     let points = gathered(graph, cloud);
     // If the input T-Net is the front end, it pools all points.
-    Ok(NetInputs { points, cloud: Some(cloud.to_owned()), pooled_stn: is_stn.then_some(pooled) })
+    let (cloud, pooled_stn) = (Some(cloud.to_owned()), is_stn.then_some(pooled));
+    Ok(NetInputs { points, cloud, centres: None, pooled_stn })
 }
 
 /// The features to pool, `[batch, features, all]`, by infer-cpu's choice of a front end, and
@@ -38,7 +42,8 @@ fn front(graph: &mut Graph, net: &Net, cloud: &str) -> anyhow::Result<(String, b
         (None, Some(stn), _) => (&stn.convs, "feat.stn"),
         (None, None, None) => {
             let points = cloud.to_owned();
-            let all = NetInputs { cloud: Some(points.clone()), points, pooled_stn: None };
+            let all =
+                NetInputs { cloud: Some(points.clone()), points, centres: None, pooled_stn: None };
             return Ok((trunk(graph, net, &all, "cpl"), false));
         }
         (None, None, Some(_)) => {

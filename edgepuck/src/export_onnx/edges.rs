@@ -34,8 +34,13 @@ pub fn add(
         .collect()
 }
 
-/// q - p, `[batch, points, all, 3]`.
-fn offsets(graph: &mut Graph, points: &str, cloud: &str, name: &impl Fn(&str) -> String) -> String {
+/// q - p, `[batch, points, all, 3]`, for all p of `points` and q of `cloud`.
+pub fn offsets(
+    graph: &mut Graph,
+    points: &str,
+    cloud: &str,
+    name: &impl Fn(&str) -> String,
+) -> String {
     let (rows, columns) = (graph.whole(&[1]), graph.whole(&[ALL]));
     let cloud = graph.add("Unsqueeze", &name("neighbours"), &[cloud, &rows], vec![]);
     let points = graph.add("Unsqueeze", &name("centres"), &[points, &columns], vec![]);
@@ -43,7 +48,7 @@ fn offsets(graph: &mut Graph, points: &str, cloud: &str, name: &impl Fn(&str) ->
 }
 
 /// x x + y y + z z, `[batch, points, all, 1]`.
-fn squared_lengths(graph: &mut Graph, offset: &str, name: &impl Fn(&str) -> String) -> String {
+pub fn squared_lengths(graph: &mut Graph, offset: &str, name: &impl Fn(&str) -> String) -> String {
     let axes = ["x", "y", "z"].map(name);
     let outputs: Vec<&str> = axes.iter().map(String::as_str).collect();
     let thirds = graph.whole(&[1, 1, 1]);

@@ -3,6 +3,7 @@ mod edges;
 mod graph;
 mod pointnet;
 mod proto;
+mod set_abstractions;
 #[cfg(test)]
 mod tests;
 
@@ -43,9 +44,13 @@ Inputs in f32. Normalise them as the model's card says (unit-sphere: subtract th
 mean, and divide by the largest radius); infer-cpu does this, the graph does not:
   points [batch, points, 3]  points that the network sees, chosen by any sampler
   cloud  [batch, all, 3]     all points, for networks with EdgeConv features
+  centres [batch, centres, 3]  for networks of set abstractions: the farthest of
+                             `points` in their order, from the one farthest from the
+                             mean, as `infer-cpu sample --sampler fps` chooses them
 With --critical-points, `cloud` is the only input, and the graph selects the points.
 EdgeConv needs memory for points x all x 64 channels x 4 bytes: 16 MB for 64 of
-1,024 points.
+1,024 points. Set abstractions need it for centres x points x channels x 4 bytes:
+64 MB for 256 centres, 1,024 points and 64 channels.
 Outputs:
   logits [batch, classes]    before the softmax, as in the output of infer-cpu --json
   kept   [batch, M], int64   with --critical-points: indices of the chosen points
@@ -110,11 +115,6 @@ fn kept_points(args: &ExportOnnxArgs, path: &Path, card: &ModelCard) -> anyhow::
 /// The ONNX model of `net`, with a Critical Points Layer of `n_points` points before it if given.
 fn export(net: &Net, card: &ModelCard, n_points: Option<usize>) -> anyhow::Result<ModelProto> {
     const BATCH: Size<'_> = Size::Named("batch");
-    if !net.abstractions.is_empty() {
-        bail!(
-            "expected a PointNet or a network of edges, found one of set abstractions, which export-onnx cannot write yet"
-        );
-    }
     let mut graph = Graph::default();
     let mut input = |name, n| graph.input(name, &[BATCH, Size::Named(n), Size::Fixed(3)]);
     let inputs = match n_points {
@@ -125,7 +125,8 @@ fn export(net: &Net, card: &ModelCard, n_points: Option<usize>) -> anyhow::Resul
         None => {
             let points = input("points", "points");
             let cloud = (!net.edges.is_empty()).then(|| input("cloud", "all"));
-            NetInputs { points, cloud, pooled_stn: None }
+            let centres = (!net.abstractions.is_empty()).then(|| input("centres", "centres"));
+            NetInputs { points, cloud, centres, pooled_stn: None }
         }
     };
     pointnet::add(&mut graph, net, &inputs);

@@ -1,4 +1,4 @@
-//! PointNet from points to logits, with or without T-Nets.
+//! PointNet from points to logits, with or without T-Nets and set abstractions.
 //!
 //! Weights have PyTorch's names and shapes: a layer that all points share is a convolution
 //! `[outputs, inputs, 1]`, and a layer after a pooling is a `Gemm` `[outputs, inputs]`. Batch norms
@@ -6,8 +6,8 @@
 
 use infer_cpu::model_file::{Dense, Network, TNet};
 
-use super::edges;
 use super::graph::{Graph, int, ints};
+use super::{edges, set_abstractions};
 
 /// The network of a model file, in f32, with batch norms folded in.
 pub type Net = Network<Dense, Dense>;
@@ -18,6 +18,8 @@ pub struct NetInputs {
     pub points: String,
     /// All points of the cloud, `[batch, all, 3]`, for networks with EdgeConv layers.
     pub cloud: Option<String>,
+    /// The centres of set abstractions, `[batch, centres, 3]`, for networks with any.
+    pub centres: Option<String>,
     /// The pooled vector of the input T-Net, `[batch, features]`, if it is in the graph already.
     pub pooled_stn: Option<String>,
 }
@@ -25,7 +27,12 @@ pub struct NetInputs {
 /// Adds `net`. The logits are value `logits`.
 pub fn add(graph: &mut Graph, net: &Net, inputs: &NetInputs) {
     let features = trunk(graph, net, inputs, "feat");
-    let mut x = pool(graph, "feat.pool", &features);
+    let mut x = match &inputs.centres {
+        Some(centres) => {
+            set_abstractions::add(graph, &net.abstractions, centres, &inputs.points, &features)
+        }
+        None => pool(graph, "feat.pool", &features),
+    };
     for (i, dense) in net.head.iter().enumerate() {
         x = match i + 1 == net.head.len() {
             true => gemm(graph, dense, "logits", &x),

@@ -1,5 +1,7 @@
 use std::collections::BTreeSet;
 
+use infer_cpu::model_file::{Dense, SetAbstraction};
+
 use super::proto::{GraphProto, TensorProto};
 use super::*;
 
@@ -25,8 +27,31 @@ fn exported(path: &Path, n_points: Option<usize>) -> ModelProto {
     export(&net, &card, n_points).unwrap()
 }
 
+/// A network of two set abstractions.
+fn sets() -> (ModelCard, Net) {
+    let (card, mut net) = model_file::read(&bundled("pointnet-64")).unwrap();
+    let layer = |name: &str, inputs: usize, outputs: usize| {
+        let (weight, bias) = (vec![0.5; inputs * outputs], vec![0.0; outputs]);
+        Dense { name: name.to_owned(), inputs, outputs, weight, bias, relu: true }
+    };
+    let level = |name: &str, width: usize, centres: usize| SetAbstraction {
+        centres,
+        radius: 0.3,
+        pool: layer(&format!("{name}.conv1"), 4, width),
+        convs: vec![layer(&format!("{name}.conv2"), width, 8)],
+    };
+    let width = net.trunk.last().unwrap().outputs;
+    net.abstractions = vec![level("sa1", width, 16), level("sa2", 8, 4)];
+    (card, net)
+}
+
 fn graph_of(path: &Path, n_points: Option<usize>) -> GraphProto {
     exported(path, n_points).graph.unwrap()
+}
+
+fn graph_of_sets() -> GraphProto {
+    let (card, net) = sets();
+    export(&net, &card, None).unwrap().graph.unwrap()
 }
 
 fn constant<'a>(graph: &'a GraphProto, name: &str) -> &'a TensorProto {
@@ -36,30 +61,30 @@ fn constant<'a>(graph: &'a GraphProto, name: &str) -> &'a TensorProto {
 /// ONNX's rules for a graph (IR.md, "Names within a graph" and "Nodes").
 #[test]
 fn every_value_is_made_once_before_it_is_used_and_every_constant_is_used() {
-    for path in models() {
-        for n_points in [None, Some(16)] {
-            let graph = graph_of(&path, n_points);
-            let inputs = graph.input.iter().map(|value| value.name.as_str());
-            let constants = graph.initializer.iter().map(|tensor| tensor.name.as_str());
-            let mut known: BTreeSet<&str> = inputs.chain(constants).collect();
-            assert_eq!(known.len(), graph.input.len() + graph.initializer.len());
-            let mut used = BTreeSet::new();
-            for node in &graph.node {
-                for name in &node.input {
-                    assert!(known.contains(name.as_str()), "{}: {name}", path.display());
-                    used.insert(name.as_str());
-                }
-                for name in &node.output {
-                    assert!(known.insert(name), "{}: {name} is made twice", path.display());
-                }
+    let graphs = models().into_iter().flat_map(|path| {
+        [None, Some(16)].map(|n_points| (path.display().to_string(), graph_of(&path, n_points)))
+    });
+    for (name, graph) in graphs.chain([("set abstractions".to_owned(), graph_of_sets())]) {
+        let inputs = graph.input.iter().map(|value| value.name.as_str());
+        let constants = graph.initializer.iter().map(|tensor| tensor.name.as_str());
+        let mut known: BTreeSet<&str> = inputs.chain(constants).collect();
+        assert_eq!(known.len(), graph.input.len() + graph.initializer.len());
+        let mut used = BTreeSet::new();
+        for node in &graph.node {
+            for input in &node.input {
+                assert!(known.contains(input.as_str()), "{name}: {input}");
+                used.insert(input.as_str());
             }
-            assert!(graph.output.iter().all(|value| known.contains(value.name.as_str())));
-            for tensor in &graph.initializer {
-                assert!(used.contains(tensor.name.as_str()), "{} is idle", tensor.name);
-                let size = if tensor.data_type == data_type::FLOAT { 4 } else { 8 };
-                let count = tensor.dims.iter().product::<i64>() as usize;
-                assert_eq!(tensor.raw_data.len(), count * size, "{}", tensor.name);
+            for output in &node.output {
+                assert!(known.insert(output), "{name}: {output} is made twice");
             }
+        }
+        assert!(graph.output.iter().all(|value| known.contains(value.name.as_str())));
+        for tensor in &graph.initializer {
+            assert!(used.contains(tensor.name.as_str()), "{} is idle", tensor.name);
+            let size = if tensor.data_type == data_type::FLOAT { 4 } else { 8 };
+            let count = tensor.dims.iter().product::<i64>() as usize;
+            assert_eq!(tensor.raw_data.len(), count * size, "{}", tensor.name);
         }
     }
 }
@@ -85,17 +110,18 @@ fn weights_bear_pytorch_s_names_and_shapes_and_hold_the_norms() {
 
 #[test]
 fn inputs_and_outputs_are_what_the_network_looks_at() {
-    let names = |name: &str, n_points| {
-        let graph = graph_of(&bundled(name), n_points);
+    let names_of = |graph: GraphProto| {
         let names = |values: Vec<proto::ValueInfoProto>| {
             values.into_iter().map(|value| value.name).collect::<Vec<_>>().join(" ")
         };
         (names(graph.input), names(graph.output))
     };
+    let names = |name: &str, n_points| names_of(graph_of(&bundled(name), n_points));
     let is = |inputs: &str, outputs: &str| (inputs.to_owned(), outputs.to_owned());
     assert_eq!(names("pointnet-64", None), is("points", "logits"));
     assert_eq!(names("edge-64", None), is("points cloud", "logits"));
     assert_eq!(names("edge-64", Some(64)), is("cloud", "logits kept"));
+    assert_eq!(names_of(graph_of_sets()), is("points centres", "logits"));
 }
 
 #[test]
@@ -117,6 +143,8 @@ fn what_onnx_cannot_choose_by_is_refused() {
     let refused = |net: &Net| export(net, &card, Some(16)).unwrap_err().to_string();
     (net.front, net.stn) = (None, None);
     assert!(refused(&net).contains("neither a front end"), "{}", refused(&net));
+    let (_, net) = sets();
+    assert!(refused(&net).contains("set abstractions"), "{}", refused(&net));
 }
 
 #[test]

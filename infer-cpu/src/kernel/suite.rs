@@ -546,7 +546,9 @@ pub fn neighbor_pooling_is_near_the_definition(kernels: &Kernels) {
     let (name, weight, bias) = (String::new(), signed(4 * channels), signed(channels));
     let dense = Dense { name, inputs: 4, outputs: channels, weight, bias, relu: true };
     let features = signed(n * stride);
-    let points: Vec<[f32; 3]> = signed(3 * n).as_chunks().0.to_vec();
+    let mut points: Vec<[f32; 3]> = signed(3 * n).as_chunks().0.to_vec();
+    // The last tile is beyond the radius of the centres.
+    points.sort_by(|a, b| a[0].total_cmp(&b[0]));
     let (cloud, pool) = (Neighborhood::of(&points), NeighborPool::new(radius, &dense));
     let centres = &points[60..67];
     let mut maxima = vec![[f32::NEG_INFINITY; LANES]; centres.len() * pool.n_lanes()];

@@ -136,7 +136,15 @@ fn is_kernel(name: &str) -> bool {
 
 /// Whether the function runs on all threads instead of the caller's alone.
 fn is_shared(name: &str) -> bool {
-    let parts = ["kernel::", "engine::chunks", "edge_conv::"];
+    let parts = [
+        "kernel::",
+        "engine::chunks",
+        "edge_conv::",
+        "set_abstraction::",
+        "PoolInput::lift",
+        "PoolInput::pool",
+        "::set_block",
+    ];
     matches!(name, "memcpy" | "memset") || parts.iter().any(|part| name.contains(part))
 }
 

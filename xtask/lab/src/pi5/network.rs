@@ -2,7 +2,7 @@
 //! with random weights.
 
 use crate::measure::baseline::{STACKS, drawn};
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result};
 use formats::model_card::{ModelCard, Normalization};
 use formats::rng::StreamKey;
 use formats::weights::{Tensor, write_weights};
@@ -25,7 +25,14 @@ pub struct Net {
     pub fcs: Vec<Layer>,
 }
 
-/// The layers of a PointNet; missing parts are empty.
+/// The layers after a set abstraction's pooling.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Abstraction {
+    pub centres: usize,
+    pub convs: Vec<Layer>,
+}
+
+/// The layers of a network; missing parts are empty.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Network {
     pub stn: Net,
@@ -33,6 +40,8 @@ pub struct Network {
     pub trunk: Net,
     /// Layers of the trunk before the feature transform.
     pub transform_after: usize,
+    /// The set abstractions after the trunk.
+    pub abstractions: Vec<Abstraction>,
     /// The front end of a Critical Points Layer.
     pub front: Net,
 }
@@ -40,20 +49,27 @@ pub struct Network {
 impl Network {
     pub fn read(path: &Path) -> Result<Self> {
         let model = inspect(path)?;
-        ensure!(model.abstractions.is_empty(), "set abstractions are not modelled yet");
+        let abstraction = |(centres, layers): (usize, Vec<LayerShape>)| {
+            // The first layer pools.
+            Abstraction { centres, convs: layers.into_iter().skip(1).map(layer).collect() }
+        };
         let front = NetShape { convs: model.front.unwrap_or_default(), fcs: Vec::new() };
         Ok(Self {
             stn: model.stn.map(net).unwrap_or_default(),
             fstn: model.fstn.map(net).unwrap_or_default(),
             trunk: net(model.trunk),
             transform_after: model.card.transform_after,
+            abstractions: model.abstractions.into_iter().map(abstraction).collect(),
             front: net(front),
         })
     }
 }
 
+fn layer(LayerShape { inputs, outputs, .. }: LayerShape) -> Layer {
+    Layer { inputs, outputs }
+}
+
 fn net(NetShape { convs, fcs }: NetShape) -> Net {
-    let layer = |LayerShape { inputs, outputs, .. }| Layer { inputs, outputs };
     let [convs, fcs] = [convs, fcs].map(|layers| layers.into_iter().map(layer).collect());
     Net { convs, fcs }
 }
@@ -103,6 +119,7 @@ pub mod tests {
             fstn: Net { convs: fstn, fcs: fstn_fcs },
             trunk: Net { convs: trunk, fcs: head },
             transform_after: 1,
+            abstractions: Vec::new(),
             front: Net { convs: front, fcs: Vec::new() },
         }
     }

@@ -4,6 +4,7 @@ use super::kernels::Number;
 use super::network::{Layer, Net, Network};
 use infer_cpu::Precision;
 use infer_cpu::sharing::{BLOCK, RUN_BLOCKS, folding_pays, prefilter_pays};
+use std::iter::once;
 use std::slice::from_ref;
 
 /// Where the points that a network sees come from.
@@ -121,7 +122,11 @@ pub fn stages(
     }
     let Net { convs: trunk, fcs: _ } = &network.trunk;
     let (stem, rest) = trunk.split_at_checked(network.transform_after)?;
-    if network.fstn.convs.is_empty() {
+    if let Some(first) = network.abstractions.first() {
+        // The centres of the other levels are the first of these.
+        stages.push(Stage::Farthest { points, picks: first.centres.min(points) });
+        formats.levels(&mut stages, points, network);
+    } else if network.fstn.convs.is_empty() {
         formats.pass(&mut stages, points, &[], trunk)?;
     } else {
         formats.pass(&mut stages, points, stem, &network.fstn.convs)?;
@@ -170,14 +175,8 @@ impl Formats {
         layers: &[Layer],
     ) -> Option<()> {
         let (&last, hidden) = layers.split_last()?;
-        let layers = stem.iter().chain(hidden).enumerate();
-        let products: Vec<Product> = layers
-            .map(|(i, &layer)| Product {
-                layer,
-                // Coordinates are multiplied in fp32 whatever the precision.
-                number: if i == 0 { Number::F32 } else { self.points },
-            })
-            .collect();
+        let layers: Vec<Layer> = stem.iter().chain(hidden).copied().collect();
+        let products = self.of_points(&layers);
         let screened = self.points == Number::F32 && prefilter_pays(last.inputs);
         let number = if screened { Number::I8 } else { self.points };
         let product = Product { layer: last, number };
@@ -189,6 +188,32 @@ impl Formats {
         Some(())
     }
 
+    /// Layers that begin with one that takes coordinates, which is in fp32 whatever the precision.
+    fn of_points(&self, layers: &[Layer]) -> Vec<Product> {
+        let mut products = self.products(layers);
+        products.iter_mut().take(1).for_each(|first| first.number = Number::F32);
+        products
+    }
+
+    fn products(&self, layers: &[Layer]) -> Vec<Product> {
+        layers.iter().map(|&layer| Product { layer, number: self.points }).collect()
+    }
+
+    /// The trunk on all points, and the layers of each set abstraction on its centres. The poolings
+    /// are all outside the inner loops.
+    fn levels(&self, stages: &mut Vec<Stage>, points: usize, network: &Network) {
+        let trunk = (points, self.of_points(&network.trunk.convs));
+        let abstractions = network.abstractions.iter();
+        let centres =
+            abstractions.map(|level| (level.centres.min(points), self.products(&level.convs)));
+        for (n, products) in once(trunk).chain(centres) {
+            for first in (0..n).step_by(BLOCK * RUN_BLOCKS) {
+                let rows = (n - first).min(BLOCK * RUN_BLOCKS);
+                stages.push(Stage::Hidden { rows, products: products.clone() });
+            }
+        }
+    }
+
     fn vectors(&self, stages: &mut Vec<Stage>, net: &Net) {
         let stored = self.stored;
         stages.extend(net.fcs.iter().map(|&layer| Stage::Vector { layer, stored }));
@@ -197,6 +222,7 @@ impl Formats {
 
 #[cfg(test)]
 mod tests {
+    use super::super::network::Abstraction;
     use super::super::network::tests::baseline;
     use super::*;
 
@@ -225,6 +251,40 @@ mod tests {
         let mut plain = baseline();
         plain.front = Net::default();
         assert_eq!(stages(&plain, Sampler::Cpl, (1024, 64), Precision::F32), None);
+    }
+
+    /// The trunk of 3 x 32 and 32 x 64 on all points, and after each pooling one layer on its
+    /// centres, which are as many as there are points at most.
+    #[test]
+    fn set_abstractions_choose_once_and_multiply_on_their_centres() {
+        let layers = |widths: &[usize]| -> Vec<Layer> {
+            let layer = |pair: &[usize]| Layer { inputs: pair[0], outputs: pair[1] };
+            widths.windows(2).map(layer).collect()
+        };
+        let level = |(centres, widths): (usize, [usize; 2])| Abstraction {
+            centres,
+            convs: layers(&widths),
+        };
+        let network = Network {
+            stn: Net::default(),
+            fstn: Net::default(),
+            trunk: Net { convs: layers(&[3, 32, 64]), fcs: layers(&[1024, 40]) },
+            abstractions: [(256, [64, 128]), (64, [128, 512])].map(level).to_vec(),
+            ..baseline()
+        };
+        let stages = |n| stages(&network, Sampler::All, (n, n), Precision::I8).unwrap();
+        let macs = |n| stages(n).iter().map(Stage::macs).sum::<usize>();
+        let of_point = 3 * 32 + 32 * 64;
+        let of_centres = |first, second| first * 64 * 128 + second * 128 * 512;
+        assert_eq!(macs(1024), 1024 * of_point + of_centres(256, 64) + 1024 * 40);
+        assert_eq!(macs(48), 48 * of_point + of_centres(48, 48) + 1024 * 40);
+        let picks = |stage: &Stage| match stage {
+            Stage::Farthest { points, picks } => Some((*points, *picks)),
+            _ => None,
+        };
+        assert_eq!(stages(1024).iter().filter_map(picks).collect::<Vec<_>>(), [(1024, 256)]);
+        let (_, last) = stages(1024)[3].products();
+        assert!(last.iter().all(|product| product.number == Number::I8), "{last:?}");
     }
 
     #[test]
