@@ -275,15 +275,16 @@ mod tests {
         let stages = |n| stages(&network, Sampler::All, (n, n), Precision::I8).unwrap();
         let macs = |n| stages(n).iter().map(Stage::macs).sum::<usize>();
         let of_point = 3 * 32 + 32 * 64;
-        let of_centres = |first, second| first * 64 * 128 + second * 128 * 512;
+        let of_centres = |first: usize, second: usize| first * 64 * 128 + second * 128 * 512;
         assert_eq!(macs(1024), 1024 * of_point + of_centres(256, 64) + 1024 * 40);
         assert_eq!(macs(48), 48 * of_point + of_centres(48, 48) + 1024 * 40);
         let picks = |stage: &Stage| match stage {
             Stage::Farthest { points, picks } => Some((*points, *picks)),
             _ => None,
         };
-        assert_eq!(stages(1024).iter().filter_map(picks).collect::<Vec<_>>(), [(1024, 256)]);
-        let (_, last) = stages(1024)[3].products();
+        let stages = stages(1024);
+        assert_eq!(stages.iter().filter_map(picks).collect::<Vec<_>>(), [(1024, 256)]);
+        let (_, last) = stages[3].products();
         assert!(last.iter().all(|product| product.number == Number::I8), "{last:?}");
     }
 
