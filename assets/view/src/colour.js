@@ -46,8 +46,7 @@ export function spanOf(columns) {
   const isSampled = (value, i) => i % step === 0 && Number.isFinite(value);
   const sample = Float64Array.from(columns.flatMap(({ values }) => [...values.filter(isSampled)])).sort();
   const [low, high] = [0.02, 0.96].map((share) => sample[Math.round(share * (sample.length - 1))] ?? 0);
-  const span = high > low ? [low, high] : [low - 0.5, low + 0.5];
-  return [...span, sample[0] < span[0], sample.at(-1) > span[1]];
+  return high > low ? [low, high, sample[0] < low, sample.at(-1) > high] : [low - 0.5, low + 0.5];
 }
 
 function rampOf([low, high, hasLess, hasMore]) {

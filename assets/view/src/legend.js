@@ -20,9 +20,8 @@ export function scaleHtml(column) {
   const title = `<b>${escaped(titleOf(column))}</b>`;
   if (!scale.entries) {
     const { low, high, hasLess, hasMore } = scale;
-    const marks = [low, (low + high) / 2, high].map((x) => `${Number(x.toPrecision(3))}`);
-    if (hasLess) marks[0] = `≤ ${marks[0]}`;
-    if (hasMore) marks[2] = `≥ ${marks[2]}`;
+    const signs = [hasLess ? "≤ " : "", "", hasMore ? "≥ " : ""];
+    const marks = [low, (low + high) / 2, high].map((x, i) => signs[i] + Number(x.toPrecision(3)));
     const ramp = `<div class="ramp" style="background:${rampCss}"></div>`;
     return `${title}<div>${ramp}<div class="marks"><span>${marks.join("</span><span>")}</span></div></div>`;
   }

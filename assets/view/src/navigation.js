@@ -26,21 +26,17 @@ export class Navigation {
   viewOf({ middle, half, radius, floor, isSweep }, free, back = BACK) {
     const { up, fov, aspect } = this.camera;
     const target = new Vector3(...middle);
-    if (isSweep) {
-      target.z = Math.max(floor, middle[2] - radius / 4);
-      return { target, back, distance: (2 * radius) / Math.min(1, aspect) };
-    }
+    if (isSweep) target.z = Math.max(floor, middle[2] - radius / 4);
     const right = new Vector3().crossVectors(up, back).normalize();
     const above = new Vector3().crossVectors(back, right);
     const slope = Math.tan((fov * Math.PI) / 360);
-    let distance = radius;
-    for (let i = 0; i < 8; i++) {
+    const needed = Array.from({ length: 8 }, (_, i) => {
       const corner = new Vector3(...half.map((x, axis) => ((i >> axis) & 1 ? x : -x)));
-      const wide = Math.abs(corner.dot(right)) / (slope * aspect * free[0]);
-      const high = Math.abs(corner.dot(above)) / (slope * free[1]);
-      distance = Math.max(distance, corner.dot(back) + Math.max(wide, high));
-    }
-    return { target, back, distance: 1.03 * distance };
+      const [wide, high] = [corner.dot(right) / aspect / free[0], corner.dot(above) / free[1]].map(Math.abs);
+      return corner.dot(back) + Math.max(wide, high) / slope;
+    });
+    const distance = isSweep ? (2 * radius) / Math.min(1, aspect) : 1.03 * Math.max(radius, ...needed);
+    return { target, back, distance };
   }
 
   /** Looks at what `viewOf` has found. */

@@ -94,8 +94,7 @@ function drawGrid({ middle, floor, radius }) {
   const n = 2 * Math.ceil((2.2 * radius) / step);
   const grid = new THREE.GridHelper(n * step, n, 0x4a5568, 0x2a313d);
   grid.rotation.x = Math.PI / 2;
-  const place = middle.map((x) => Math.round(x / step) * step);
-  grid.position.set(place[0], place[1], floor);
+  grid.position.set(...middle.map((x) => Math.round(x / step) * step).with(2, floor));
   grid.material.depthWrite = false;
   return { grid, step };
 }
@@ -118,17 +117,14 @@ export function extentOf(frame) {
   if (!axes[0].length) return { middle: [0, 0, 0], half: [3, 3, 3], radius: 5, floor: 0, isSweep: false };
   for (const axis of axes) axis.sort((a, b) => a - b);
   const at = (axis, share) => axes[axis][Math.round(share * (axes[axis].length - 1))];
-  const spanOf = (low, high) => {
-    const middle = [0, 1, 2].map((axis) => (at(axis, low) + at(axis, high)) / 2);
-    const half = [0, 1, 2].map((axis) => (at(axis, high) - at(axis, low)) / 2);
-    return { middle, half, radius: Math.max(Math.hypot(...half), 1e-3), floor: at(2, 0.01) };
-  };
-  const all = spanOf(0, 1);
+  const middleOf = (axis, low, high) => (at(axis, low) + at(axis, high)) / 2;
+  const halfOf = (axis, low, high) => (at(axis, high) - at(axis, low)) / 2;
+  const isAt = (axis, { pose }) => Math.abs(pose[4 * axis + 3] - middleOf(axis, 0, 1)) <= 1.25 * halfOf(axis, 0, 1);
   // Of a sweep, in or at which the sensor is, the near part matters; of an object all.
-  const isNear = ({ pose }) =>
-    [0, 1].every((axis) => Math.abs(pose[4 * axis + 3] - all.middle[axis]) <= 1.25 * all.half[axis]);
-  const isSweep = !frame.meshes?.length && (frame.sensors ?? []).some(isNear);
-  return { ...(isSweep ? spanOf(0.1, 0.9) : all), isSweep };
+  const isSweep = !frame.meshes?.length && frame.sensors?.some((sensor) => isAt(0, sensor) && isAt(1, sensor));
+  const [low, high] = isSweep ? [0.1, 0.9] : [0, 1];
+  const [middle, half] = [middleOf, halfOf].map((of) => [0, 1, 2].map((axis) => of(axis, low, high)));
+  return { middle, half, radius: Math.max(Math.hypot(...half), 1e-3), floor: at(2, 0.01), isSweep };
 }
 
 /** The columns by which points can be coloured: those of the file, the height and the range. */
@@ -207,10 +203,8 @@ export class Stage {
 
   /** Beside points, the colours of meshes mean what those of the points do, or nothing. */
   #colourMeshes(name) {
-    const { meshes = [] } = this.frame;
-    meshes.forEach((mesh, i) => {
-      const isNumbered = name === "object" || (!name && meshes.length > 1);
-      const tint = isNumbered ? numberColour(i) : [176, 190, 205];
+    this.frame.meshes?.forEach((mesh, i, meshes) => {
+      const tint = name === "object" || (!name && meshes.length > 1) ? numberColour(i) : [176, 190, 205];
       const colour = mesh.class && (!name || name === "class") ? classColour(mesh.class) : tint;
       this.parts.meshes[i].material.color.setRGB(...colour.map((x) => x / 255), THREE.SRGBColorSpace);
     });

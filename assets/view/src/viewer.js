@@ -34,25 +34,18 @@ export function createViewer(element, data = { panes: [] }) {
   return viewer;
 }
 
-const hasFound = ({ boxes }) => boxes?.some((box) => !box.truth);
-/** The parts that can be hidden, and whether a frame has them. */
-const PARTS = {
-  boxes: hasFound,
-  truth: ({ boxes }) => boxes?.some((box) => box.truth),
-  labels: hasFound,
-  meshes: ({ meshes }) => meshes?.length,
-  beams: ({ sensors }) => sensors?.some(({ rays }) => rays?.length),
-  sensors: ({ sensors }) => sensors?.length,
-  grid: () => true,
-};
+/** The parts of these frames that can be hidden. */
+function partsOf(frames) {
+  const any = (name, is = () => true) => frames.some((frame) => frame[name]?.some(is));
+  const [boxes, truth] = [any("boxes", (box) => !box.truth), any("boxes", (box) => box.truth)];
+  const [meshes, sensors, beams] = [any("meshes"), any("sensors"), any("sensors", ({ rays }) => rays?.length)];
+  const parts = { boxes, truth, labels: boxes, meshes, beams, sensors, grid: true };
+  return Object.keys(parts).filter((name) => parts[name]);
+}
+
 const USUAL_COLOURS = ["class", "cluster", "object", "range", "height"];
 const MOST_LABELS = 60;
 const PLAY_MS = 150;
-const TITLE_PIXELS = 36;
-/** Panes whose sizes differ by more are seen at a scale of their own. */
-const MOST_UNLIKE = 3;
-/** Here, keys mean something else. */
-const WRITES = "select, textarea, input:not([type=checkbox]), [contenteditable]";
 
 const countOf = (frame) => (frame?.points?.position.length ?? 0) / 3;
 
@@ -74,8 +67,7 @@ class Viewer {
     this.camera = new THREE.PerspectiveCamera(50, 1, 0.1, 1000);
     this.camera.up.set(0, 0, 1);
     this.navigation = new Navigation(this.camera, this.canvas, () => this.invalidate());
-    [this.material, this.hidden, this.panes, this.frame] = [pointMaterial(), new Set(), [], 0];
-    this.views = [];
+    [this.material, this.hidden, this.panes, this.views, this.frame] = [pointMaterial(), new Set(), [], [], 0];
     this.marker = new THREE.Points(new THREE.BufferGeometry(), pointMaterial());
     this.marker.material.depthTest = false;
     this.marker.frustumCulled = false;
@@ -95,7 +87,8 @@ class Viewer {
     });
     window.addEventListener("keydown", (event) => {
       const { key, repeat, ctrlKey, metaKey, altKey, target } = event;
-      if (ctrlKey || metaKey || altKey || (repeat && !key.startsWith("Arrow")) || target.closest?.(WRITES)) return;
+      if (ctrlKey || metaKey || altKey || (repeat && !key.startsWith("Arrow"))) return;
+      if (target.closest?.("select, textarea, input:not([type=checkbox]), [contenteditable]")) return;
       if (key.startsWith("Arrow") && target === canvas) event.preventDefault();
       this.#press(key.toLowerCase());
     });
@@ -130,7 +123,7 @@ class Viewer {
   }
 
   setData(data, { fit = false } = {}) {
-    [this.data, this.spans] = [data, {}];
+    [this.data, this.frames, this.spans] = [data, data.panes.flatMap(({ frames }) => frames), {}];
     this.nFrames = Math.max(1, ...data.panes.map((pane) => pane.frames.length));
     this.time.hidden = this.nFrames < 2;
     // The first turn of a capture may have only a few points.
@@ -146,12 +139,10 @@ class Viewer {
 
   #stageFrames() {
     for (const { stage } of this.panes) stage.dispose();
-    const frames = this.data.panes.map(({ frames }) => frames[Math.min(this.frame, frames.length - 1)] ?? {});
-    const extents = this.extents.map((extent, i) => this.#extentFor(frames[i], extent));
-    const isElsewhere = extents.some((extent, i) => extent !== this.extents[i]);
-    this.extents = extents;
-    this.panes = this.data.panes.map(({ name }, i) => {
-      return { name, frame: frames[i], stage: new Stage(frames[i], this.material, extents[i]) };
+    this.panes = this.data.panes.map(({ name, frames }, i) => {
+      const frame = frames[Math.min(this.frame, frames.length - 1)] ?? {};
+      this.extents[i] = this.#extentFor(frame, this.extents[i]);
+      return { name, frame, stage: new Stage(frame, this.material, this.extents[i]) };
     });
     this.#align();
     const columns = this.panes.flatMap(({ stage }) => stage.columns);
@@ -165,7 +156,6 @@ class Viewer {
     const first = this.panes.some(({ stage }) => stage.parts.meshes && stage.parts.points) ? 3 : 0;
     const usual = USUAL_COLOURS.slice(first).find((name) => this.names.includes(name));
     this.colourBy(this.names.includes(this.colour) ? this.colour : usual);
-    return isElsewhere;
   }
 
   /** The extent that is shown, or that of the frame, if its points would be a speck there or cut off. */
@@ -180,31 +170,21 @@ class Viewer {
   colourBy(name) {
     this.colour = name;
     for (const pane of this.panes) pane.column = pane.stage.colourBy(name, (column) => this.#spanOf(column));
-    const columns = this.panes.map(({ column }) => column).filter(Boolean);
-    const scales = this.#scales();
-    const boxes = boxesHtml(
-      this.panes.flatMap(({ frame }) => frame.boxes ?? []),
-      columns,
-    );
+    const coloured = this.panes.filter(({ column }) => column);
+    const columns = coloured.map(({ column }) => column);
+    const scales = [...new Set(columns.map(scaleHtml))];
+    const named = (scale, i) => (scales[1] ? `<small>${escaped(coloured[i].name)}</small>` : "") + scale;
+    const boxes = this.panes.flatMap(({ frame }) => frame.boxes ?? []);
     const steps = new Set(this.panes.map(({ stage }) => `${shown(stage.gridStep)} m`));
     const grid = `<small>grid ${[...steps].join(" and ")}</small>`;
-    this.legend.innerHTML = [...scales, boxes, grid].join("");
+    this.legend.innerHTML = [...scales.map(named), boxesHtml(boxes, columns), grid].join("");
     this.invalidate();
-  }
-
-  /** The legends of the panes' colours, one if they are the same. */
-  #scales() {
-    const coloured = this.panes.filter(({ column }) => column);
-    const scales = coloured.map(({ column }) => scaleHtml(column));
-    if (new Set(scales).size < 2) return scales.slice(0, 1);
-    return scales.map((scale, i) => `<small>${escaped(coloured[i].name)}</small>${scale}`);
   }
 
   /** A colour means the same in all frames and panes. */
   #spanOf({ name, kind }) {
-    const frames = this.data.panes.flatMap((pane) => pane.frames);
     const isOf = (other) => other.name === name && other.kind === kind;
-    if (kind === "number") this.spans[name] ??= spanOf(frames.flatMap((frame) => columnsOf(frame).filter(isOf)));
+    if (kind === "number") this.spans[name] ??= spanOf(this.frames.flatMap((frame) => columnsOf(frame).filter(isOf)));
     return this.spans[name];
   }
 
@@ -213,7 +193,10 @@ class Viewer {
     const frame = Math.min(this.nFrames - 1, Math.max(0, number));
     if (frame === this.frame) return;
     this.frame = frame;
-    if (this.#stageFrames()) this.fit(this.camera.getWorldDirection(new THREE.Vector3()).negate());
+    const before = this.extents.slice();
+    this.#stageFrames();
+    const isElsewhere = this.extents.some((extent, i) => extent !== before[i]);
+    if (isElsewhere) this.fit(this.camera.getWorldDirection(new THREE.Vector3()).negate());
   }
 
   /** Looks at all, from `back` of it. */
@@ -226,20 +209,15 @@ class Viewer {
     this.#align();
   }
 
-  /** Brings panes of very different sizes or places to that of the first: one camera sees all of each. */
+  /** Brings panes of very different sizes or places to those of the first: one camera sees all of each. */
   #align() {
     const [first] = this.views;
     this.panes.forEach(({ stage }, i) => {
       const { target, distance } = this.views[i] ?? first ?? {};
-      if (!target) return;
-      const ratio = first.distance / distance;
-      const isFar = target.distanceTo(first.target) > first.distance / 2;
-      const isOwn = isFar || ratio > MOST_UNLIKE || ratio < 1 / MOST_UNLIKE;
-      stage.world.scale.setScalar(isOwn ? ratio : 1);
-      stage.world.position
-        .copy(first.target)
-        .addScaledVector(target, -ratio)
-        .multiplyScalar(isOwn ? 1 : 0);
+      const ratio = first ? first.distance / distance : 1;
+      if (!first || (ratio < 3 && ratio > 1 / 3 && target.distanceTo(first.target) < first.distance / 2)) return;
+      stage.world.scale.setScalar(ratio);
+      stage.world.position.copy(first.target).addScaledVector(target, -ratio);
     });
   }
 
@@ -249,25 +227,21 @@ class Viewer {
     const [width, height] = [this.size[0] / this.panes.length, this.size[1]];
     const { bar, legend, time } = this;
     const isWide = legend.offsetWidth > this.size[0] / 2;
-    const low = [time, isWide && legend].filter((part) => part?.offsetHeight).map((part) => part.offsetTop);
-    const [top, bottom] = [bar.offsetTop + bar.offsetHeight, Math.min(height, ...low) - TITLE_PIXELS];
+    const low = isWide ? legend.offsetTop : time.hidden ? height : time.offsetTop;
+    const [top, bottom] = [bar.offsetTop + bar.offsetHeight, low - 36];
     this.camera.setViewOffset(width, height, 0, (height - top - bottom) / 2, width, height);
     const aside = isWide ? 0 : Math.min(legend.offsetLeft + legend.offsetWidth, width / 5);
     return [1 - (2 * aside) / width, Math.max(0.2, (bottom - top) / height)];
   }
 
   #hide() {
-    for (const { stage } of this.panes) {
-      for (const [name, objects] of Object.entries(stage.parts)) {
-        for (const object of objects) object.visible = !this.hidden.has(name);
-      }
+    for (const [name, objects] of this.panes.flatMap(({ stage }) => Object.entries(stage.parts))) {
+      for (const object of objects) object.visible = !this.hidden.has(name);
     }
     this.invalidate();
   }
 
   #drawBar() {
-    const frames = this.data.panes.flatMap((pane) => pane.frames);
-    const parts = Object.keys(PARTS).filter((name) => frames.some(PARTS[name]));
     const toggle = (name) => {
       const checked = this.hidden.has(name) ? "" : "checked";
       return `<label><input type="checkbox" name="${name}" ${checked}>${name}</label>`;
@@ -276,7 +250,7 @@ class Viewer {
     const points = `<label>colour <select name="colour">${this.names.map(option).join("")}</select></label>
       <label>size <input type="range" name="size" min="1" max="10" step="0.5" value="${this.pixels}"></label>`;
     const title = "F: turntable (drag, wheel) or flight (drag to look; keys W A S D Q E)";
-    const html = `${this.names.length ? points : ""}${parts.map(toggle).join("")}
+    const html = `${this.names.length ? points : ""}${partsOf(this.frames).map(toggle).join("")}
       <button name="fly" title="${title}">${this.navigation.flies ? "fly" : "turntable"}</button>
       <button name="reset" title="R: look at all">reset</button>`;
     // A list of colours that is open stays open while data change.
@@ -348,23 +322,14 @@ class Viewer {
     this.panes.forEach(({ name, frame }, pane) => {
       for (const box of this.hidden.has("labels") || this.hidden.has("boxes") ? [] : (frame.boxes ?? [])) {
         if (box.truth) continue;
-        const words = [box.class, Number.isInteger(box.track) && `#${box.track}`, box.score?.toFixed(2)]
-          .filter(Boolean)
-          .join(" ");
-        const facts = () =>
-          this.#showFacts(box.class ?? "box", [
-            ["centre (m)", box.centre],
-            ["size (m)", box.size],
-            ["yaw (°)", (box.yaw * 180) / Math.PI],
-            ["score", box.score],
-            ["track", box.track],
-          ]);
-        const top = box.centre.with(2, box.centre[2] + box.size[2] / 2);
-        add(pane, top, "box", words, facts, css(boxColour(box)));
+        const { centre, size, yaw, score, track } = box;
+        const words = [box.class, Number.isInteger(track) && `#${track}`, score?.toFixed(2)].filter(Boolean).join(" ");
+        const known = { "centre (m)": centre, "size (m)": size, "yaw (°)": (yaw * 180) / Math.PI, score, track };
+        const facts = () => this.#showFacts(box.class ?? "box", Object.entries(known));
+        add(pane, centre.with(2, centre[2] + size[2] / 2), "box", words, facts, css(boxColour(box)));
       }
-      for (const sensor of this.hidden.has("sensors") ? [] : (frame.sensors ?? [])) {
-        const at = [3, 7, 11].map((i) => sensor.pose[i]);
-        add(pane, at, "sensor", sensor.name);
+      for (const { name, pose } of this.hidden.has("sensors") ? [] : (frame.sensors ?? [])) {
+        add(pane, [pose[3], pose[7], pose[11]], "sensor", name);
       }
       const count = frame.points ? `, ${countOf(frame).toLocaleString("en")} points` : "";
       const className = this.panes.length > 1 ? "title" : "title only";

@@ -120,12 +120,29 @@ try {
     const marks = await page.locator(".marks").allTextContents();
     assert.equal(marks.length, 1, "the files side by side have one scale");
     const first = await page.evaluate(() => viewer.panes[0].frame.name);
+    await page.keyboard.press("ArrowRight");
+    assert.match(await page.textContent("output"), /2 of 5/, "keys work before a click");
     await page.fill("input[name=frame]", "3");
     assert.match(await page.textContent("output"), /4 of 5/);
     assert.notEqual(await page.evaluate(() => viewer.panes[0].frame.name), first);
     assert.deepEqual(await page.locator(".marks").allTextContents(), marks, "all frames have one scale");
     await page.selectOption("select[name=colour]", "class");
     assert.match(await legend(page), /class.*(car|building)/s);
+  });
+  run("scan meshes/chair/train/chair_0001.off --out chair.npz");
+  await check("object", "chair.npz", async (page) => {
+    // The highest and the lowest pixel that a point takes.
+    const [top, bottom] = await page.evaluate(() => {
+      const [{ frame, stage }] = viewer.panes;
+      const at = (i) => stage.world.position.clone().fromArray(frame.points.position, i).project(viewer.camera).y;
+      const heights = Array.from(
+        frame.points.position.keys().filter((i) => i % 3 === 0),
+        at,
+      ).sort((a, b) => b - a);
+      return [heights[0], heights.at(-1)].map((y) => ((1 - y) / 2) * viewer.size[1]);
+    });
+    const bar = await page.locator(".bar").boundingBox();
+    assert.ok(top > bar.y + bar.height && bottom < 800, `the points are from ${top} to ${bottom}`);
   });
   await check("clusters", "clusters", async (page) => assert.match(await legend(page), /cluster/));
   await check("scene", "scene.toml", async (page) => {
