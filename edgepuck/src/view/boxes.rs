@@ -100,7 +100,7 @@ impl Object {
             centre: centre_m,
             size: size_m,
             yaw: yaw_deg.to_radians(),
-            score: self.confidence.or(self.probability),
+            score: self.probability.or(self.confidence),
             track: self.track.or(self.object),
             truth: false,
             turn: self.turn,
