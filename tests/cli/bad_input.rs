@@ -34,7 +34,8 @@ fn bad_meshes_are_named_and_the_others_go_on() {
 fn each_command_has_the_same_names_of_models() {
     let folder = Folder::new();
     folder.write("c.xyz", "0 0 0\n1 0 0\n0 1 0\n0 0 1\n");
-    let cause = "edge-65: name: expected a model file, or one of edge-64, set-64, street-128, shapes-ro";
+    let cause =
+        "edge-65: name: expected a model file, or one of edge-64, set-64, street-128, shapes-ro";
     for words in [
         "classify c.xyz --model edge-65",
         "inspect edge-65",
