@@ -96,10 +96,10 @@ def _file(
         file = place / "detections.json"
         file.write_text(json.dumps({"objects": [_box(one) for one in shown]}))
     else:
-        if shown is None or np.ndim(shown) == 0:
+        points = np.asarray(shown, dtype=float)
+        if points.ndim == 0:
             kinds = "points, a Scan, a DrawnScene, a Mesh, detections or a path"
             raise _edgepuck.Error(f"expected {kinds}, found {type(shown).__name__}")
-        points = np.asarray(shown, dtype=float)
         if points.ndim != 2 or points.shape[1] < 3:
             raise _edgepuck.Error(f"points: expected an array of shape [n, 3], found {list(points.shape)}")
         file = place / "points.npy"

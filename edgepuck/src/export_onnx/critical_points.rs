@@ -8,7 +8,8 @@
 use anyhow::bail;
 
 use super::graph::{Graph, int, word};
-use super::pointnet::{Net, NetInputs, convolutions, pool, transposed, trunk};
+use super::layers::{convolutions, pool, transposed};
+use super::pointnet::{Net, NetInputs, trunk};
 
 /// The output with the indices of the selected points.
 pub const KEPT: &str = "kept";

@@ -1,6 +1,7 @@
 mod critical_points;
 mod edges;
 mod graph;
+mod layers;
 mod pointnet;
 mod proto;
 mod set_abstractions;

@@ -8,7 +8,7 @@ use infer_cpu::model_file::{Dense, SetAbstraction};
 
 use super::edges::{offsets, squared_lengths};
 use super::graph::{Graph, int};
-use super::pointnet::{convolutions, pool, transposed};
+use super::layers::{convolutions, pool, transposed};
 
 /// The axis of the points in `[batch, centres, points, channels]`.
 const POINTS: i64 = 2;
