@@ -23,13 +23,16 @@ pub struct KeyedPose {
     pub quaternion_xyzw: [f64; 4],
 }
 
+/// The time between poses in KITTI's format, which has no times: its sensor turns 10 times a second.
+pub const KITTI_PERIOD_S: f64 = 0.1;
+
 /// Reads a trajectory in TUM's or KITTI's format, which the count of numbers in a line tells apart.
-/// The poses of KITTI's format are `period_s` apart and begin at 0.
-pub fn read_trajectory(path: &Path, period_s: f64) -> Result<Vec<KeyedPose>, FormatError> {
-    read(path, period_s).map_err(|error| or_foreign_file(path, "a trajectory", error))
+/// The poses of KITTI's format are [`KITTI_PERIOD_S`] apart and begin at 0.
+pub fn read_trajectory(path: &Path) -> Result<Vec<KeyedPose>, FormatError> {
+    read(path).map_err(|error| or_foreign_file(path, "a trajectory", error))
 }
 
-fn read(path: &Path, period_s: f64) -> Result<Vec<KeyedPose>, FormatError> {
+fn read(path: &Path) -> Result<Vec<KeyedPose>, FormatError> {
     let io = |source| FormatError::io(path, source);
     let text = read_text(path, u64::MAX).map_err(io)?;
     let flaw =
@@ -39,7 +42,7 @@ fn read(path: &Path, period_s: f64) -> Result<Vec<KeyedPose>, FormatError> {
         if text.trim().is_empty() || text.trim_start().starts_with('#') {
             continue;
         }
-        let pose = match pose_of(text, poses.len() as f64 * period_s) {
+        let pose = match pose_of(text, poses.len() as f64 * KITTI_PERIOD_S) {
             Ok(pose) => pose,
             Err(cause) => return flaw(line, &cause),
         };
@@ -185,7 +188,7 @@ mod tests {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), text).unwrap();
         let name = file.path().display().to_string();
-        read_trajectory(file.path(), 0.1).map_err(|error| error.to_string().replace(&name, "f"))
+        read_trajectory(file.path()).map_err(|error| error.to_string().replace(&name, "f"))
     }
 
     #[test]

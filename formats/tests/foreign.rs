@@ -16,7 +16,7 @@ fn what_stands_in_place_of_a_file_is_named() {
         |path| formats::pcap::read(path, |_| std::ops::ControlFlow::Continue(())).map(drop);
     let mut readers: Vec<(&str, &str, Reader)> = vec![
         ("a.pcap", "a capture", capture),
-        ("a.tum", "a trajectory", |path| read_trajectory(path, 0.1).map(drop)),
+        ("a.tum", "a trajectory", |path| read_trajectory(path).map(drop)),
         ("a.json", "metadata in JSON", |path| Metadata::read(path).map(drop)),
         ("a.safetensors", "safetensors", |path| WeightsFile::open(path).map(drop)),
     ];

@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use edgepuck_scenes::{LabelledScene, ObjectBox, SceneError, Stage, is_test, place_in_set};
 use edgepuck_segment::OrientedBox;
 use formats::hash::Hashing;
+use formats::trajectory::KITTI_PERIOD_S;
 use formats::{FormatError, atomic, rows};
 use glam::DVec3;
 use sim_gpu::{Pose, glam};
@@ -30,9 +31,6 @@ formats::named! {
 
 /// The size of KITTI's pictures, pixels.
 const PICTURE: [f64; 2] = [1242.0, 375.0];
-
-/// KITTI's sweeps are 0.1 s apart.
-const PERIOD_S: f64 = 0.1;
 
 /// A data set that is being written.
 pub struct Writer {
@@ -92,7 +90,7 @@ impl Writer {
             let numbers = (0..self.n_sweeps).filter(|number| is_test(*number) == of_test);
             if self.layout == Layout::SemanticKitti {
                 // Each sweep is a scene of its own: their poses are equal.
-                self.sequence(of_test).finish(numbers.map(|_| Pose::IDENTITY), PERIOD_S)?;
+                self.sequence(of_test).finish(numbers.map(|_| Pose::IDENTITY), KITTI_PERIOD_S)?;
                 continue;
             }
             let set = if of_test { "val" } else { "train" };

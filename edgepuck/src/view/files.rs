@@ -30,10 +30,6 @@ const MOST_FRAMES: usize = 500;
 
 /// Reads a file or a folder of any kind.
 pub fn read(file: &Path, points: &PointsArgs) -> anyhow::Result<Content> {
-    // `-` is standard input.
-    if file != Path::new("-") {
-        fs::metadata(file).map_err(|source| FormatError::io(file, source))?;
-    }
     let extension = file.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     Ok(Content::Frames(match &*extension {
         _ if file.is_dir() => folder(file, points)?,

@@ -16,9 +16,6 @@ use std::path::{Path, PathBuf};
 
 use crate::Usage;
 
-/// The time between poses in KITTI's format, which has no times: seconds.
-const KITTI_S: f64 = 0.1;
-
 /// A file, or a drive or a folder of sweeps.
 #[derive(Serialize)]
 pub struct Pane {
@@ -163,7 +160,7 @@ impl Pane {
                  alone, or those of `live` without --poses"
             ))
         );
-        let motion = Trajectory::load(&self.poses, KITTI_S)?;
+        let motion = Trajectory::load(&self.poses)?;
         let seen = boxes.into_iter().map(|placed| {
             if !placed.in_world {
                 return Ok(placed);

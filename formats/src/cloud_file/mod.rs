@@ -185,9 +185,9 @@ fn open(path: &Path, format: Option<CloudFormat>) -> Result<(File, CloudFormat),
         let cause = "expected a file, found a folder: name the files in it";
         return Err(FormatError::malformed(path, "name", cause));
     }
-    let format = format.map_or_else(|| CloudFormat::of_path(path), Ok)?;
+    // A file that is missing is told before its name is judged.
     let file = File::open(path).map_err(|source| FormatError::io(path, source))?;
-    Ok((file, format))
+    Ok((file, format.map_or_else(|| CloudFormat::of_path(path), Ok)?))
 }
 
 /// Reads a cloud from `reader`, which errors call `name`.

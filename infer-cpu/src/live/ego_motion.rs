@@ -53,7 +53,7 @@ impl EgoMotion {
             let world_from_sensor = DQuat::from_array(keyed.quaternion_xyzw);
             (keyed.time_s, Pose { position_m: keyed.position_m.into(), world_from_sensor })
         };
-        Ok(Self::Poses(read_trajectory(file, 0.1)?.into_iter().map(pose).collect()))
+        Ok(Self::Poses(read_trajectory(file)?.into_iter().map(pose).collect()))
     }
 
     /// The pose at the Unix time `time_s`, for a sensor with its first packet at `start_s`.

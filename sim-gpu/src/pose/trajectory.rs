@@ -41,12 +41,12 @@ impl Trajectory {
     ///
     /// # Errors
     /// As [`read_trajectory`].
-    pub fn load(path: &Path, period_s: f64) -> Result<Self, FormatError> {
+    pub fn load(path: &Path) -> Result<Self, FormatError> {
         let pose = |keyed: KeyedPose| {
             let rotation = DQuat::from_array(keyed.quaternion_xyzw);
             (keyed.time_s, Pose { position_m: keyed.position_m.into(), rotation })
         };
-        Ok(Self(read_trajectory(path, period_s)?.into_iter().map(pose).collect()))
+        Ok(Self(read_trajectory(path)?.into_iter().map(pose).collect()))
     }
 
     /// The pose at this time.

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use formats::scan::{Attribute, AttributeSet};
+use formats::trajectory::KITTI_PERIOD_S;
 use glam::{DQuat, DVec3};
 use serde::de::value::SeqAccessDeserializer;
 use serde::de::{SeqAccess, Visitor};
@@ -110,10 +111,6 @@ pub(super) struct SensorTable {
     deskew: bool,
 }
 
-/// The period of poses of a trajectory without times, seconds: KITTI's sensor has 10 revolutions
-/// per second.
-const PERIOD_S: f64 = 0.1;
-
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct TimedPose {
@@ -163,8 +160,9 @@ fn trajectory(
     let wrong = |cause: String| InvalidValue::new(key.clone(), cause);
     let found = match motion {
         None => return Ok(None),
-        Some(Motion::File(file)) => Trajectory::load(&folder.join(file), PERIOD_S)
-            .map_err(|error| wrong(error.to_string()))?,
+        Some(Motion::File(file)) => {
+            Trajectory::load(&folder.join(file)).map_err(|error| wrong(error.to_string()))?
+        }
         Some(Motion::Poses(poses)) => {
             let timed = |(i, pose): (usize, TimedPose)| {
                 let key = format!("{key}[{i}]");
@@ -216,7 +214,7 @@ pub(crate) fn check_motion(
     }
     let [first_s, last_s] = trajectory.known_s();
     // A recording may end within its last revolution.
-    if first_s == last_s || (first_s <= from_s && to_s <= last_s + PERIOD_S) {
+    if first_s == last_s || (first_s <= from_s && to_s <= last_s + KITTI_PERIOD_S) {
         return Ok(());
     }
     let cause = format!(
@@ -235,7 +233,7 @@ pub(super) fn check_moves(
 ) -> Result<(), InvalidValue> {
     let [first_s, last_s] = trajectory.known_s();
     let is_seen = |sensor: &SceneSensor| {
-        let end_s = sensor.start_s + PERIOD_S * f64::from(sensor.sensor.revolutions.get());
+        let end_s = sensor.start_s + KITTI_PERIOD_S * f64::from(sensor.sensor.revolutions.get());
         sensor.start_s <= last_s && end_s >= first_s
     };
     if first_s == last_s || sensors.is_empty() || sensors.iter().any(is_seen) {
