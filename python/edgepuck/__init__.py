@@ -20,12 +20,13 @@ from ._dataset import Dataset
 from ._detect import Detection, detect
 from ._heightfield import heightfield
 from ._mesh import Mesh, box
+from ._page import View
 from ._scan import Scan
 from ._scene import Batch, Scene, scan_scene
 from ._scenes import DrawnScene, Scenes
 from ._segment import segment
 from ._sensor import Sensor
-from ._view import View, view
+from ._view import view
 
 __version__ = _version("edgepuck")
 

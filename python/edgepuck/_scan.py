@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import os
+import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import _edgepuck
+from ._page import page_of
 
 # The columns in files whose names are keywords of Python, or too short there.
 _NAMES = {"return": "return_number", "sensor": "sensor_position"}
@@ -82,9 +85,12 @@ class Scan:
         return f"<Scan of {len(self)} points: {known}>"
 
     def _repr_html_(self) -> str | None:
-        from ._view import view
-
-        return view(self)._repr_html_() if len(self) else None
+        if not len(self):
+            return None
+        with tempfile.TemporaryDirectory(prefix="edgepuck-") as folder:
+            file = Path(folder, "scan.npz")
+            self.save(file)
+            return page_of([str(file)])._repr_html_()
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
         array = self.positions if dtype is None else self.positions.astype(dtype, copy=False)
