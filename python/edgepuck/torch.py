@@ -112,13 +112,12 @@ class SetNetwork(nn.Module):
         """The logits, [batch, n_classes], of `clouds`, [batch, n, 3]."""
         points, features = clouds, _apply(self.feat, clouds)
         # The first of farthest points are farthest points of fewer: each level's centres begin the last one's.
-        chosen = self.farthest(points, self.levels[0][0])
+        chosen = _rows(clouds, self.farthest(clouds, self.levels[0][0]))
         for number, (n_centres, radius, _) in enumerate(self.levels, 1):
             level = self.get_submodule(f"sa{number}")
-            centres = _rows(points, chosen[:, :n_centres])
+            centres = chosen[:, :n_centres]
             features = _apply(level, self._pooled(level, features, points, centres, radius), first=2)
             points = centres
-            chosen = torch.arange(n_centres, device=clouds.device).expand(len(clouds), -1)
         x = torch.cat([torch.amax(features, 1), torch.mean(features, 1)], 1)
         for i in range(1, self.n_dense):
             x = self.get_submodule(f"fc{i}")(x)

@@ -158,12 +158,11 @@ class Kernels:
         self.launch("winners", batch * n, min(max(channels, 64), 256), *arrays, *sizes, *radii, found)
         return found.long()
 
-
     def check(self, clouds: Tensor) -> None:
         """Compares the kernels with the functions that they replace."""
         u, weight = torch.randn(*clouds.shape[:2], 64, device=clouds.device), torch.randn(64, 4, device=clouds.device)
         picked = farthest(clouds, 256)
-        centres = clouds.gather(1, picked[:, :, None].expand(-1, -1, 3))
+        centres = ordered(clouds, picked)
         pairs = [
             (self.farthest(clouds, 256), picked),
             (self.winners(u, clouds, centres, weight, 0.2), winners(u, clouds, centres, weight, 0.2)),
@@ -179,9 +178,12 @@ def uniform(shape: tuple[int, ...], low: float, high: float, device: torch.devic
     return torch.rand(shape, device=device) * (high - low) + low
 
 
-def by_distance(points: Tensor, centre: Tensor) -> Tensor:
-    order = (points - centre).square().sum(2).argsort(1)
+def ordered(points: Tensor, order: Tensor) -> Tensor:
     return points.gather(1, order[:, :, None].expand(-1, -1, 3))
+
+
+def by_distance(points: Tensor, centre: Tensor) -> Tensor:
+    return ordered(points, (points - centre).square().sum(2).argsort(1))
 
 
 def augmented(clouds: Tensor, others: Tensor, recipe: Recipe) -> tuple[Tensor, Tensor]:
