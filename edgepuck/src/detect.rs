@@ -103,7 +103,7 @@ pub(crate) fn run(args: &DetectArgs) -> anyhow::Result<Outcome> {
             Outline {
                 corners: [a, b, c, d].map(|corner| corner.truncate().to_array()),
                 class: &object.class,
-                score: object.confidence,
+                score: Some(object.confidence),
                 tint: colours::of_class(&object.class),
             }
         })

@@ -24,7 +24,7 @@ use sweep_file::SweepFormat;
 
 use crate::caster::CasterArgs;
 use crate::shard::Shard;
-use crate::view::frame::Labels;
+use crate::view::frame::{Frame, Labels};
 use crate::{Outcome, Usage, preview};
 use formats::outputs::Overwrite;
 
@@ -162,7 +162,8 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
 fn draw(stage: &Stage, done: &LabelledScene, out: &Path) -> anyhow::Result<()> {
     let (names, values) = sweep_file::point_classes(stage, done);
     let labels = Labels { name: "class", values, names: Some(names) };
-    preview::draw(&done.sweep.scan, Some(&labels), None, "scene 0", out)
+    let shown = Frame::of_scan(String::new(), done.sweep.scan.clone(), vec![labels]);
+    preview::draw(&shown, None, "scene 0", out)
 }
 
 /// Prints the clusters of each class, and what a whole set, of which a part need not have all, lacks.

@@ -1,20 +1,24 @@
-//! `edgepuck preview`: a picture of a scan.
+//! `edgepuck preview`: a picture of points, meshes and boxes.
 
 use crate::points::PointsArgs;
-use crate::view::files;
-use crate::{Outcome, preview};
+use crate::view::{files, panes};
+use crate::{Outcome, Usage, preview};
+use anyhow::ensure;
 use formats::outputs::{Overwrite, need_extension};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub struct Args {
-    /// Points to draw: a scan (.npz, .ply, .csv), a capture (.pcap or .pcapng), of which the first
-    /// turn is drawn, or a cloud (.npy, .pcd, .xyz, .txt, .pts, .las, KITTI's or nuScenes' .bin); a
-    /// scene (.toml), what its sensors see; the folder of clusters of segment, or another of sweeps,
-    /// of which the first is drawn. If a scan is in the folder clean/ of a dataset, its noisy version
-    /// is drawn below it
-    #[arg(value_name = "SCAN")]
-    scan: PathBuf,
+    /// What to draw: points, meshes and boxes of all kinds that view takes. Of a capture, a folder or
+    /// a packed set, the first is drawn; of a scene (.toml), what its sensors see. If a scan is in
+    /// the folder clean/ of a dataset, its noisy version is drawn below it. Boxes, as of detect
+    /// (.json) and live (.jsonl), are drawn in what is named before them
+    #[arg(value_name = "FILE", required = true)]
+    files: Vec<PathBuf>,
+
+    /// Boxes to draw as truth: the JSON file of a sweep of gen-scenes, or as of detect
+    #[arg(long, value_name = "FILE")]
+    truth: Option<PathBuf>,
 
     #[command(flatten)]
     points: PointsArgs,
@@ -30,15 +34,25 @@ pub struct Args {
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     need_extension("--out", &args.out, &["png"])?;
     args.overwrite.check([&*args.out])?;
-    let clean = files::first_points(&args.scan, &args.points)?;
-    let Some(clean) = clean.filter(|points| !points.scan.is_empty()) else {
-        formats::say!("{}: expected points to draw, found none", args.scan.display());
+    let file = &args.files[0];
+    let read = |file: &Path| files::first_frame(file, &args.points);
+    let mut panes = panes(&args.files, args.truth.as_deref(), read)?;
+    ensure!(
+        panes.len() == 1,
+        Usage(
+            "expected one file and perhaps boxes, found two files: draw each, or see both by view"
+                .into()
+        )
+    );
+    let (told, is_empty) = (panes[0].told(), panes[0].is_empty());
+    let Some(shown) = panes[0].frames.pop().filter(|_| !is_empty) else {
+        formats::say!("{}: expected points, meshes or boxes to draw, found none", file.display());
         return Ok(Outcome::SomeRefused);
     };
-    let noisy = noisy_twin(&args.scan).map(|file| args.points.read(&file)).transpose()?;
-    let title = args.scan.file_stem().unwrap_or_default().to_string_lossy();
-    preview::draw(&clean.scan, clean.labels.first(), noisy.as_ref(), &title, &args.out)?;
-    formats::say!("{} points: {}", clean.scan.len(), args.out.display());
+    let noisy = noisy_twin(file).map(|file| args.points.read(&file)).transpose()?;
+    let title = file.file_stem().unwrap_or_default().to_string_lossy();
+    preview::draw(&shown, noisy.as_ref(), &title, &args.out)?;
+    formats::say!("{told}: {}", args.out.display());
     Ok(Outcome::Success)
 }
 

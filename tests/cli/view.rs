@@ -97,6 +97,16 @@ fn folders_captures_meshes_and_scenes_are_shown() {
         format!("[[object]]\nmesh = \"{mesh}\"\nlabel = \"</script>\"\n[[sensor]]\nprofile = \"vlp16\"\nposition_m = [3, 0, 1]\nlook_at_m = [0, 0, 0]\n"),
     );
     folder.succeeds(&format!("view {mesh} scene.toml --out two.html"));
+    // A picture shows the first of what a page shows.
+    let boxes = frame(&data(&folder, "truth.html"), 0)["boxes"].as_array().unwrap().len();
+    for (inputs, told) in [
+        (mesh, "1 meshes: scan.png".to_owned()),
+        ("drive.truth.jsonl", format!("{boxes} boxes: scan.png")),
+        ("drive.pcap drive.truth.jsonl", " boxes: scan.png".to_owned()),
+    ] {
+        let said = folder.succeeds(&format!("preview {inputs} --overwrite"));
+        assert!(said.contains(&told), "{said}");
+    }
     let two = data(&folder, "two.html");
     assert_eq!(frame(&two, 0)["points"], Value::Null);
     assert_eq!(frame(&two, 1)["meshes"][0]["class"], "</script>");
@@ -109,6 +119,10 @@ fn folders_captures_meshes_and_scenes_are_shown() {
         &[
             ("view drive.pcap --out page.png", "--out: expected a name with .html, found page.png"),
             ("view drive.pcap --out two.html", "two.html: it exists already"),
+            (
+                "preview drive.pcap drive --out a.png",
+                "expected one file and perhaps boxes, found two",
+            ),
             (
                 "view drive drive drive --out a.html",
                 "expected at most two files side by side, found 3",

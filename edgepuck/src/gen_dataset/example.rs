@@ -1,6 +1,7 @@
 //! The example picture of a dataset: one mesh from all its viewpoints, clean above noisy.
 
 use crate::preview;
+use crate::view::frame::Frame;
 use edgepuck_dataset::internals::layout;
 use edgepuck_dataset::{Manifest, MeshRecord, Variant};
 use formats::Scan;
@@ -35,7 +36,8 @@ pub fn draw(out: &Path, manifest: &Manifest) -> anyhow::Result<Option<PathBuf>> 
     };
     let title = format!("{name} as {sensor} sees it, {views}");
     let picture = layout::example(out);
-    preview::draw(&clean, None, noisy.as_ref(), &title, &picture)?;
+    let clean = Frame::of_scan(String::new(), clean, Vec::new());
+    preview::draw(&clean, noisy.as_ref(), &title, &picture)?;
     Ok(Some(picture))
 }
 

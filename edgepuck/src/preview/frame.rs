@@ -19,11 +19,10 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// The frame of the first of `scans` that has a finite point; a cube of a
-    /// metre if none has. Noise far from the object would else shrink it to a
-    /// dot.
-    pub fn around(scans: &[&Scan]) -> Self {
-        let bounds = scans.iter().find_map(|scan| bounds(&scan.positions));
+    /// The frame of the first of these sets of points that has a finite one; a cube of a metre if
+    /// none has. Noise far from the object would else shrink it to a dot.
+    pub fn around(points: &[&[[f32; 3]]]) -> Self {
+        let bounds = points.iter().find_map(|points| bounds(points));
         let (low, high) = bounds.unwrap_or(([0.0; 3], [0.0; 3]));
         let axes = [0, 1, 2];
         let centre = axes.map(|axis| (low[axis] + high[axis]) / 2.0);

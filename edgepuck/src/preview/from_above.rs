@@ -24,6 +24,6 @@ pub fn draw_from_above(
     let frame = Frame::near_sensor(scan);
     let [_, from_above, _] = View::ALL;
     draw_png(out, (EDGE, EDGE + TITLE_HEIGHT), (title, TITLE_HEIGHT), |below| {
-        panel::draw(below, from_above, scan, tints, &frame, outlines)
+        panel::draw(below, from_above, (scan, tints), &frame, &[], outlines)
     })
 }

@@ -3,9 +3,11 @@
 use anyhow::{Result, anyhow};
 use formats::Scan;
 use plotters::prelude::*;
+use sim_gpu::glam::DVec3;
 
 use super::canvas::{Area, metres, text};
 use super::frame::{Frame, View};
+use crate::view::frame::Mesh;
 
 /// Edge of the square that shows the frame, in pixels.
 const SQUARE: u32 = 380;
@@ -22,26 +24,26 @@ pub const HEIGHT: u32 = CAPTION + SQUARE + AXIS_X + 2 * MARGIN;
 const AXIS_NAMES: [&str; 3] = ["x (m)", "y (m)", "z (m)"];
 const GRID: RGBColor = RGBColor(232, 232, 232);
 
-/// The box around an object, seen from above.
+/// The box around an object, as a view shows it.
 pub struct Outline<'a> {
-    /// Its corners (x, y) in order, metres.
+    /// Its corners (right, up) in order, metres.
     pub corners: [[f64; 2]; 4],
     /// The object's class.
     pub class: &'a str,
-    /// The confidence in the class, 0 to 1.
-    pub score: f64,
+    /// The confidence in the class, 0 to 1, if the box has one.
+    pub score: Option<f64>,
     /// The colour of the class.
     pub tint: RGBColor,
 }
 
-/// Draws what `view` shows of `scan`, nearer points over farther ones, each in
-/// its tint, and `outlines` with a legend of their classes.
+/// Draws what `view` shows: `meshes`; over them the points of `scan`, nearer ones over farther
+/// ones, each in its tint; and `outlines` with a legend of their classes.
 pub fn draw(
     area: &Area<'_>,
     view: View,
-    scan: &Scan,
-    tints: &[RGBColor],
+    (scan, tints): (&Scan, &[RGBColor]),
     frame: &Frame,
+    meshes: &[(&Mesh, RGBColor)],
     outlines: &[Outline<'_>],
 ) -> Result<()> {
     let (caption, below) = area.split_vertically(CAPTION);
@@ -70,6 +72,9 @@ pub fn draw(
         .y_desc(AXIS_NAMES[view.up])
         .draw()?;
 
+    let faces = faces(meshes, view);
+    let faces = faces.iter().map(|Face { corners, tint, .. }| Polygon::new(*corners, *tint));
+    chart.draw_series(faces).map_err(|error| anyhow!("drawing the meshes: {error}"))?;
     let radius = if scan.len() < 20_000 { 2 } else { 1 };
     let points = from_far_to_near(scan, view, frame).into_iter().map(|i| {
         let point = scan.positions[i];
@@ -96,7 +101,8 @@ pub fn draw(
         let [right, top] = corners
             .iter()
             .fold([f64::NEG_INFINITY; 2], |most, at| [most[0].max(at.0), most[1].max(at.1)]);
-        let (name, style) = (format!("{class} {score:.2}"), text(15).color(tint));
+        let score = score.map_or(String::new(), |score| format!(" {score:.2}"));
+        let (name, style) = (format!("{class}{score}"), text(15).color(tint));
         let (width, height) = below.estimate_text_size(&name, &style)?;
         let (width, height) = (width as i32, height as i32);
         let (x, y) = chart.backend_coord(&(right, top));
@@ -125,6 +131,34 @@ pub fn draw(
             .draw()?;
     }
     Ok(())
+}
+
+/// A triangle, as a view shows it.
+struct Face {
+    nearness: f64,
+    corners: [(f64, f64); 3],
+    tint: RGBColor,
+}
+
+/// The triangles of `meshes` from far to near: the more a face is turned away, the darker it is.
+fn faces(meshes: &[(&Mesh, RGBColor)], view: View) -> Vec<Face> {
+    const DARKEST: f64 = 0.4;
+    let (depth, side) = view.depth;
+    let face = |mesh: &Mesh, tint: RGBColor, index: &[u32; 3]| {
+        let at = index.map(|i| DVec3::from(mesh.position[i as usize].map(f64::from)));
+        let normal = (at[1] - at[0]).cross(at[2] - at[0]).normalize_or_zero();
+        let light = DARKEST + (1.0 - DARKEST) * normal[depth].abs();
+        let [red, green, blue] = [tint.0, tint.1, tint.2].map(|x| (f64::from(x) * light) as u8);
+        let nearness = at.iter().map(|at| at[depth]).sum::<f64>() * f64::from(side);
+        let corners = at.map(|at| (at[view.right], at[view.up]));
+        Face { nearness, corners, tint: RGBColor(red, green, blue) }
+    };
+    let mut faces: Vec<_> = meshes
+        .iter()
+        .flat_map(|(mesh, tint)| mesh.index.iter().map(move |index| face(mesh, *tint, index)))
+        .collect();
+    faces.sort_by(|a, b| a.nearness.total_cmp(&b.nearness));
+    faces
 }
 
 fn from_far_to_near(scan: &Scan, view: View, frame: &Frame) -> Vec<usize> {

@@ -2,7 +2,7 @@
 
 use super::MOST_POINTS;
 use super::boxes;
-use super::frame::{Frame, Labels, Placed, Points};
+use super::frame::{Frame, Labels, Placed};
 use super::scene;
 use crate::points::{PointsArgs, warn_of_packets};
 use crate::{Usage, colours};
@@ -49,15 +49,19 @@ pub fn read(file: &Path, points: &PointsArgs) -> anyhow::Result<Content> {
     }))
 }
 
-/// The first points in a file or a folder of any kind; of a capture, those of its first whole turn.
-pub fn first_points(file: &Path, points: &PointsArgs) -> anyhow::Result<Option<Points>> {
-    if points.is_capture(file) {
-        return Ok(cloud(file, points)?.points);
-    }
-    Ok(match read(file, points)? {
-        Content::Frames(frames) => frames.into_iter().find_map(|frame| frame.points),
-        Content::Boxes(_) => None,
-    })
+/// What is first seen of a file or a folder of any kind, but for boxes that are only described beside
+/// it: of a capture, its first whole turn; of a folder, what has points first.
+pub fn first_frame(file: &Path, points: &PointsArgs) -> anyhow::Result<Content> {
+    let frames = match points.is_capture(file) {
+        true => vec![cloud(file, points)?],
+        false => match read(file, points)? {
+            Content::Frames(frames) => frames,
+            boxes @ Content::Boxes(_) => return Ok(boxes),
+        },
+    };
+    let first = frames.iter().position(|frame| frame.n_points() > 0).unwrap_or(0);
+    let undescribed = |frame| Frame { boxes: Vec::new(), ..frame };
+    Ok(Content::Frames(frames.into_iter().skip(first).take(1).map(undescribed).collect()))
 }
 
 /// The points in `file`; with the classes that labels beside it have, or with the objects that
@@ -101,7 +105,7 @@ fn classes(objects: &[u32], truth: &[Placed]) -> Labels {
 }
 
 /// The class of each point by its name.
-fn class_labels<'a>(of_points: impl Iterator<Item = &'a str>) -> Labels {
+pub fn class_labels<'a>(of_points: impl Iterator<Item = &'a str>) -> Labels {
     let (mut names, mut numbers) = (Vec::new(), HashMap::new());
     let number = |name: &'a str| {
         *numbers.entry(name).or_insert_with(|| {

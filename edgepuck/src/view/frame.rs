@@ -112,9 +112,17 @@ impl Pane {
     /// What it shows, for people.
     pub fn told(&self) -> String {
         let sum = |of: fn(&Frame) -> usize| self.frames.iter().map(of).sum::<usize>();
-        let [meshes, boxes] = [sum(|frame| frame.meshes.len()), sum(|frame| frame.boxes.len())];
-        let (points, frames) = (sum(Frame::n_points), self.frames.len());
-        format!("{points} points, {meshes} meshes, {boxes} boxes in {frames} frames")
+        let all = [
+            (sum(Frame::n_points), "points"),
+            (sum(|frame| frame.meshes.len()), "meshes"),
+            (sum(|frame| frame.boxes.len()), "boxes"),
+        ];
+        let told: Vec<_> =
+            all.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}")).collect();
+        match self.frames.len() {
+            1 => told.join(", "),
+            n => format!("{} in {n} frames", told.join(", ")),
+        }
     }
 
     /// Adds the boxes in `file` to the frames of their turns, or to all frames if they name none.
@@ -201,6 +209,18 @@ impl Pane {
 }
 
 impl Placed {
+    /// Its corners: those of the base counterclockwise, then those of the top.
+    pub fn corners(&self) -> [[f64; 3]; 8] {
+        let turned = DQuat::from_rotation_z(self.yaw);
+        let corner = |place: usize| {
+            let (ahead, left) = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)][place % 4];
+            let up = if place < 4 { -1.0 } else { 1.0 };
+            let from_centre = DVec3::new(ahead, left, up) * DVec3::from(self.size) / 2.0;
+            (DVec3::from(self.centre) + turned * from_centre).to_array()
+        };
+        std::array::from_fn(corner)
+    }
+
     /// The box in the frame of a sensor with this pose.
     pub fn seen_from(self, pose: Pose) -> Self {
         let back = pose.rotation.inverse();

@@ -48,7 +48,10 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         need_extension("--out", out, &["html"])?;
         args.overwrite.check([&**out])?;
     }
-    let panes = panes(args)?;
+    let mut panes =
+        panes(&args.files, args.truth.as_deref(), |file| files::read(file, &args.points))?;
+    let most = MOST_POINTS / panes.len();
+    panes.iter_mut().for_each(|pane| pane.thin(most));
     if panes.iter().all(Pane::is_empty) {
         let files = args.files.iter().map(|file| file.display().to_string()).collect::<Vec<_>>();
         bail!("{}: expected something to show, found no point, mesh or box", files.join(", "));
@@ -63,10 +66,15 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-fn panes(args: &Args) -> anyhow::Result<Vec<Pane>> {
+/// What `files` hold by `read`, with the boxes among them and those of `truth` in their frames.
+pub fn panes(
+    files: &[PathBuf],
+    truth: Option<&Path>,
+    read: impl Fn(&Path) -> anyhow::Result<Content>,
+) -> anyhow::Result<Vec<Pane>> {
     let (mut panes, mut boxes) = (Vec::<Pane>::new(), Vec::new());
-    for file in &args.files {
-        match files::read(file, &args.points)? {
+    for file in files {
+        match read(file)? {
             Content::Frames(frames) => panes.push(Pane::new(file, frames)),
             // Before the first pane, they belong to it.
             Content::Boxes(found) => boxes.push((panes.len().max(1) - 1, file, found)),
@@ -77,20 +85,18 @@ fn panes(args: &Args) -> anyhow::Result<Vec<Pane>> {
         Usage(format!("expected at most two files side by side, found {}", panes.len()))
     );
     if panes.is_empty() {
-        panes.push(Pane::new(&args.files[0], Vec::new()));
+        panes.push(Pane::new(&files[0], Vec::new()));
     }
     for (pane, file, found) in boxes {
         panes[pane].add(found, file)?;
     }
-    if let Some(file) = &args.truth {
+    if let Some(file) = truth {
         let truth = |placed| Placed { truth: true, ..placed };
         let found: Vec<_> = boxes::read(file)?.into_iter().map(truth).collect();
         for pane in &mut panes {
             pane.add(found.clone(), file)?;
         }
     }
-    let most = MOST_POINTS / panes.len();
-    panes.iter_mut().for_each(|pane| pane.thin(most));
     Ok(panes)
 }
 
