@@ -96,7 +96,9 @@ pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
 /// Runs the command line `words` like [`main`], but returns errors to the caller instead of
 /// printing them. `--help` is an error.
 pub fn run_words(words: impl IntoIterator<Item = OsString>) -> anyhow::Result<Outcome> {
-    run(&parsed(words)?.command)
+    let done = run(&parsed(words)?.command);
+    formats::atomic::forget_new();
+    done
 }
 
 /// The command line `words`. The examples of commands that `infer-cpu` has too are of this program.

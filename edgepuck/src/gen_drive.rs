@@ -149,7 +149,7 @@ fn write_sequence(stage: &Stage, drive: &mut Drive<'_>, args: &Args) -> anyhow::
     let n_turns = whole_turns(drive, args.seconds)?;
     let sequence = Sequence(args.out.clone());
     args.overwrite.clear([&*args.out], |file| sequence.has_written(file))?;
-    let begun = UnfinishedFolder::begin(&args.out);
+    let begun = UnfinishedFolder::begin(&args.out)?;
     let mut turns = Turns::new(stage, sequence);
     let n_packets = (f64::from(n_turns) * drive.period_s() / drive.packet_s()).ceil();
     fire(drive, n_packets, |drive, first, packets| {

@@ -119,8 +119,8 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let mut stand = vec![false; stage.recipe().object.len()];
     let packed = args.out.join("packed");
     // Saved sweeps are complete, one by one; of packed clusters, only all are.
-    let begun = UnfinishedFolder::begin(&packed);
-    let begun_set = set.as_deref().map(UnfinishedFolder::begin);
+    let begun = UnfinishedFolder::begin(&packed)?;
+    let begun_set = set.as_deref().map(UnfinishedFolder::begin).transpose()?;
     let set = args.layout.zip(set);
     let set = set.map(|(layout, folder)| Writer::new(layout, folder, args.sweeps));
     let counts = generate(&stage, &Settings::default(), numbers.clone(), &packed, |done| {
@@ -149,13 +149,12 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
         n_points / numbers.len(),
         numbers.len() as f64 / seconds
     );
-    report(&stage, &counts, &stand, args.shard.is_none())?;
+    let has_clusters = report(&stage, &counts, &stand, args.shard.is_none())?;
     formats::say!("Clusters: {}. Picture: {}.", packed.display(), preview.display());
     if n_points == 0 {
         formats::say!("warning: no beam returned a point");
-        return Ok(Outcome::SomeRefused);
     }
-    Ok(Outcome::Success)
+    Ok(if n_points > 0 && has_clusters { Outcome::Success } else { Outcome::SomeRefused })
 }
 
 /// Draws the sweep of a scene, each point in the colour of its class.
@@ -167,12 +166,13 @@ fn draw(stage: &Stage, done: &LabelledScene, out: &Path) -> anyhow::Result<()> {
 }
 
 /// Prints the clusters of each class, and what a whole set, of which a part need not have all, lacks.
+/// Returns whether there is a cluster where there must be one.
 fn report(
     stage: &Stage,
     counts: &ClusterCounts,
     stand: &[bool],
     is_whole: bool,
-) -> std::io::Result<()> {
+) -> std::io::Result<bool> {
     let mut out = std::io::stdout().lock();
     writeln!(out, "{:<16} {:>9} {:>9}", "class", "train", "test")?;
     for ((class, train), test) in stage.classes().iter().zip(&counts.train).zip(&counts.test) {
@@ -185,10 +185,17 @@ fn report(
             object.class
         );
     }
-    if is_whole && counts.test.iter().all(|n| *n == 0) {
+    let [has_train, has_test] =
+        [&counts.train, &counts.test].map(|part| part.iter().any(|n| *n > 0));
+    if is_whole && !has_train && !has_test {
+        formats::say!(
+            "warning: no object is in a cluster: expected some above the ground that stand where the \
+             sensors see them"
+        );
+    } else if is_whole && !has_test {
         formats::say!("warning: no cluster is in the test part, which has every tenth of --sweeps");
     }
-    Ok(())
+    Ok(has_train || has_test || !is_whole)
 }
 
 /// What decides of the files that are written.

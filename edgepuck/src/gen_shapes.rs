@@ -49,7 +49,8 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
             && number.is_some_and(|number| number.parse::<u32>().is_ok())
     };
     args.overwrite.clear(classes.iter().map(PathBuf::as_path), is_shape)?;
-    let begun = classes.map(|class| UnfinishedFolder::begin(&class));
+    let begun = classes.iter().map(|class| UnfinishedFolder::begin(class));
+    let begun = begun.collect::<Result<Vec<_>, _>>()?;
     shapes::write_tree(&args.out, args.seed, args.train, args.test)
         .context("cannot write the shapes")?;
     begun.into_iter().for_each(UnfinishedFolder::finish);

@@ -14,6 +14,8 @@ use crate::street::StreetClass;
 
 /// The most that products of a rotation's rows may be off: KITTI rounds to 7 digits, others to 3.
 const NOT_A_ROTATION: f64 = 0.01;
+/// The farthest that a camera may be from the LiDAR on one vehicle, metres.
+const FARTHEST_CAMERA_M: f64 = 20.0;
 /// The largest sine of a camera's elevation, 64 degrees.
 const STEEPEST: f64 = 0.9;
 
@@ -58,6 +60,14 @@ impl Camera {
             let cause = "expected a camera that looks ahead, found one that looks along the LiDAR's \
                          z: x of the camera points to the right, y down, z ahead";
             return Err(("Tr_velo_to_cam", cause.to_owned()));
+        }
+        let apart_m = self.rect_from_lidar.w_axis.truncate().length();
+        if apart_m > FARTHEST_CAMERA_M {
+            let cause = format!(
+                "expected a camera within {FARTHEST_CAMERA_M} m of the LiDAR, found {apart_m:.1} m: is the \
+                 fourth column in metres?"
+            );
+            return Err(("Tr_velo_to_cam", cause));
         }
         let [x, y, z] = [0, 1, 2].map(|row| self.image_from_rect.row(row).truncate());
         if x.x <= 0.0 || y.y <= 0.0 || z != DVec3::Z {
@@ -208,6 +218,11 @@ mod tests {
             ("1 0 0 0 1 0 0 0 1", "0 0 0 0 0 0 0 0 0", "R0_rect: expected a rotation: rows of"),
             ("0 -1 0 0 0 0 -1 0 1", "0 1 0 0 0 0 -1 0 1", "Tr_velo_to_cam: expected a rotation"),
             ("0 -1 0 0 0 0 -1 0 1 0 0 0", "1 0 0 0 0 1 0 0 0 0 1 0", "looks along the LiDAR's z"),
+            (
+                "0 0 -1 0 1 0 0 0",
+                "0 0 -1 -76 1 0 0 -272",
+                "found 282.4 m: is the fourth column in metres",
+            ),
         ] {
             let changed = CALIBRATION.replace(valid, other);
             assert_ne!(changed, CALIBRATION);

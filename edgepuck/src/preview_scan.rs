@@ -44,6 +44,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
                 .into()
         )
     );
+    panes[0].frames.truncate(1);
     let (told, is_empty) = (panes[0].told(), panes[0].is_empty());
     let Some(shown) = panes[0].frames.pop().filter(|_| !is_empty) else {
         formats::say!("{}: expected points, meshes or boxes to draw, found none", file.display());

@@ -44,7 +44,7 @@ pub fn run(args: &SegmentArgs) -> anyhow::Result<Outcome> {
     let segmentation = segmenter.segment(&sweep)?;
     let elapsed_ms = 1e3 * start.elapsed().as_secs_f64();
 
-    let begun = UnfinishedFolder::begin_new(&args.out);
+    let begun = UnfinishedFolder::begin_new(&args.out)?;
     write_clusters(&args.out, &scan, segmentation)?;
     let tints: Vec<_> = segmentation.labels().iter().map(|label| tint(*label)).collect();
     write_ply(&args.out.join("sweep.ply"), &scan.positions, &tints)?;

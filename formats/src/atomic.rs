@@ -33,6 +33,43 @@ fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
     UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// The outputs that did not exist when this process looked, and that it may not replace: one that is
+/// there when it is finished is another program's.
+static NEW: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+fn new() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    NEW.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Notes that nothing is at `path`: this process may make a file or a folder there, and replace none.
+#[cfg(feature = "cli")]
+pub(crate) fn expect_new(path: &Path) {
+    new().insert(behind_links(path));
+}
+
+/// Forgets which outputs are new: for a process that runs several commands.
+#[cfg(feature = "cli")]
+pub fn forget_new() {
+    new().clear();
+}
+
+fn made_meanwhile() -> io::Error {
+    let cause = "another program made it meanwhile: name another, or replace it by --overwrite";
+    io::Error::new(io::ErrorKind::AlreadyExists, cause)
+}
+
+/// The file to which the symbolic links at `path` lead, which need not exist; `path` if there are none.
+fn behind_links(path: &Path) -> PathBuf {
+    // As many as Linux follows.
+    const MOST_LINKS: usize = 40;
+    let mut path = path.to_path_buf();
+    for _ in 0..MOST_LINKS {
+        let Ok(target) = fs::read_link(&path) else { break };
+        path = path.parent().unwrap_or(Path::new("")).join(target);
+    }
+    path
+}
+
 /// Removes the files and folders that are not complete yet, and begins no others: for a process that
 /// ends.
 pub fn abandon() {
@@ -49,17 +86,28 @@ pub struct UnfinishedFolder(PathBuf);
 
 impl UnfinishedFolder {
     /// Begins the folder at `path`, which does not exist yet or is empty.
-    #[must_use]
-    pub fn begin(path: &Path) -> Self {
+    ///
+    /// # Errors
+    /// Errors of the system; another program made the folder since this one looked.
+    pub fn begin(path: &Path) -> Result<Self, FormatError> {
+        if new().remove(path) {
+            make_folder_of(path)?;
+            fs::create_dir(path).map_err(|source| match source.kind() {
+                io::ErrorKind::AlreadyExists => FormatError::io(path, made_meanwhile()),
+                _ => FormatError::io(path, source),
+            })?;
+        }
         unfinished().insert(path.to_path_buf());
-        Self(path.to_path_buf())
+        Ok(Self(path.to_path_buf()))
     }
 
     /// Begins the folder at `path`; `None` if it has entries already, which others may need.
-    #[must_use]
-    pub fn begin_new(path: &Path) -> Option<Self> {
+    ///
+    /// # Errors
+    /// As [`UnfinishedFolder::begin`].
+    pub fn begin_new(path: &Path) -> Result<Option<Self>, FormatError> {
         let has_entries = fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_some());
-        (!has_entries).then(|| Self::begin(path))
+        if has_entries && !new().contains(path) { Ok(None) } else { Self::begin(path).map(Some) }
     }
 
     /// Keeps the folder.
@@ -170,11 +218,23 @@ impl Temporary {
     fn persist(self, path: &Path) -> io::Result<()> {
         let Self { path: temporary, known } = self;
         let unfinished = unfinished();
-        let persisted = temporary.persist(path).map_err(|error| error.error);
+        let persisted = match new().remove(path) {
+            true => persist_new(temporary, path),
+            false => temporary.persist(path).map_err(|error| error.error),
+        };
         drop(unfinished);
         drop(known);
         persisted
     }
+}
+
+fn persist_new(temporary: TempPath, path: &Path) -> io::Result<()> {
+    temporary.persist_noclobber(path).or_else(|error| match error.error.kind() {
+        io::ErrorKind::AlreadyExists => Err(made_meanwhile()),
+        // Some file systems cannot do both at once.
+        _ if !path.exists() => error.path.persist(path).map_err(|error| error.error),
+        _ => Err(error.error),
+    })
 }
 
 impl Unfinished {
@@ -200,9 +260,10 @@ impl Unfinished {
 
 impl<W: Write> Unfinished<W> {
     fn open(path: &Path, open: impl FnOnce(File) -> W) -> Result<Self, FormatError> {
-        let (file, temporary) = Temporary::of(path)?;
+        let path = behind_links(path);
+        let (file, temporary) = Temporary::of(&path)?;
         let writer = BufWriter::with_capacity(BUFFER, open(file));
-        Ok(Self { path: path.to_path_buf(), writer, temporary })
+        Ok(Self { path, writer, temporary })
     }
 
     /// Appends the output of `fill`.
@@ -318,6 +379,42 @@ mod tests {
         assert_eq!(names(path.parent().unwrap()), ["scan.bin"]);
     }
 
+    #[cfg(feature = "cli")]
+    #[test]
+    fn what_another_program_made_meanwhile_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let [file, made] = ["scan.bin", "made"].map(|name| folder.path().join(name));
+        for path in [&file, &made] {
+            expect_new(path);
+        }
+        fs::write(&file, "theirs").unwrap();
+        fs::create_dir(&made).unwrap();
+        let refused = write_bytes(&file, "ours").unwrap_err().to_string();
+        assert!(refused.contains("scan.bin") && refused.contains("meanwhile"), "{refused}");
+        assert!(UnfinishedFolder::begin(&made).is_err() && made.is_dir());
+        assert_eq!(fs::read(&file).unwrap(), b"theirs");
+        // What this process made itself, it may replace.
+        let own = folder.path().join("own.bin");
+        expect_new(&own);
+        write_bytes(&own, "first").unwrap();
+        write_bytes(&own, "second").unwrap();
+        assert_eq!(fs::read(&own).unwrap(), b"second");
+        assert_eq!(names(folder.path()), ["made", "own.bin", "scan.bin"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_is_followed() {
+        let folder = tempfile::tempdir().unwrap();
+        let [link, target] = ["link", "inside/target"].map(|name| folder.path().join(name));
+        std::os::unix::fs::symlink("inside/target", &link).unwrap();
+        for content in ["first", "second"] {
+            write_bytes(&link, content).unwrap();
+            assert_eq!(fs::read_to_string(&target).unwrap(), content);
+            assert!(link.is_symlink());
+        }
+    }
+
     #[test]
     fn a_failed_write_keeps_the_old_file_and_leaves_nothing() {
         let folder = tempfile::tempdir().unwrap();
@@ -362,16 +459,16 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         for (name, is_kept) in [("kept", true), ("lost", false)] {
             let path = folder.path().join(name);
-            let begun = UnfinishedFolder::begin(&path);
+            let begun = UnfinishedFolder::begin(&path).unwrap();
             write_bytes(&path.join("a"), b"x").unwrap();
             if is_kept {
                 begun.finish();
             }
         }
         assert_eq!(names(folder.path()), ["kept"]);
-        assert!(UnfinishedFolder::begin_new(&folder.path().join("new")).is_some());
+        assert!(UnfinishedFolder::begin_new(&folder.path().join("new")).unwrap().is_some());
         // With files of others, it stays.
-        assert!(UnfinishedFolder::begin_new(folder.path()).is_none());
+        assert!(UnfinishedFolder::begin_new(folder.path()).unwrap().is_none());
     }
 
     #[test]

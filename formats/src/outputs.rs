@@ -1,5 +1,6 @@
 //! The one rule for outputs that exist already, and for the names of outputs.
 
+use crate::atomic::expect_new;
 use crate::outcome::Usage;
 use anyhow::Context;
 use std::path::{Path, PathBuf};
@@ -14,7 +15,7 @@ pub struct Overwrite {
 
 impl Overwrite {
     /// Checks that none of `files` exists, unless they may be replaced, and that [they can be
-    /// made](check_place).
+    /// made](check_place). What another program makes until this one does is not replaced either.
     ///
     /// # Errors
     /// Names the first for which this does not hold, or that is a folder.
@@ -41,7 +42,11 @@ impl Overwrite {
         if !self.overwrite && (path.is_file() || path.is_dir()) {
             return Err(refused(path, "it exists already: --overwrite replaces it"));
         }
-        check_place(path)
+        check_place(path)?;
+        if !self.overwrite && !path.exists() {
+            expect_new(path);
+        }
+        Ok(())
     }
 
     /// As [`Overwrite::check_folder`], of folders that [`Overwrite::clear`] removes, if all files in

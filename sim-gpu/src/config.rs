@@ -113,7 +113,15 @@ pub fn read<T: DeserializeOwned, U, E: Into<Vec<InvalidValue>>>(
     if text.len() as u64 > MAX_FILE_BYTES {
         return Err(ConfigError::TooLong { file: file.to_owned() });
     }
-    parse(&text, file, check)
+    // What is no TOML at all, such as a mesh, would have a mistake in each line.
+    let other = file.extension().filter(|extension| !extension.eq_ignore_ascii_case("toml"));
+    match other.filter(|_| text.parse::<toml::Table>().is_err()) {
+        Some(extension) => Err(ConfigError::Content {
+            file: file.to_owned(),
+            message: format!("expected a TOML file, found .{}", extension.display()),
+        }),
+        None => parse(&text, file, check),
+    }
 }
 
 /// Parses `text`, which is in `file`, and makes of it what is wanted by `check`.

@@ -151,6 +151,7 @@ fn what_is_not_there_is_named() {
     fs::create_dir(folder.at("empty")).unwrap();
     folder.write("bad.toml", "name = \"x\"\n");
     folder.write("bad.npz", "PK\u{3}\u{4}");
+    folder.write("meshes.obj", "v 0 0 0\n");
     folder.write("latin.toml", b"# A scene\nname = \"M\xFCller\"\n");
     folder.write("utf16.toml", b"\xFF\xFEn\0a\0");
     folder.refuses(
@@ -166,6 +167,8 @@ fn what_is_not_there_is_named() {
             ("gen-dataset empty --adapter no-such-adapter", "no"),
             ("gen-dataset --verify nowhere", "nowhere"),
             ("merge-dataset nowhere --out x", "nowhere"),
+            ("profile meshes.obj", "meshes.obj: expected a TOML file, found .obj"),
+            ("live --pcap -", "-: name: expected a file, found standard input"),
             ("scan nowhere.toml --out x.npz", "nowhere.toml"),
             ("scan bad.toml --out x.npz", "bad.toml"),
             ("scan latin.toml --out x.npz", "in UTF-8, found the byte 0xFC in line 2: save it"),

@@ -46,6 +46,39 @@ fn a_damaged_shard_is_not_merged() {
 }
 
 #[test]
+fn a_set_without_an_object_is_no_success_and_a_capture_without_a_turn_is_told() {
+    let folder = Folder::with_meshes();
+    folder.write(
+        "bare.toml",
+        r#"
+        description = "A plane without an object"
+        [ground]
+        half_m = 60
+        [mount]
+        height_m = [1.0, 2.0]
+        [[sensor]]
+        profile = "vlp16"
+        [[object]]
+        kind = "wall"
+        class = "wall"
+        count = [0, 0]
+        place = "line"
+        distance_m = [5, 50]
+        "#,
+    );
+    let said = folder.exits(3, "gen-scenes bare.toml --sweeps 10 --save 0 --out bare");
+    assert!(said.contains("no object is in a cluster"), "{said}");
+    let noisy = "gen-dataset meshes --sensor vlp16 --views 1 --dropout 1 --adapter cpu --out noisy";
+    let said = folder.exits(3, noisy);
+    assert!(said.contains("rotational-noisy-train.npz holds no cloud"), "{said}");
+    folder.succeeds("gen-drive room --seconds 0.05 --out short.pcap");
+    let said = folder.succeeds("live --pcap short.pcap");
+    assert!(said.contains("short.pcap: no object was found among"), "{said}");
+    let said = folder.exits(1, "merge-dataset bare/packed noisy --out whole");
+    assert!(!said.contains("os error"), "{said}");
+}
+
+#[test]
 fn overwriting_keeps_what_is_there_until_all_is_checked_and_leaves_nothing_of_it() {
     let folder = Folder::new();
     folder.succeeds("gen-scenes room --sweeps 1 --layout kitti --out out");

@@ -131,12 +131,18 @@ fn folders_captures_meshes_and_scenes_are_shown() {
     );
     folder.write("empty/notes.md", "nothing");
     folder.write("bad.json", "{}");
+    let placed = r#"{"objects":[{"position_m":[0,0,0],"size_m":[4,-2,1],"yaw_deg":0}]}"#;
+    folder.write("negative.json", placed);
     folder.refuses(2, &[("view empty --out a.html", "found no file of points in it")]);
     folder.refuses(
         1,
         &[
             ("view nowhere.npz --out a.html", "nowhere.npz"),
             ("view bad.json --out a.html", "bad.json: objects: expected boxes as of detect"),
+            (
+                "view negative.json --out a.html",
+                "objects[0]: expected metres up to 1e7, and no size",
+            ),
         ],
     );
     assert!(!folder.at("a.html").exists());

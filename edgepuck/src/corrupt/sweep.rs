@@ -39,7 +39,7 @@ pub(super) fn run(
     };
 
     remove_former(&args.out, &input.sweep)?;
-    let begun = UnfinishedFolder::begin_new(&args.out);
+    let begun = UnfinishedFolder::begin_new(&args.out)?;
     let is_dark = brightness.is_none();
     let (mut written, mut too_weak_before) = (Vec::new(), 0);
     for (entry, severity, corruption) in chosen {

@@ -240,8 +240,8 @@ fn report_empty_sets(manifest: &Manifest) -> bool {
     all_have_points
 }
 
-/// Prints the packed files from which all clouds are left out. Returns `false` if there are such
-/// files and no file has a cloud.
+/// Prints the packed files from which all clouds are left out. Returns `false` if one of these is of a
+/// set whose other part has no cloud either.
 fn report_empty_packed(manifest: &Manifest) -> bool {
     let is_empty = |packed: &&PackedRecord| packed.clouds == 0 && !packed.left_out.is_empty();
     let empty: Vec<_> = manifest.packed.iter().filter(is_empty).collect();
@@ -253,7 +253,11 @@ fn report_empty_packed(manifest: &Manifest) -> bool {
             manifest.config.min_points
         );
     }
-    empty.is_empty() || manifest.packed.iter().any(|packed| packed.clouds > 0)
+    let set = |packed: &PackedRecord| packed.file.rsplit_once('-').map(|(set, _)| set.to_owned());
+    let has_clouds = |of: &&PackedRecord| {
+        manifest.packed.iter().any(|other| set(other) == set(of) && other.clouds > 0)
+    };
+    empty.iter().all(has_clouds)
 }
 
 /// Verifies the dataset in `folder` and prints its problems, one a line.

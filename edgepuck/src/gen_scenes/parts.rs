@@ -1,6 +1,7 @@
 //! Parts of a set of scenes, which any number of machines make, and the whole of them.
 
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
@@ -48,7 +49,7 @@ pub fn merge(folders: &[PathBuf], out: &Path) -> anyhow::Result<()> {
     });
     check_parts(&said.collect::<Vec<_>>(), out)?;
     parts.sort_by_key(|(_, record)| record.number);
-    let begun = UnfinishedFolder::begin(out);
+    let begun = UnfinishedFolder::begin(out)?;
     for (folder, _) in &parts {
         link_all(folder, out).with_context(|| folder.display().to_string())?;
     }
@@ -62,7 +63,14 @@ pub fn merge(folders: &[PathBuf], out: &Path) -> anyhow::Result<()> {
 
 fn read(folder: &Path) -> anyhow::Result<(&Path, Record)> {
     let file = record(folder);
-    let text = fs::read(&file).map_err(|error| FormatError::io(&file, error))?;
+    let lack = || match folder.is_dir() {
+        true => "expected a part as of gen-scenes --shard, found a folder without part.json",
+        false => "expected the folder of a part, found none",
+    };
+    let text = fs::read(&file).map_err(|error| match error.kind() {
+        ErrorKind::NotFound => FormatError::malformed(folder, "part", lack()),
+        _ => FormatError::io(&file, error),
+    })?;
     let record = serde_json::from_slice(&text).map_err(|error| {
         FormatError::malformed(&file, "record", format!("expected that of a part: {error}"))
     })?;

@@ -56,10 +56,16 @@ pub fn draw(shown: &shown::Frame, noisy: Option<&Scan>, title: &str, out: &Path)
         scan.check_lengths()?;
     }
     let scans: Vec<_> = rows.iter().map(|&(_, scan)| scan).collect();
-    let (views, frame, panel_width, panel_height) = match noisy.is_none() && Frame::is_sweep(clean)
-    {
-        true => (&View::ALL[1..2], Frame::near_sensor(clean), EDGE, EDGE),
-        false => (&View::ALL[..], frame_around(&scans, shown), panel::WIDTH, panel::HEIGHT),
+    let is_sweep = noisy.is_none() && Frame::is_sweep(clean);
+    let has_boxes_alone =
+        noisy.is_none() && clean.is_empty() && meshes.is_empty() && !shown.boxes.is_empty();
+    let frame = match is_sweep {
+        true => Frame::near_sensor(clean),
+        false => frame_around(&scans, shown),
+    };
+    let (views, panel_width, panel_height) = match is_sweep || has_boxes_alone {
+        true => (&View::ALL[1..2], EDGE, EDGE),
+        false => (&View::ALL[..], panel::WIDTH, panel::HEIGHT),
     };
     let colours = Colours::of(&scans, &frame);
 
@@ -70,7 +76,7 @@ pub fn draw(shown: &shown::Frame, noisy: Option<&Scan>, title: &str, out: &Path)
         let (panels, bar) = below.split_horizontally(width - BAR_WIDTH);
         match labels {
             Some(labels) => colours::draw_legend(&bar, labels)?,
-            None if clean.is_empty() && !shown.boxes.is_empty() => {}
+            None if has_boxes_alone => {}
             None => colours.draw_bar(&bar)?,
         }
         for (row, &(name, scan)) in panels.split_evenly((rows.len(), 1)).iter().zip(&rows) {

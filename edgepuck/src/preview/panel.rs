@@ -98,6 +98,10 @@ pub fn draw(
             let swatch = move |(x, y)| Rectangle::new([(x, y - 6), (x + 16, y + 6)], line.filled());
             series.label(*class).legend(swatch);
         }
+        // From the sides, too many boxes stand behind each other.
+        if view.depth.0 != 2 {
+            continue;
+        }
         let [right, top] = corners
             .iter()
             .fold([f64::NEG_INFINITY; 2], |most, at| [most[0].max(at.0), most[1].max(at.1)]);

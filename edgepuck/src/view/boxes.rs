@@ -8,6 +8,9 @@ use sim_gpu::Pose;
 use std::fmt::Display;
 use std::path::Path;
 
+/// The farthest that a box may be, which holds UTM coordinates, and its largest size, metres.
+const FARTHEST_M: f64 = 1e7;
+
 /// A file of one sweep.
 #[derive(Deserialize)]
 struct OfSweep {
@@ -95,6 +98,11 @@ impl Object {
                 "found neither `whole_box` nor `box`, nor the three of `position_m`, `size_m` and \
                  `yaw_deg`",
             )?;
+        let is_sound = size_m.iter().all(|size| (0.0..=FARTHEST_M).contains(size))
+            && centre_m.iter().all(|x| x.abs() <= FARTHEST_M);
+        if !is_sound {
+            return Err("expected metres up to 1e7, and no size below 0");
+        }
         Ok(Placed {
             class: self.class,
             centre: centre_m,

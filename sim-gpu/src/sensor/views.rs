@@ -87,6 +87,7 @@ impl Views {
 
     /// Checks all numbers.
     pub fn validate(&self) -> Result<(), InvalidValue> {
+        at_least("views.count", Some(f64::from(self.count)), 1.0)?;
         positive("views.distance_m", self.distance_m)?;
         at_least("views.distance_to_m", self.distance_to_m, self.distance_m)?;
         within("views.elevation_deg", self.elevation_deg, -90.0..=90.0)?;
@@ -112,6 +113,12 @@ mod tests {
             let pose = |object| drawn.pose(1, DVec3::ZERO, StreamKey::new(0, object, 0));
             assert_ne!(pose("chair"), pose("table"));
         }
+    }
+
+    #[test]
+    fn there_is_a_view() {
+        assert!(Views::ROTATING.validate().is_ok());
+        assert!(Views { count: 0, ..Views::ROTATING }.validate().is_err());
     }
 
     #[test]

@@ -214,7 +214,15 @@ pub fn run(args: &LiveArgs) -> anyhow::Result<Outcome> {
     if !args.stats && read.capture.first_unread.is_some() {
         formats::say!("warning: {}{} UDP packets{}", args.capture(), read.n_packets, read.capture);
     }
-    let Counts { packets, lost, duplicated, late, .. } = *pipeline.counts();
+    let Counts { packets, lost, duplicated, late, points, clusters, .. } = *pipeline.counts();
+    if args.pcap.is_some() && !args.stats && packets > 0 && clusters == 0 {
+        formats::say!(
+            "warning: {}no object was found among {points} points of {packets} packets: expected a whole \
+             turn of the sensor or more, and clusters of {} points or more (--min-points)",
+            args.capture(),
+            args.min_points
+        );
+    }
     // Single repeated and late packets are usual in networks.
     if duplicated + late > packets {
         formats::say!(
