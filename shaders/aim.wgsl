@@ -82,6 +82,6 @@ fn aim(view: View, beam: vec3i) -> TraceRay {
         vec3f(origin) / 8388608.0,
         view.root,
         vec3f((direction + 32) >> vec3u(6u)) / 16777216.0,
-        f32(skipped) / 1048576.0,
+        0u,
     );
 }

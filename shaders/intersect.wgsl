@@ -69,31 +69,37 @@ fn intersect(origin: vec3f, shear: Shear, triangle: LeafTriangle) -> Candidate {
     let u = edge(bx, by, cx, cy);
     let v = -edge(ax, ay, cx, cy);
     let w = edge(ax, ay, bx, by);
-    let outside = (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0);
-    let determinant = u + v + w;
-    if outside || determinant == 0.0 {
+    let least = min(min(u, v), w);
+    let most = max(max(u, v), w);
+    // Beside no edge by more than the displacement; the shear makes a side at most sqrt(3) longer.
+    let margin = 2.0 * DISPLACEMENT * triangle.longest;
+    if least < -margin && most > margin {
+        return Candidate(false, 0.0, 0.0, NO_HIT);
+    }
+    let near_edge = within(u, cx - bx, cy - by)
+        || within(v, cx - ax, cy - ay)
+        || within(w, bx - ax, by - ay);
+    if least < 0.0 && most > 0.0 && !near_edge {
         return Candidate(false, 0.0, 0.0, NO_HIT);
     }
     let az = row(shear.z, a);
     let bz = row(shear.z, b);
     let cz = row(shear.z, c);
-    let t = fma(u, az, fma(v, bz, w * cz)) / determinant;
-    // The normal in sheared space has the determinant as its z: their ratio is
-    // the tangent that turns a displacement into an error of distance.
-    let slope_x = edge(by - ay, bz - az, cy - ay, cz - az);
-    let slope_y = edge(bz - az, bx - ax, cz - az, cx - ax);
-    let slope = (abs(slope_x) + abs(slope_y)) / abs(determinant);
-    let error = DISPLACEMENT * (1.0 + slope);
-    let near_edge = within(u, cx - bx, cy - by)
-        || within(v, cx - ax, cy - ay)
-        || within(w, bx - ax, by - ay);
-    // Near an edge the ray may truly meet the neighbour instead; a triangle within its error of
-    // the origin may truly lie behind it.
-    var rival = NO_HIT;
-    if near_edge {
-        rival = t - 2.0 * error - DISPLACEMENT * STEEPEST;
-    } else if t < error {
-        rival = t - error;
+    let determinant = u + v + w;
+    // A triangle seen edge-on is met anywhere along its extent.
+    var t = min(min(az, bz), cz);
+    var error = DISPLACEMENT + (max(max(az, bz), cz) - t);
+    if determinant != 0.0 {
+        t = fma(w, cz, fma(v, bz, u * az)) / determinant;
+        // The normal in sheared space has the determinant as its z: their ratio is
+        // the tangent that turns a displacement into an error of distance.
+        let slope_x = edge(by - ay, bz - az, cy - ay, cz - az);
+        let slope_y = edge(bz - az, bx - ax, cz - az, cx - ax);
+        let slope = (abs(slope_x) + abs(slope_y)) / abs(determinant);
+        error = DISPLACEMENT * (1.0 + slope);
     }
-    return Candidate(t + error >= 0.0, t, error, rival);
+    // Near an edge the ray may truly miss the triangle; a triangle within its error of the origin
+    // may truly lie behind it.
+    let is_open = near_edge || t < error;
+    return Candidate(t + error >= 0.0, t, error, select(NO_HIT, t - error, is_open));
 }

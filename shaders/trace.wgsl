@@ -43,8 +43,7 @@ fn ray_of(i: u32) -> TraceRay {
     if view.first_direction == SENT {
         let at = view.first_word + 8u * number;
         let root = view.root + rays[at + 3u];
-        return TraceRay(
-            sent_vector(at), root, sent_vector(at + 4u), bitcast<f32>(rays[at + 7u]));
+        return TraceRay(sent_vector(at), root, sent_vector(at + 4u), 0u);
     }
     let at = 3u * (view.first_direction + rays[view.first_word + number]);
     return aim(view, vec3i(directions[at], directions[at + 1u], directions[at + 2u]));
@@ -62,6 +61,6 @@ fn main(
     }
     let ray = ray_of(i);
     let nearest = traverse(ray);
-    codes[i] = code_of(nearest, ray.skipped);
+    codes[i] = code_of(nearest);
     finish(i, ray, nearest);
 }

@@ -87,12 +87,8 @@ fn traverse(ray: TraceRay) -> Nearest {
     return nearest;
 }
 
-// The caster's answer; ambiguous if another triangle may truly be nearer by more than the promised
-// accuracy.
-fn code_of(nearest: Nearest, skipped: f32) -> u32 {
-    if nearest.index == MISS {
-        return MISS;
-    }
-    let doubt = nearest.t + nearest.error - nearest.rival;
-    return nearest.index | select(0u, AMBIGUOUS, doubt > ACCURACY * (skipped + nearest.t));
+// The caster's answer; ambiguous if the rival may truly be nearer.
+fn code_of(nearest: Nearest) -> u32 {
+    let is_open = nearest.index != MISS && nearest.t + nearest.error > nearest.rival;
+    return nearest.index | select(0u, AMBIGUOUS, is_open);
 }

@@ -225,8 +225,8 @@ fn records_are_laid_out_alike_in_wgsl_and_rust() {
             module,
             Node { left_min, left, left_max, left_count, right_min, right, right_max, right_count }
         );
-        assert_same_layout!(module, LeafTriangle { a, index, b, _padding_b, c, _padding_c });
-        assert_same_layout!(module, TraceRay { origin, root, direction, skipped });
+        assert_same_layout!(module, LeafTriangle { a, index, b, longest, c, _padding_c });
+        assert_same_layout!(module, TraceRay { origin, root, direction, _padding });
         assert_same_layout!(
             module,
             View {

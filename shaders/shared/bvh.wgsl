@@ -16,7 +16,8 @@ struct LeafTriangle {
     a: vec3f,
     index: u32,
     b: vec3f,
-    _padding_b: u32,
+    // The length of the longest side.
+    longest: f32,
     c: vec3f,
     _padding_c: u32,
 }

@@ -4,8 +4,7 @@ struct TraceRay {
     origin: vec3f,
     root: u32,
     direction: vec3f,
-    // Distance from the sensor to `origin`, in unit lengths.
-    skipped: f32,
+    _padding: u32,
 }
 
 struct Nearest {

@@ -21,8 +21,8 @@ pub struct TraceRay {
     pub root: u32,
     /// Unit direction in the unit frame.
     pub direction: [f32; 3],
-    /// Distance from the sensor to `origin`, in unit lengths.
-    pub skipped: f32,
+    /// Fills the record up to WGSL's array stride.
+    pub _padding: u32,
 }
 
 /// A caster's answer for a ray that hits nothing.
@@ -35,8 +35,8 @@ pub(crate) const SENT: u32 = u32::MAX;
 /// The distance for a ray that hits nothing, unit lengths: finite, and beyond every other distance.
 pub const NO_HIT: f32 = 1e30;
 
-/// A bit of a caster's answer: another triangle may truly be nearer by more than the promised
-/// accuracy, and f64 must decide.
+/// A bit of a caster's answer: the ray may truly miss the triangle, or meet another one before it, and
+/// f64 must decide.
 pub const AMBIGUOUS: u32 = 1 << 31;
 
 /// A ray in f64. `origin + t * direction` is `t` metres from the ray's start.
@@ -268,7 +268,7 @@ impl<const N: usize> Entries<N> {
             origin: origin.lane(i).as_vec3().to_array(),
             root,
             direction: self.direction.lane(i).as_vec3().to_array(),
-            skipped: self.skipped[i] as f32,
+            _padding: 0,
         })
     }
 }

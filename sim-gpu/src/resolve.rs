@@ -1,8 +1,7 @@
 //! Turns a caster's codes into ranges, in f64.
 //!
-//! Casters find the triangle that a ray hits; this module computes where. Ranges are thus the same
-//! to the last bit on every adapter that finds the same triangle, and accurate at grazing
-//! incidence too.
+//! Casters find the triangle that a ray hits, or leave it to f64; this module computes where. Hits are
+//! thus the same to the last bit on every adapter, and accurate at grazing incidence too.
 
 use crate::cpu::effects::append_outputs;
 use crate::cpu::oracle::{self, Crossing};

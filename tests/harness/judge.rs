@@ -29,9 +29,9 @@ pub const SILHOUETTE_RAD: f64 = 1e-6;
 /// surfaces do not lie upon one another.
 ///
 /// A caster marks a ray that passes an edge by less than its own rounding,
-/// `DISPLACEMENT`, which is 48 * 2^-24 of a unit length: of triangles whose sides
+/// `DISPLACEMENT`, which is 56 * 2^-24 of a unit length: of triangles whose sides
 /// are a fiftieth of the object, whose perimeter is 350 times their area, that is
-/// 350 * 2.9e-6, a thousandth of all hits. This allows twenty times as much, for
+/// 350 * 3.3e-6, a thousandth of all hits. This allows twenty times as much, for
 /// triangles that are seen from the side.
 pub const MOST_AMBIGUOUS: f64 = 0.02;
 

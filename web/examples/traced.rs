@@ -13,6 +13,10 @@ use harness::meshes::{cube, icosphere, soup, torus};
 const PLACES: [(f64, f64, f64); 4] =
     [(5.0, 6.0, 0.0), (1.75, 44.0, 42.0), (0.23, 12.0, -63.0), (30.0, 3.0, 200.0)];
 
+/// Places among the leaves of the tree, where some beams pass borders by less than the rounding of f32.
+const AMONG_LEAVES: [(f64, f64, f64); 4] =
+    [(0.1, 5.0, 5.0), (0.3, 0.0, 90.0), (0.5, 10.0, 100.0), (0.5, 10.0, 280.0)];
+
 fn main() -> anyhow::Result<()> {
     let folder = std::env::args().nth(1).context("expected a folder")?;
     let folder = Path::new(&folder);
@@ -51,9 +55,15 @@ fn main() -> anyhow::Result<()> {
             None => simulator.take_built_in(&name),
         };
         taken.map_err(|cause| anyhow!(cause))?;
+        let places = match name.as_str() {
+            "tree" => [PLACES, AMONG_LEAVES].concat(),
+            // Its sensor has a place of its own.
+            "street" => PLACES[..1].to_vec(),
+            _ => PLACES.to_vec(),
+        };
         // Weather needs a detection limit, which the second sensor lacks.
         for (sensor, rain_mm_h, fog_m) in [("vlp32c", 20.0, 80.0), ("generic-static", 0.0, 0.0)] {
-            for (distance_m, elevation_deg, azimuth_deg) in PLACES {
+            for &(distance_m, elevation_deg, azimuth_deg) in &places {
                 let returns = (rain_mm_h > 0.0 && distance_m == 5.0).then_some("dual");
                 let settings = serde_json::json!({
                     "sensor": sensor, "distance_m": distance_m, "elevation_deg": elevation_deg,
@@ -68,6 +78,7 @@ fn main() -> anyhow::Result<()> {
                 let write =
                     |ending, bytes| fs::write(folder.join(format!("{case}.{ending}")), bytes);
                 write("codes", le(&traced.codes, |code| code.to_le_bytes()))?;
+                write("triangles", le(&traced.triangles, |triangle| triangle.to_le_bytes()))?;
                 write("ranges", le(&traced.ranges, |range| range.to_le_bytes()))?;
                 let columns = [scan.positions, scan.range, scan.intensity].concat();
                 write("scan", le(&columns, |number| number.to_le_bytes()))?;

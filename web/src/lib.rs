@@ -55,7 +55,9 @@ pub struct Scanned {
 pub struct Traced {
     /// The caster's answer for each ray: a triangle, or none, and whether f64 decides.
     pub codes: Vec<u32>,
-    /// The ranges of the rays that hit, metres.
+    /// The triangles of the rays that hit, in the order of jobs and beams.
+    pub triangles: Vec<u32>,
+    /// Their ranges, metres.
     pub ranges: Vec<f64>,
 }
 
@@ -178,8 +180,10 @@ impl Simulator {
         let caster = self.caster.for_effects_async(&plain).await.map_err(words)?;
         let casts = caster.cast_async(&jobs).await.map_err(words)?;
         let solved = jobs.iter().zip(&casts).map(|(job, cast)| resolve(job, cast, pattern, &plain));
-        let ranges = solved.flat_map(|found| found.hits).map(|hit| hit.range_m).collect();
-        Ok(Traced { codes: casts.into_iter().flat_map(|cast| cast.codes).collect(), ranges })
+        let hits = solved.flat_map(|found| found.hits).map(|hit| (hit.triangle, hit.range_m));
+        let (triangles, ranges) = hits.unzip();
+        let codes = casts.into_iter().flat_map(|cast| cast.codes).collect();
+        Ok(Traced { codes, triangles, ranges })
     }
 
     /// What the network calls the points of `scanned`; nothing without a network, without points, and

@@ -3,6 +3,7 @@
 
 use super::{BOX_PADDING, Bounds};
 use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
 
 /// An inner node: the boxes and the places of both children.
 #[repr(C)]
@@ -36,8 +37,8 @@ pub struct LeafTriangle {
     pub index: u32,
     /// The middle corner.
     pub b: [f32; 3],
-    /// Keeps `c` on the 16-byte boundary that WGSL gives a `vec3f`.
-    pub _padding_b: u32,
+    /// The length of the longest side.
+    pub longest: f32,
     /// The highest corner.
     pub c: [f32; 3],
     /// Fills the record up to WGSL's array stride.
@@ -96,7 +97,9 @@ pub(super) fn with_root(mut nodes: Vec<Node>, root: Child) -> Vec<Node> {
 impl LeafTriangle {
     pub(super) fn new(corners: [[f32; 3]; 3], index: u32) -> Self {
         let [a, b, c] = canonical_corners(corners);
-        Self { a, index, b, _padding_b: 0, c, _padding_c: 0 }
+        let length = |[p, q]: [[f32; 3]; 2]| Vec3::from_array(p).distance(Vec3::from_array(q));
+        let longest = [[a, b], [b, c], [a, c]].map(length).into_iter().fold(0.0, f32::max);
+        Self { a, index, b, longest, c, _padding_c: 0 }
     }
 }
 

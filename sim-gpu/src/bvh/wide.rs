@@ -32,13 +32,15 @@ pub struct WideNode {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct WideChild(u32);
 
-/// A leaf of up to four triangles. Unused places hold a triangle without area, which no ray hits.
+/// A leaf of up to four triangles. Unused places hold a triangle without area.
 #[repr(C, align(64))]
 #[derive(Clone, Copy, Debug)]
 pub struct Leaf4 {
     /// Each triangle's corners in canonical order: of the lowest corners x of all,
     /// y of all, z of all, then of the middle ones and of the highest.
     pub corners: [[[f32; LEAF]; 3]; 3],
+    /// The length of each triangle's longest side; negative in unused places, near which no ray passes.
+    pub longest: [f32; LEAF],
     pub(crate) indices: [u32; LEAF],
     /// How many triangles there are.
     pub len: u32,
@@ -92,19 +94,23 @@ impl WideNode {
 }
 
 impl Leaf4 {
-    const NOTHING: Self =
-        Self { corners: [[[0.0; LEAF]; 3]; 3], indices: [u32::MAX; LEAF], len: 0 };
+    const NOTHING: Self = Self {
+        corners: [[[0.0; LEAF]; 3]; 3],
+        longest: [-1.0; LEAF],
+        indices: [u32::MAX; LEAF],
+        len: 0,
+    };
 
     /// A leaf of one to four `triangles`.
     fn new(mut triangles: impl ExactSizeIterator<Item = LeafTriangle>) -> Self {
         let len = triangles.len() as u32;
         let first = triangles.next().expect("invariant: a leaf has a triangle");
         // A point of the first triangle stays inside the box of the leaf.
-        let without_area = LeafTriangle { b: first.a, c: first.a, ..first };
+        let without_area = LeafTriangle { b: first.a, c: first.a, longest: -1.0, ..first };
         let mut leaf = Self { len, ..Self::NOTHING };
         let places = std::iter::once(first).chain(triangles).chain(repeat(without_area));
         for (i, triangle) in places.take(LEAF).enumerate() {
-            leaf.indices[i] = triangle.index;
+            (leaf.indices[i], leaf.longest[i]) = (triangle.index, triangle.longest);
             for (corner, from) in leaf.corners.iter_mut().zip([triangle.a, triangle.b, triangle.c])
             {
                 (0..3).for_each(|axis| corner[axis][i] = from[axis]);

@@ -76,7 +76,7 @@ impl Interleaved {
                     turn += 1;
                     continue;
                 }
-                codes[*number] = nearest.code(rays[*number].skipped);
+                codes[*number] = nearest.code();
                 if let Some(next) = to_begin.next() {
                     walks[turn].begin(next);
                 } else {

@@ -31,32 +31,33 @@ pub struct Shear {
 /// The crossings of a ray with the triangles of a leaf, one in each lane.
 #[derive(Clone, Copy, Debug)]
 pub struct Candidates4 {
-    /// A bit for each lane whose triangle the ray meets.
+    /// A bit for each lane whose triangle the ray meets, or passes by at most [`DISPLACEMENT`].
     pub met: u32,
     /// Distance from the ray's origin, unit lengths.
     pub t: [f32; LEAF],
     /// Bound of the difference between `t` and the true distance.
     pub error: [f32; LEAF],
-    /// Lower bound of the distance of another surface that the ray may truly meet instead,
-    /// because it passes near an edge or starts near the triangle; else `NO_HIT`.
+    /// Lower bound of the distance of what the ray may truly meet instead, because it passes near
+    /// an edge or starts near the triangle; else `NO_HIT`.
     pub rival: [f32; LEAF],
 }
 
 /// The most that rounding displaces a triangle relative to the ray, in unit lengths.
 ///
-/// In units u = 2^-24, for each component, with coordinates of vertices at most 1 and of origins at
-/// most 2: u for the vertex, u for the origin, 2u for their difference, and 3.5u for the direction
-/// over a chord of 3.5, in sum 7.5u. The shear (|Sx| <= 1) doubles that to 15u. Its own arithmetic
-/// adds 8u, the rounding of Sx 5.5u, and edge functions over edges of at most 2 add 8u: 36.5u
-/// sideways. Along the ray it is 1.74 x 7.5u, and 3.5 x 4u for the division: 27u.
+/// In units u = 2^-24, as lengths of vectors, with coordinates of vertices at most 1, origins at most
+/// 1.87 from the centre, and 3.55 to go. WGSL rounds sums and products correctly or fuses them
+/// ("Reassociation and Fusion"), and lets a division err by 2.5 ULP ("Accuracy of Concrete Floating
+/// Point Expressions"), which is at most 5u of its result.
 ///
-/// For a ray made in integers ([`aim`](super::aim)), the origin counts 5.5u, and the direction 0.6u
-/// over each unit length, 2.2u over 3.55. The sum is 10.7u instead of 7.5u: 43u sideways and 33u
-/// along the ray. All are below 48u.
-pub const DISPLACEMENT: f32 = 48.0 / 16_777_216.0;
-
-/// The tangent of the steepest incidence with the promised accuracy: 1 / tan(0.1 degree).
-pub const STEEPEST: f32 = 573.0;
+/// The vertex counts 0.9u, the origin of a ray made in integers ([`aim`](super::aim)) 8.2u, their
+/// difference 3.5u, and the direction 3.7u: 16.3u, which the shear lengthens to at most sqrt(3) times
+/// that, 28.2u. Its products add 2.8u and its differences 3u. Sx and Sy are off by 5.5u each, over a
+/// z of at most 2.08 where both are 1: 16.2u. Edge functions add 4u. That is 54.2u sideways; a ray
+/// rounded from f64 has less.
+///
+/// Along the ray, errors of the origin, the direction and `per_z` move all surfaces alike. The vertex
+/// and its difference from the origin count 4.4u, the product 2u, and the quotient 21u: 27.4u.
+pub const DISPLACEMENT: f32 = 56.0 / 16_777_216.0;
 
 /// The axes in cyclic order, the one of largest size last.
 #[must_use]
@@ -106,8 +107,8 @@ fn edge(px: Vec4, py: Vec4, qx: Vec4, qy: Vec4) -> Vec4 {
     px * qy - py * qx
 }
 
-/// Intersects a ray with a leaf's triangles; `None` if it meets none of them. Both faces count,
-/// and edges belong to the triangle.
+/// Intersects a ray with a leaf's triangles; `None` if it meets none of them. Both faces count.
+/// Whatever the adapter's rounding, a triangle that the ray truly meets is among those met.
 #[inline(always)]
 #[must_use]
 pub fn intersect4(origin: Vec3, shear: &Shear, leaf: &Leaf4) -> Option<Candidates4> {
@@ -118,23 +119,13 @@ pub fn intersect4(origin: Vec3, shear: &Shear, leaf: &Leaf4) -> Option<Candidate
     let u = edge(b.x, b.y, c.x, c.y);
     let v = -edge(a.x, a.y, c.x, c.y);
     let w = edge(a.x, a.y, b.x, b.y);
-    let zero = Vec4::ZERO;
-    let negative = u.cmplt(zero) | v.cmplt(zero) | w.cmplt(zero);
-    let positive = u.cmpgt(zero) | v.cmpgt(zero) | w.cmpgt(zero);
-    let determinant = u + v + w;
-    // A NaN, which is not equal to 0, passes here and fails the comparison for `met`.
-    let inside = !(negative & positive) & determinant.cmpne(zero);
-    if !inside.any() {
+    let (least, most) = (u.min(v).min(w), u.max(v).max(w));
+    // Beside no edge by more than the displacement; the shear makes a side at most sqrt(3) longer.
+    let margin = Vec4::from_array(leaf.longest) * (2.0 * DISPLACEMENT);
+    let apart = least.cmplt(-margin) & most.cmpgt(margin);
+    if apart.all() {
         return None;
     }
-    let (az, bz, cz) = (a.along * shear.per_z, b.along * shear.per_z, c.along * shear.per_z);
-    let t = (u * az + v * bz + w * cz) / determinant;
-    // The normal in sheared space has the determinant as its z: their ratio is
-    // the tangent that turns a displacement into an error of distance.
-    let slope_x = edge(b.y - a.y, bz - az, c.y - a.y, cz - az);
-    let slope_y = edge(bz - az, b.x - a.x, cz - az, c.x - a.x);
-    let slope = (slope_x.abs() + slope_y.abs()) / determinant.abs();
-    let error = DISPLACEMENT * (1.0 + slope);
     // Whether a point lies within `DISPLACEMENT` of the line along (x, y), given
     // the edge function there. Squares that vanish count as within.
     let within = |edge: Vec4, x: Vec4, y: Vec4| {
@@ -143,13 +134,28 @@ pub fn intersect4(origin: Vec3, shear: &Shear, leaf: &Leaf4) -> Option<Candidate
     let near_edge = within(u, c.x - b.x, c.y - b.y)
         | within(v, c.x - a.x, c.y - a.y)
         | within(w, b.x - a.x, b.y - a.y);
-    // Near an edge the ray may truly miss the triangle and meet its neighbour. Within the
-    // displacement the two planes part by at most the slopes of both.
-    let neighbour = t - 2.0 * error - DISPLACEMENT * STEEPEST;
-    // A triangle within its error of the origin may truly lie behind it.
-    let if_behind = Vec4::select(t.cmplt(error), t - error, Vec4::splat(NO_HIT));
-    let rival = Vec4::select(near_edge, neighbour, if_behind);
-    let met = (inside & (t + error).cmpge(zero)).bitmask();
+    let zero = Vec4::ZERO;
+    let outside = least.cmplt(zero) & most.cmpgt(zero);
+    let (az, bz, cz) = (a.along * shear.per_z, b.along * shear.per_z, c.along * shear.per_z);
+    let determinant = u + v + w;
+    let t = (u * az + v * bz + w * cz) / determinant;
+    // The normal in sheared space has the determinant as its z: their ratio is
+    // the tangent that turns a displacement into an error of distance.
+    let slope_x = edge(b.y - a.y, bz - az, c.y - a.y, cz - az);
+    let slope_y = edge(bz - az, b.x - a.x, cz - az, c.x - a.x);
+    let slope = (slope_x.abs() + slope_y.abs()) / determinant.abs();
+    let error = DISPLACEMENT * (1.0 + slope);
+    // A triangle seen edge-on is met anywhere along its extent.
+    let (first, last) = (az.min(bz).min(cz), az.max(bz).max(cz));
+    let edge_on = determinant.cmpeq(zero);
+    let t = Vec4::select(edge_on, first, t);
+    let error = Vec4::select(edge_on, DISPLACEMENT + (last - first), error);
+    // Near an edge the ray may truly miss the triangle. A triangle within its error of the origin
+    // may truly lie behind it.
+    let is_open = near_edge | t.cmplt(error);
+    let rival = Vec4::select(is_open, t - error, Vec4::splat(NO_HIT));
+    // A NaN fails the last comparison.
+    let met = (!apart & (near_edge | !outside) & (t + error).cmpge(zero)).bitmask();
     let [t, error, rival] = [t, error, rival].map(|lanes| lanes.to_array());
     Some(Candidates4 { met, t, error, rival })
 }

@@ -5,7 +5,7 @@
 //! of `traverse` for a single ray to the bit.
 
 use super::frustum::Frustum;
-use super::intersect::{DISPLACEMENT, STEEPEST};
+use super::intersect::DISPLACEMENT;
 use super::traverse::{FAR_SCALE, Instructions, Nearest, PACKET, Prepared};
 use crate::bvh::{Entered, LEAF, Leaf4, MAX_DEPTH, Stack, WIDTH, WideBvh, WideChild, WideNode};
 use crate::lanes::each;
@@ -91,7 +91,7 @@ impl<S: Simd> Instructions for Packets<S> {
     ) -> [u32; PACKET] {
         let mut nearest = NearestOfRays::NONE;
         Packet::new(rays, frustum, self).trace(tree, stacks, &mut nearest);
-        each(|lane| nearest.get(lane).code(rays[lane].skipped))
+        each(|lane| nearest.get(lane).code())
     }
 }
 
@@ -230,29 +230,33 @@ impl<S: Simd> Packet<S> {
         let u = edge(b.x, b.y, c.x, c.y);
         let v = -edge(a.x, a.y, c.x, c.y);
         let w = edge(a.x, a.y, b.x, b.y);
-        let zero = self.by.splat(0.0);
-        let negative = u.simd_lt(zero) | v.simd_lt(zero) | w.simd_lt(zero);
-        let positive = zero.simd_lt(u) | zero.simd_lt(v) | zero.simd_lt(w);
-        let determinant = u + v + w;
-        // A NaN, which is not equal to 0, passes here and fails the comparison for `met`.
-        let inside = determinant.simd_ne(zero) & !(negative & positive) & live;
-        if inside.to_bitmask() == 0 {
+        let (least, most) = (u.min(v).min(w), u.max(v).max(w));
+        let margin = leaf.longest[i] * (2.0 * DISPLACEMENT);
+        let apart = least.simd_lt(-margin) & most.simd_gt(margin);
+        let live = live & !apart;
+        if live.to_bitmask() == 0 {
             return;
         }
+        let near_edge = within(u, c.x - b.x, c.y - b.y)
+            | within(v, c.x - a.x, c.y - a.y)
+            | within(w, b.x - a.x, b.y - a.y);
+        let zero = self.by.splat(0.0);
+        let outside = least.simd_lt(zero) & most.simd_gt(zero);
         let per_z = self.shear[2];
         let (az, bz, cz) = (a.along * per_z, b.along * per_z, c.along * per_z);
+        let determinant = u + v + w;
         let t = (u * az + v * bz + w * cz) / determinant;
         let slope_x = edge(b.y - a.y, bz - az, c.y - a.y, cz - az);
         let slope_y = edge(bz - az, b.x - a.x, cz - az, c.x - a.x);
         let slope = (slope_x.abs() + slope_y.abs()) / determinant.abs();
         let error = (slope + 1.0) * DISPLACEMENT;
-        let met = zero.simd_le(t + error) & inside;
-        let near_edge = within(u, c.x - b.x, c.y - b.y)
-            | within(v, c.x - a.x, c.y - a.y)
-            | within(w, b.x - a.x, b.y - a.y);
-        let neighbour = t - error * 2.0 - DISPLACEMENT * STEEPEST;
-        let if_behind = t.simd_lt(error).select(t - error, self.by.splat(NO_HIT));
-        let rival = near_edge.select(neighbour, if_behind);
+        let (first, last) = (az.min(bz).min(cz), az.max(bz).max(cz));
+        let edge_on = determinant.simd_eq(zero);
+        let t = edge_on.select(first, t);
+        let error = edge_on.select((last - first) + DISPLACEMENT, error);
+        let is_open = near_edge | t.simd_lt(error);
+        let rival = is_open.select(t - error, self.by.splat(NO_HIT));
+        let met = zero.simd_le(t + error) & (near_edge | !outside) & live;
         nearest.consider(met, [t, error, rival], leaf.indices[i]);
     }
 

@@ -15,9 +15,6 @@ pub const LEAST_COMPONENT: f32 = 1e-20;
 /// JCGT 2(2), 2013. Twice his 1 + 2 gamma(3), for the 2.5 ULP that WGSL allows a division.
 pub const FAR_SCALE: f32 = 1.0 + 32.0 / 16_777_216.0;
 
-/// The relative accuracy that casters promise: where f32 cannot keep it, f64 decides.
-pub const ACCURACY: f32 = 1e-6;
-
 /// The nearest surface along a ray so far.
 #[derive(Clone, Copy, Debug)]
 pub struct Nearest {
@@ -153,7 +150,7 @@ impl Instructions for Portable {
         rays: &[TraceRay; PACKET],
         _: Frustum,
     ) -> [u32; PACKET] {
-        rays.each_ref().map(|ray| traverse(tree, stack, ray).code(ray.skipped))
+        rays.each_ref().map(|ray| traverse(tree, stack, ray).code())
     }
 }
 
@@ -186,16 +183,12 @@ impl Nearest {
         }
     }
 
-    /// The caster's answer: [`MISS`], or the index, with [`AMBIGUOUS`] if f64 must decide.
-    /// `skipped` is the distance from the sensor to the ray's origin.
+    /// The caster's answer: [`MISS`], or the index, with [`AMBIGUOUS`] if f64 must decide, because
+    /// the rival may truly be nearer.
     #[must_use]
-    pub fn code(&self, skipped: f32) -> u32 {
-        if self.index == MISS {
-            return MISS;
-        }
-        // How far the rival may lie before the winner.
-        let doubt = self.t + self.error - self.rival;
-        if doubt > ACCURACY * (skipped + self.t) { self.index | AMBIGUOUS } else { self.index }
+    pub fn code(&self) -> u32 {
+        let is_open = self.index != MISS && self.t + self.error > self.rival;
+        if is_open { self.index | AMBIGUOUS } else { self.index }
     }
 }
 

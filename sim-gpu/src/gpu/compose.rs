@@ -3,8 +3,8 @@
 
 use crate::bvh::MAX_DEPTH;
 use crate::cpu::aim::BEFORE;
-use crate::cpu::intersect::{DISPLACEMENT, STEEPEST};
-use crate::cpu::traverse::{ACCURACY, FAR_SCALE, LEAST_COMPONENT};
+use crate::cpu::intersect::DISPLACEMENT;
+use crate::cpu::traverse::{FAR_SCALE, LEAST_COMPONENT};
 use crate::effects::{Effects, RayEffect, RayInput};
 use crate::ray::{AMBIGUOUS, MISS, NO_HIT, SENT};
 use edgepuck_shaders as shaders;
@@ -59,12 +59,10 @@ pub(super) fn reads_random_bits(effects: &Effects) -> bool {
 /// The constants that shaders share with their counterparts, which document them.
 pub(super) fn constants() -> String {
     let floats = [
-        ("ACCURACY", ACCURACY),
         ("DISPLACEMENT", DISPLACEMENT),
         ("FAR_SCALE", FAR_SCALE),
         ("LEAST_COMPONENT", LEAST_COMPONENT),
         ("NO_HIT", NO_HIT),
-        ("STEEPEST", STEEPEST),
     ];
     let whole = [
         ("AMBIGUOUS", AMBIGUOUS),

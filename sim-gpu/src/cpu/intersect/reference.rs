@@ -1,6 +1,6 @@
 //! The same test for one triangle, line by line as in `shaders/intersect.wgsl`.
 
-use super::{Candidates4, DISPLACEMENT, STEEPEST, Shear, intersect4};
+use super::{Candidates4, DISPLACEMENT, Shear, intersect4};
 use crate::bvh::{Builder, Bvh};
 use crate::ray::NO_HIT;
 use formats::rng::StreamKey;
@@ -38,7 +38,12 @@ fn within(edge: f32, x: f32, y: f32) -> bool {
 }
 
 /// Distance, error and rival.
-fn intersect(origin: Vec3, direction: Vec3, corners: [[f32; 3]; 3]) -> Option<[f32; 3]> {
+fn intersect(
+    origin: Vec3,
+    direction: Vec3,
+    corners: [[f32; 3]; 3],
+    longest: f32,
+) -> Option<[f32; 3]> {
     let shear = rows(direction);
     let [a, b, c] = corners.map(|corner| Vec3::from_array(corner) - origin);
     let (ax, ay) = (row(shear.x, a), row(shear.y, a));
@@ -47,26 +52,28 @@ fn intersect(origin: Vec3, direction: Vec3, corners: [[f32; 3]; 3]) -> Option<[f
     let u = edge(bx, by, cx, cy);
     let v = -edge(ax, ay, cx, cy);
     let w = edge(ax, ay, bx, by);
-    let outside = (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0);
-    let determinant = u + v + w;
-    if outside || determinant == 0.0 {
+    let (least, most) = (u.min(v).min(w), u.max(v).max(w));
+    let margin = 2.0 * DISPLACEMENT * longest;
+    if least < -margin && most > margin {
+        return None;
+    }
+    let near_edge =
+        within(u, cx - bx, cy - by) || within(v, cx - ax, cy - ay) || within(w, bx - ax, by - ay);
+    if least < 0.0 && most > 0.0 && !near_edge {
         return None;
     }
     let (az, bz, cz) = (row(shear.z, a), row(shear.z, b), row(shear.z, c));
-    let t = (u * az + v * bz + w * cz) / determinant;
-    let slope_x = edge(by - ay, bz - az, cy - ay, cz - az);
-    let slope_y = edge(bz - az, bx - ax, cz - az, cx - ax);
-    let slope = (slope_x.abs() + slope_y.abs()) / determinant.abs();
-    let error = DISPLACEMENT * (1.0 + slope);
-    let near_edge =
-        within(u, cx - bx, cy - by) || within(v, cx - ax, cy - ay) || within(w, bx - ax, by - ay);
-    let rival = if near_edge {
-        t - 2.0 * error - DISPLACEMENT * STEEPEST
-    } else if t < error {
-        t - error
+    let determinant = u + v + w;
+    let (t, error) = if determinant == 0.0 {
+        let (first, last) = (az.min(bz).min(cz), az.max(bz).max(cz));
+        (first, DISPLACEMENT + (last - first))
     } else {
-        NO_HIT
+        let slope_x = edge(by - ay, bz - az, cy - ay, cz - az);
+        let slope_y = edge(bz - az, bx - ax, cz - az, cx - ax);
+        let slope = (slope_x.abs() + slope_y.abs()) / determinant.abs();
+        ((u * az + v * bz + w * cz) / determinant, DISPLACEMENT * (1.0 + slope))
     };
+    let rival = if near_edge || t < error { t - error } else { NO_HIT };
     (t + error >= 0.0).then_some([t, error, rival])
 }
 
@@ -98,7 +105,8 @@ fn each_lane_does_what_one_triangle_does() {
         let lanes = intersect4(origin, &Shear::along(direction), leaf);
         for lane in 0..4 {
             let corner = |c: usize| leaf.corners[c].map(|axis| axis[lane]);
-            let expected = intersect(origin, direction, [0, 1, 2].map(corner));
+            let corners = [0, 1, 2].map(corner);
+            let expected = intersect(origin, direction, corners, leaf.longest[lane]);
             let of_lane = |found: Candidates4| {
                 let met = found.met & (1 << lane) != 0;
                 met.then_some([found.t[lane], found.error[lane], found.rival[lane]])

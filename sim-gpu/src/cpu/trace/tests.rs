@@ -77,7 +77,7 @@ fn levels() -> Vec<Level> {
 
 fn one_by_one(tree: &WideBvh, rays: &[TraceRay]) -> Vec<u32> {
     let mut stack = Stack::default();
-    rays.iter().map(|ray| traverse(tree, &mut stack, ray).code(ray.skipped)).collect()
+    rays.iter().map(|ray| traverse(tree, &mut stack, ray).code()).collect()
 }
 
 #[test]

@@ -89,10 +89,7 @@ impl RaySet {
         let range = |(ray, &code): (&Ray, &u32)| match code {
             MISS => None,
             code if code & AMBIGUOUS == 0 => oracle::range_to(target, ray, code),
-            code => match oracle::nearest(target, ray) {
-                Some(nearest) => Some(nearest.range_m),
-                None => oracle::range_to(target, ray, code & !AMBIGUOUS),
-            },
+            _ => oracle::nearest(target, ray).map(|nearest| nearest.range_m),
         };
         self.rays.iter().zip(&cast.codes).map(range).collect()
     }
