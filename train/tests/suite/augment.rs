@@ -129,11 +129,19 @@ fn a_ball_of_points_is_mixed_in() {
             assert_eq!(gone.len() as f32 / 32.0, share);
             assert_eq!(drawn.points.iter().filter(|p| !whole.contains(p)).count(), gone.len());
         }
-        // Some point is the centre of a ball that holds exactly what is gone.
+        // Some point is the centre of a ball that holds exactly what is gone, and of one that holds
+        // what has come, of its own cloud.
+        let come: Vec<_> = drawn.points.iter().filter(|p| !whole.contains(p)).collect();
+        let other = (1..6).find(|&i| come.iter().any(|p| clouds.set.cloud(i).contains(p)));
+        let (_, left): (Vec<_>, Vec<_>) =
+            clouds.set.cloud(other.unwrap_or(0)).iter().partition(|p| come.contains(p));
         let is_centre = |c: &[f32; 3]| {
             let far = |p: &[f32; 3]| (0..3).map(|k| (p[k] - c[k]).powi(2)).sum::<f32>();
-            let nearest = kept.iter().map(&far).fold(f32::MAX, f32::min);
-            gone.iter().all(|p| far(p) <= nearest)
+            let holds = |inner: &[&[f32; 3]], outer: &[&[f32; 3]]| {
+                let nearest = outer.iter().map(|p| far(p)).fold(f32::MAX, f32::min);
+                inner.iter().all(|p| far(p) <= nearest)
+            };
+            holds(&gone, &kept) && holds(&come, &left)
         };
         assert!(whole.iter().any(is_centre), "{epoch}");
     }
