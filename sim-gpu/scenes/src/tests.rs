@@ -164,6 +164,22 @@ fn dark_objects_are_detected_at_shorter_ranges() {
 }
 
 #[test]
+fn each_model_has_a_reflectivity_of_its_own() {
+    let bright = RECIPE.replace("kind = \"pole\"", "kind = \"pole\", reflectivity = [0.2, 0.8]");
+    let stage = stage(&bright);
+    let mut all = BTreeMap::new();
+    for scene in (0..9).map(|number| DrawnScene::draw(&stage, number)) {
+        for (object, instance) in scene.objects.iter().zip(&stage.build(&scene).instances()[1..]) {
+            let key = (object.entry, object.variant);
+            assert_eq!(*all.entry(key).or_insert(instance.reflectivity), instance.reflectivity);
+        }
+    }
+    let of_poles: Vec<f64> = (0..3).map(|variant| all[&(3, variant)]).collect();
+    assert!(of_poles.iter().all(|x| (0.2..=0.8).contains(x)) && all[&(0, 0)] == 1.0, "{all:?}");
+    assert!((0..3).all(|i| of_poles[i] != of_poles[(i + 1) % 3]), "{of_poles:?}");
+}
+
+#[test]
 fn clusters_of_one_object_have_its_class_and_tell_their_place() {
     let stage = stage(RECIPE);
     let mut segmenter = Segmenter::new(Settings::default()).unwrap();

@@ -1,6 +1,6 @@
 //! Where objects stand and move, and what scenes tell of them.
 
-use glam::{DQuat, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 
 use super::{RECIPE, drive_recipe, stage};
 use crate::{DrawnScene, Drive};
@@ -69,4 +69,24 @@ fn traffic_keeps_to_the_right_and_is_as_dense_as_the_recipe_says() {
     let bound = 6.0 * (variance / n_blocks).sqrt();
     assert!((n_walkers / n_blocks - 6.0f64).abs() < bound, "{n_walkers} in {n_blocks} blocks");
     assert!(n_cars > 100, "{n_cars}");
+}
+
+/// Their directions are off by up to sqrt(3) times 0.04.
+#[test]
+fn houses_face_the_road() {
+    let hedge = "kind = \"hedge\", class = \"bush\", count = [2, 4], place = \"line\"";
+    let house = "kind = \"house-front\", class = \"house\", count = [6, 6], place = \"front\"";
+    let stage = stage(&RECIPE.replace(hedge, house));
+    let mut n = 0;
+    for number in 0..10 {
+        let scene = DrawnScene::draw(&stage, number);
+        for house in scene.objects.iter().filter(|of| of.entry == 2) {
+            let beside_m = house.position.y - scene.ground.road_y_m;
+            let to_road = DVec2::new(0.0, -beside_m.signum());
+            let off_rad = DVec2::from_angle(house.yaw_rad).angle_to(to_road);
+            assert!(off_rad.abs() <= 0.04 * 3f64.sqrt() + 1e-12, "{off_rad}");
+            n += 1;
+        }
+    }
+    assert!(n > 20, "{n}");
 }
