@@ -65,6 +65,21 @@ fn a_turn_about_the_up_axis_keeps_heights_and_radii() {
 }
 
 #[test]
+fn jitter_is_normal_up_to_its_clip() {
+    let clouds = crate::clouds(3);
+    let shaken = Augment { jitter: 0.01, jitter_clip: 0.015, ..plain().augment };
+    let recipe = Recipe { points: 32, augment: shaken, ..plain() };
+    let drawn = (0..100).flat_map(|epoch| augment::augment(&clouds, 0, (epoch, 0), &recipe).points);
+    let off = drawn.zip(clouds.set.cloud(0).iter().cycle());
+    let off: Vec<f32> = off.flat_map(|(a, b)| [0, 1, 2].map(|k| (a[k] - b[k]).abs())).collect();
+    // Coordinates below 1 are rounded to 6e-8, twice.
+    assert!(off.iter().all(|off| *off <= 0.015 + 2e-7));
+    // 0.1336 of 9600 normal numbers are beyond 1.5 of their deviations, with five of 0.0035.
+    let share = off.iter().filter(|off| **off > 0.015 - 2e-7).count() as f64 / off.len() as f64;
+    assert!((share - 0.1336).abs() < 5.0 * 0.0035, "{share}");
+}
+
+#[test]
 fn a_sensor_s_noise_is_along_its_rays() {
     let clouds = crate::clouds(3);
     let noisy = Augment { sensor_noise: 0.01, ..plain().augment };
