@@ -102,7 +102,8 @@ mod tests {
     fn each_turn_counts_with_its_own_time() {
         let mut stats = Stats::new();
         for turn in 0..10 {
-            [turn, 2].map(|ms| stats.spend(Stage::Segment, Duration::from_millis(ms)));
+            stats.spend(Stage::Segment, Duration::from_millis(turn));
+            stats.spend(Stage::Segment, Duration::from_millis(2));
             stats.answered_after(Duration::from_millis(20 - turn), turn);
             stats.end_turn();
         }
