@@ -148,6 +148,13 @@ fn occlusion(visible: f64) -> f64 {
     [0.5, 0.9].into_iter().filter(|least| visible < *least).count() as f64
 }
 
+#[cfg(test)]
+#[test]
+fn less_than_a_tenth_and_less_than_half_are_hidden() {
+    let expected = [(1.0, 0.0), (0.91, 0.0), (0.89, 1.0), (0.51, 1.0), (0.49, 2.0), (0.01, 2.0)];
+    assert!(expected.into_iter().all(|(visible, state)| occlusion(visible) == state));
+}
+
 fn oriented(of: &ObjectBox) -> OrientedBox {
     OrientedBox {
         centre_m: of.centre_m.as_vec3().to_array(),

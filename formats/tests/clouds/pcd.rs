@@ -1,5 +1,5 @@
 use super::{MANY, error, read};
-use formats::cloud_file::read_cloud;
+use formats::cloud_file::{CloudFormat, read_cloud, read_cloud_from};
 use test_support::{need, shared_data};
 
 const HEADER: &str = "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\n";
@@ -18,6 +18,18 @@ fn text_is_read_by_its_columns() {
     assert_eq!(points[0], [1.5, 0.1, -3.0]);
     assert!(points[1][0].is_nan());
     assert_eq!(points[1][1..], [f64::INFINITY, 6.0]);
+}
+
+/// x y z and w x y z: a quaternion of any length is a quarter about z.
+#[test]
+fn a_viewpoint_is_the_pose_of_the_sensor() {
+    let header =
+        "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nVIEWPOINT 1 2 3 2 0 0 2\nPOINTS 1\nDATA ascii\n";
+    let (name, bytes) = (std::path::Path::new("a.pcd"), pcd(header, b"0 0 0\n"));
+    let cloud = read_cloud_from(&bytes[..], Some(CloudFormat::Pcd), name).unwrap();
+    let expected =
+        [0.0, -1.0, 0.0, 1.0, 1.0, 0.0, 0.0, 2.0, 0.0, 0.0, 1.0, 3.0, 0.0, 0.0, 0.0, 1.0];
+    assert_eq!(cloud.pose, Some(expected));
 }
 
 #[test]

@@ -92,3 +92,25 @@ impl Stats {
         (!self.latency.is_empty()).then(|| self.latency.value_at_quantile(share) as f64 / 1e3)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Histograms of two digits are off by up to 1 %.
+    #[test]
+    fn each_turn_counts_with_its_own_time() {
+        let mut stats = Stats::new();
+        for turn in 0..10 {
+            stats.spend(Stage::Segment, Duration::from_millis(turn));
+            stats.spend(Stage::Segment, Duration::from_millis(2));
+            stats.answered_after(Duration::from_millis(20 - turn), turn);
+            stats.end_turn();
+        }
+        let near = |found: f64, expected: f64| (found - expected).abs() <= 0.01 * expected;
+        assert!(near(stats.mean_ms(Stage::Segment), 6.5) && stats.mean_ms(Stage::Track) == 0.0);
+        assert!(near(stats.stage_ms(Stage::Segment, 1.0), 11.0) && stats.n_turns() == 10);
+        assert_eq!(stats.first_turn_ms(), Some(20.0));
+        assert!(near(stats.latency_ms(1.0).unwrap(), 19.0));
+    }
+}

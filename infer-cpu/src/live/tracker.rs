@@ -306,6 +306,26 @@ mod tests {
         assert!((track.id, track.n_seen) == (1, 3) && !track.is_piece);
     }
 
+    /// A piece moves the box with the velocity of the whole, and belongs to the object of two that was seen
+    /// more often.
+    #[test]
+    fn the_box_of_an_object_goes_on_while_pieces_are_seen() {
+        let mut tracker = Tracker::new(2);
+        let whole = |x, size_m| PlacedBox { centre_m: [x, 0.0, 0.0], size_m, yaw_deg: 0.0 };
+        for t in [0.0, 0.1, 0.2] {
+            let car = Observation { size_m: [4.0, 1.6], ..seen(t, 10.0 + 8.0 * t, 0.0) };
+            let track = tracker.observe(&car).unwrap();
+            track.whole.fuse(0, &whole(10.0 + 8.0 * t, [4.0, 1.6, 1.5]), [0.0; 2], None);
+        }
+        let other = tracker.observe(&seen(0.2, 16.0, 9.0)).unwrap();
+        other.whole.fuse(0, &whole(10.0, [9.0, 9.0, 1.5]), [0.0; 2], None);
+        let door = Observation { size_m: [0.9, 0.1], ..seen(0.3, 13.8, -0.7) };
+        let track = tracker.observe(&door).unwrap();
+        let [vx, ..] = track.velocity_m_s().unwrap();
+        assert!(track.id == 1 && track.is_piece && (vx - 8.0).abs() < 1.0, "{vx} m/s");
+        assert!((track.whole.placed().centre_m[0] - (11.6 + 0.1 * vx)).abs() < 1e-9);
+    }
+
     #[test]
     fn a_car_is_found_again_after_a_second_and_not_after_two() {
         let mut tracker = Tracker::new(2);

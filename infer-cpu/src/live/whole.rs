@@ -158,6 +158,17 @@ mod tests {
         assert_near(size_m[0], 4.0);
     }
 
+    /// Of many boxes, the latest counts a twentieth of the size and three tenths of the direction.
+    #[test]
+    fn a_size_is_kept_and_a_direction_follows() {
+        let mut boxes = vec![seen(8.0, [4.0, 1.6], 0.0); 200];
+        boxes.push(seen(8.0, [4.0, 2.0], 8.0));
+        let PlacedBox { size_m, yaw_deg, .. } = fused(&boxes);
+        assert_near(size_m[1], 1.6 + 0.05 * 0.4);
+        let (sin, cos) = 16f64.to_radians().sin_cos();
+        assert_near(yaw_deg, 0.5 * (0.3 * sin).atan2(0.7 + 0.3 * cos).to_degrees());
+    }
+
     #[test]
     fn what_has_moved_shows_its_front_also_when_it_stands() {
         let mut whole = Whole::default();

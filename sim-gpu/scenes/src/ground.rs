@@ -129,3 +129,27 @@ impl Ground {
         (2.0 * self.stream.unit(vertex) - 1.0) * 3f64.sqrt()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Neighbouring vertices have nothing in common, nor have those of two tiles but on their border.
+    #[test]
+    fn tiles_are_rough_everywhere_and_fit_together() {
+        let spans = [[0.0; 2], [0.02; 2], [6.0; 2], [0.0; 2]].map(recipe::Span::from);
+        let [slope_deg, roughness_m, road_width_m, kerb_m] = spans;
+        let even = recipe::Ground::default();
+        let recipe = recipe::Ground { slope_deg, roughness_m, road_width_m, kerb_m, ..even };
+        let key = StreamKey::new(1, "ground", 0);
+        let ground = Ground::draw(&recipe, 0.0, &mut Sampler::new(key), key);
+        let [before, tile] = [-1, 0].map(|number| ground.tile(number, 20.0).vertices);
+        // Steps of 0.5 m.
+        let row = 41;
+        assert!((0..tile.len()).step_by(row).all(|i| before[i + 40] == tile[i]));
+        for (what, of, by) in [("along", &tile, 1), ("across", &tile, row), ("tiles", &before, 0)] {
+            let pairs = tile.iter().zip(&of[by..]).map(|(a, b)| [a.z, b.z]);
+            test_support::assert_uncorrelated(what, &pairs.collect::<Vec<_>>());
+        }
+    }
+}

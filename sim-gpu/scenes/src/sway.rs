@@ -48,3 +48,27 @@ impl Sway {
         DQuat::from_rotation_y(pitch_rad) * DQuat::from_rotation_x(roll_rad)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Over 5 s, in which all waves end, the mean square of an angle is the square of its deviation,
+    /// which at half of 5 m/s is half of the recipe's.
+    #[test]
+    fn pitch_and_roll_sway_as_far_as_the_recipe_says_and_independently() {
+        let starts = (0..1000).map(|seed| {
+            let sway = Sway::draw([2.0, 2.0].into(), 2.5, seed);
+            let angles_deg = |i: u32| {
+                let turned = sway.at(0.1 * f64::from(i));
+                [turned.y, turned.x].map(|part| 2.0 * libm::atan2(part, turned.w).to_degrees())
+            };
+            for axis in 0..2 {
+                let square = (0..50).map(|i| angles_deg(i)[axis].powi(2)).sum::<f64>() / 50.0;
+                assert!((square - 1.0).abs() < 1e-9, "{square}");
+            }
+            angles_deg(0)
+        });
+        test_support::assert_uncorrelated("pitch and roll", &starts.collect::<Vec<_>>());
+    }
+}

@@ -1,3 +1,5 @@
+mod world;
+
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -127,10 +129,13 @@ fn glass_that_returns_nothing_leaves_holes_in_cars() {
         let text = RECIPE.replace("glass_returned = [0, 0]", returned);
         let stage = stage(&text);
         let scene = DrawnScene::draw(&stage, 3);
-        stage.sweep(&scene).unwrap().points().len()
+        let driven = self::stage(&text.replace("vlp16", "vlp32c"));
+        let packets = Drive::new(&driven, 5.0).unwrap().fire(0..150).unwrap();
+        let of_drive = packets.iter().map(|packet| packet.scan.len()).sum::<usize>();
+        [stage.sweep(&scene).unwrap().points().len(), of_drive]
     };
     let (dark, bright) = (with("glass_returned = [0, 0]"), with("glass_returned = [1, 1]"));
-    assert!(dark < bright, "{dark} points with glass that returns nothing, {bright} with all");
+    assert!((0..2).all(|i| dark[i] < bright[i]), "{dark:?} points with dark glass, {bright:?}");
 }
 
 #[test]
@@ -159,7 +164,23 @@ fn dark_objects_are_detected_at_shorter_ranges() {
 }
 
 #[test]
-fn clusters_of_one_object_have_its_class() {
+fn each_model_has_a_reflectivity_of_its_own() {
+    let bright = RECIPE.replace("kind = \"pole\"", "kind = \"pole\", reflectivity = [0.2, 0.8]");
+    let stage = stage(&bright);
+    let mut all = BTreeMap::new();
+    for scene in (0..9).map(|number| DrawnScene::draw(&stage, number)) {
+        for (object, instance) in scene.objects.iter().zip(&stage.build(&scene).instances()[1..]) {
+            let key = (object.entry, object.variant);
+            assert_eq!(*all.entry(key).or_insert(instance.reflectivity), instance.reflectivity);
+        }
+    }
+    let of_poles: Vec<f64> = (0..3).map(|variant| all[&(3, variant)]).collect();
+    assert!(of_poles.iter().all(|x| (0.2..=0.8).contains(x)) && all[&(0, 0)] == 1.0, "{all:?}");
+    assert!((0..3).all(|i| of_poles[i] != of_poles[(i + 1) % 3]), "{of_poles:?}");
+}
+
+#[test]
+fn clusters_of_one_object_have_its_class_and_tell_their_place() {
     let stage = stage(RECIPE);
     let mut segmenter = Segmenter::new(Settings::default()).unwrap();
     let mut seen = std::collections::BTreeSet::new();
@@ -168,7 +189,21 @@ fn clusters_of_one_object_have_its_class() {
         let sweep = stage.sweep(&scene).unwrap();
         let points = Points { points: sweep.points(), rings: Some(sweep.rings()) };
         let found = segmenter.segment(&points).unwrap();
-        for cluster in label_clusters(&stage, &scene, &sweep, found) {
+        let labelled = label_clusters(&stage, &scene, &sweep, found);
+        for (cluster, of) in labelled.iter().zip(found.clusters()) {
+            let own =
+                || of.points.iter().map(|&i| DVec3::from(points.points[i as usize].map(f64::from)));
+            let n = of.points.len() as f64;
+            let range_m = own().map(|at| at.truncate().length()).sum::<f64>() / n;
+            let on = |&&i: &&u32| sweep.surfaces()[i as usize] == cluster.surface;
+            let share = of.points.iter().filter(on).count() as f64 / n;
+            let off =
+                [f64::from(cluster.range_m) - range_m, f64::from(cluster.truth_share) - share];
+            // Means of f32, each within an ulp of up to 100 m.
+            assert!(off.iter().all(|off| off.abs() < 1e-5), "{off:?}");
+            let lowest_m = own().fold(f64::INFINITY, |lowest_m, at| at.z.min(lowest_m)) as f32;
+            let height_m = of.ground_z_m.map(|ground_z_m| lowest_m - ground_z_m);
+            assert_eq!(height_m, Some(cluster.height_m).filter(|height_m| !height_m.is_nan()));
             let class = &stage.classes()[cluster.label];
             if class != OTHER {
                 let object = &scene.objects[cluster.surface as usize - 1];
@@ -388,6 +423,11 @@ fn sightings_count_every_point_once_in_its_revolution() {
         let since_s = sighting.time_s - 946_684_800.0;
         let turn = f64::from(sighting.turn);
         assert!((turn..turn + 1.0).contains(&(since_s * 10.0)), "{sighting:?}");
+        let seen = drive.object(sighting.object).unwrap();
+        let base_m = seen.placed.position + seen.velocity_m_s * since_s;
+        let centre_m = base_m + 0.5 * seen.size_m.z * DVec3::Z;
+        // In 0.12 us, to which f64 rounds Unix time, it moves by a micrometre.
+        assert!(centre_m.distance(sighting.centre_m.into()) < 2e-6, "{sighting:?}: {centre_m}");
     }
 }
 

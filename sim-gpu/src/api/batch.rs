@@ -398,13 +398,13 @@ mod tests {
         };
         let attributes = [Attribute::Intensity, Attribute::Power];
         let batch = scene.batch(&sensor, &poses).moving(moves).effects(effects.clone());
-        let batch = batch.attributes(attributes).seed(3).run().unwrap();
+        let batch = batch.attributes(attributes).seed(3).start_s(0.5).run().unwrap();
         let (mut n_seconds, mut world) = (0, scene.clone());
         for (row, (&pose, &of_row)) in poses.iter().zip(&of_each).enumerate() {
             world[moving].pose = of_row;
             let wanted = attributes.into_iter().chain([Attribute::Range, Attribute::Beam]);
             let scan = world.scan(&sensor, pose).effects(effects.clone()).attributes(wanted);
-            let points = scan.seed(batch.seeds[row]).run().unwrap().points;
+            let points = scan.seed(batch.seeds[row]).start_s(0.5).run().unwrap().points;
             let [range_m, intensity, power] =
                 [&points.range_m, &points.intensity, &points.power].map(|column| column.as_ref());
             let mut expected = vec![(f32::INFINITY, f32::INFINITY, 0.0, 0.0); n];

@@ -242,3 +242,17 @@ pub(super) fn check_pose(key: impl Fn() -> String, pose: Pose) -> Result<(), Inv
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_pose_of_a_scan_is_that_when_it_begins() {
+        let poses = [0.0, 9.0].map(|time_s| (time_s, Pose::at([3.0 * time_s, 0.0, 0.0])));
+        let (scene, sensor) = (Scene::new(), Sensor::named("vlp16").unwrap());
+        let scan =
+            scene.scan(&sensor, Pose::IDENTITY).along(Trajectory::new(poses.into()).unwrap());
+        assert_eq!(scan.start_s(2.0).run().unwrap().points.pose.unwrap()[3], 6.0);
+    }
+}

@@ -93,14 +93,17 @@ fn a_run_leaves_a_model_and_a_folder() {
     // Classes in another order are those of their names.
     let mut turned = CLASSES.to_vec();
     turned.reverse();
-    let mut of_names = clouds(30);
+    let uneven = || clouds(30).split_off(1);
+    let mut of_names = uneven();
     of_names.iter_mut().for_each(|(_, label)| *label = CLASSES.len() - 1 - *label);
     write(&folder.path().join("turned.npz"), &of_names, &turned);
-    write(&folder.path().join("same.npz"), &clouds(30), &CLASSES);
+    write(&folder.path().join("same.npz"), &uneven(), &CLASSES);
     let [of_turned, of_same] = ["turned", "same"].map(|name| {
-        let ran = train(folder.path(), &format!("eval --model m.safetensors --data {name}.npz"));
+        let words = format!("eval --model m.safetensors --data {name}.npz --csv {name}.csv");
+        let ran = train(folder.path(), &words);
         assert!(!stderr(&ran).contains("is called"), "{}", stderr(&ran));
-        String::from_utf8_lossy(&ran.stdout).replace(name, "")
+        let csv = std::fs::read_to_string(folder.path().join(format!("{name}.csv"))).unwrap();
+        String::from_utf8_lossy(&ran.stdout).replace(name, "") + &csv
     });
     assert_eq!(of_turned, of_same);
 }

@@ -65,6 +65,21 @@ fn a_turn_about_the_up_axis_keeps_heights_and_radii() {
 }
 
 #[test]
+fn jitter_is_normal_up_to_its_clip() {
+    let clouds = crate::clouds(3);
+    let shaken = Augment { jitter: 0.01, jitter_clip: 0.015, ..plain().augment };
+    let recipe = Recipe { points: 32, augment: shaken, ..plain() };
+    let drawn = (0..100).flat_map(|epoch| augment::augment(&clouds, 0, (epoch, 0), &recipe).points);
+    let off = drawn.zip(clouds.set.cloud(0).iter().cycle());
+    let off: Vec<f32> = off.flat_map(|(a, b)| [0, 1, 2].map(|k| (a[k] - b[k]).abs())).collect();
+    // Coordinates below 1 are rounded to 6e-8, twice.
+    assert!(off.iter().all(|off| *off <= 0.015 + 2e-7));
+    // 0.1336 of 9600 normal numbers are beyond 1.5 of their deviations, with five of 0.0035.
+    let share = off.iter().filter(|off| **off > 0.015 - 2e-7).count() as f64 / off.len() as f64;
+    assert!((share - 0.1336).abs() < 5.0 * 0.0035, "{share}");
+}
+
+#[test]
 fn a_sensor_s_noise_is_along_its_rays() {
     let clouds = crate::clouds(3);
     let noisy = Augment { sensor_noise: 0.01, ..plain().augment };
@@ -129,11 +144,19 @@ fn a_ball_of_points_is_mixed_in() {
             assert_eq!(gone.len() as f32 / 32.0, share);
             assert_eq!(drawn.points.iter().filter(|p| !whole.contains(p)).count(), gone.len());
         }
-        // Some point is the centre of a ball that holds exactly what is gone.
+        // Some point is the centre of a ball that holds exactly what is gone, and of one that holds
+        // what has come, of its own cloud.
+        let come: Vec<_> = drawn.points.iter().filter(|p| !whole.contains(p)).collect();
+        let other = (1..6).find(|&i| come.iter().any(|p| clouds.set.cloud(i).contains(p)));
+        let (_, left): (Vec<_>, Vec<_>) =
+            clouds.set.cloud(other.unwrap_or(0)).iter().partition(|p| come.contains(p));
         let is_centre = |c: &[f32; 3]| {
             let far = |p: &[f32; 3]| (0..3).map(|k| (p[k] - c[k]).powi(2)).sum::<f32>();
-            let nearest = kept.iter().map(&far).fold(f32::MAX, f32::min);
-            gone.iter().all(|p| far(p) <= nearest)
+            let holds = |inner: &[&[f32; 3]], outer: &[&[f32; 3]]| {
+                let nearest = outer.iter().map(|p| far(p)).fold(f32::MAX, f32::min);
+                inner.iter().all(|p| far(p) <= nearest)
+            };
+            holds(&gone, &kept) && holds(&come, &left)
         };
         assert!(whole.iter().any(is_centre), "{epoch}");
     }

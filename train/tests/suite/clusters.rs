@@ -116,6 +116,22 @@ fn a_foot_is_cut_and_strays_are_added_as_the_recipe_says() {
     assert!(drawn.iter().all(|drawn| span(&drawn.points, 2).1 < 3.6));
 }
 
+/// The cluster begins 0.4 m above the ground, which is at 0.
+#[test]
+fn strips_of_ground_lie_on_the_ground_where_it_is_known() {
+    let mut clouds = one_cluster(100);
+    clouds.set.height_m = Some(vec![0.4]);
+    let clusters =
+        ClusterVariation { ground_share: 1.0, ground_reach: 1.0, ..ClusterVariation::default() };
+    let recipe = Recipe { clusters, sampling: Sampling::First, ..metric() };
+    for epoch in 0..20 {
+        let drawn = augment(&clouds, 0, (epoch, 0), &recipe).points;
+        let (cluster, strips) = drawn.split_at(100);
+        assert!((span(cluster, 2).0 - 0.4).abs() < 1e-6);
+        assert!(!strips.is_empty() && strips.iter().all(|point| point[2].abs() < 1e-6));
+    }
+}
+
 #[test]
 fn variations_are_refused_where_they_mean_nothing() {
     let clusters = ClusterVariation { cut: 0.1, ..ClusterVariation::default() };

@@ -55,3 +55,26 @@ impl BestCut {
         kept
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Nodes 0 and 1 make 2, which makes 4 with 3. A node of 1.1 times the worth of the best cut of its
+    /// parts, however deep that is, takes their place.
+    #[test]
+    fn the_cut_is_the_best_at_all_levels() {
+        let parents = [Some(2), Some(2), Some(4), Some(4), None];
+        for (worths, expected) in [
+            ([1.0, 1.0, 1.5, 1.0, 3.29], &[0, 1, 3][..]),
+            ([1.0, 1.0, 1.5, 1.0, 3.31], &[4]),
+            ([1.0, 1.0, 2.3, 1.0, 3.62], &[2, 3]),
+            ([1.0, 1.0, 2.3, 1.0, 3.64], &[4]),
+        ] {
+            let mut best = BestCut::default();
+            let mut found = best.find(&worths, |node| parents[node], 0.1).to_vec();
+            found.sort_unstable();
+            assert_eq!(found, expected, "{worths:?}");
+        }
+    }
+}

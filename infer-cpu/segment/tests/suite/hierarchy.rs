@@ -2,7 +2,7 @@
 
 use edgepuck_segment::{Label, Segmenter, Settings, Sweep};
 
-use crate::scanner::{Scan, VLP32C, block, flat, scan};
+use crate::scanner::{Scan, VLP32C, block, flat, ground, scan};
 
 /// Two cars 0.5 m apart, and two persons 0.3 m apart.
 fn street() -> Scan {
@@ -37,11 +37,27 @@ fn each_object_and_each_group_is_a_node() {
         for expected in [&[1][..], &[2], &[1, 2], &[3], &[4], &[3, 4]] {
             assert!(nodes.iter().any(|node| node == expected), "{expected:?}: {nodes:?}");
         }
-        // The ground is flat: 1.8 m below the sensor.
-        for node in hierarchy.nodes() {
-            let ground_z_m = node.ground_z_m.unwrap();
-            assert!((ground_z_m + 1.8).abs() < 0.05, "{ground_z_m}");
-        }
+    }
+}
+
+/// On a street of 8 degrees, 1.8 m below the sensor at x = 0.
+#[test]
+fn a_node_has_the_height_of_the_ground_under_its_middle() {
+    let slope = 8f64.to_radians().tan();
+    let on_street = |x: f64, y: f64| block([x, y], [1.0, 1.0], x * slope, 2.0);
+    let hill = ground(slope, 0.0, |_, _| true);
+    let scan = scan(&VLP32C, &[hill, on_street(12.0, 0.0), on_street(-7.0, 3.0)]);
+    let mut segmenter = Segmenter::new(Settings::default()).unwrap();
+    let sweep = Sweep { points: &scan.points, rings: Some(&scan.rings) };
+    let nodes = segmenter.hierarchy(&sweep).unwrap().nodes();
+    for (node, middle_x) in nodes.flat_map(|node| match surfaces(&scan, node.points)[..] {
+        [1] => Some((node, 11.5)),
+        [2] => Some((node, -6.75)),
+        _ => None,
+    }) {
+        // It is up to half a metre from the middle of what is seen of a box.
+        let off_m = f64::from(node.ground_z_m.unwrap()) - (slope * middle_x - 1.8);
+        assert!(off_m.abs() < 0.5 * slope + 0.05, "{off_m} at {middle_x}");
     }
 }
 

@@ -65,6 +65,15 @@ fn links_stand_where_the_joints_put_them() {
     assert_eq!((robot.parts.len(), &robot.parts[0].name[..]), (1, "lower"));
 }
 
+/// The slide follows the elbow, which follows the shoulder: 0.4 (0.5 q + 0.1) + 0.3.
+#[test]
+fn a_joint_follows_one_that_follows_another() {
+    let mimic = "<mimic joint=\"elbow\" multiplier=\"0.4\" offset=\"0.3\"/><limit lower=\"0\"";
+    let robot = read_at(&ARM.replace("<limit lower=\"0\"", mimic), &[("shoulder", 0.2)]).unwrap();
+    let [elbow, hand] = [2, 3].map(|part| robot.parts[part].world_from_mesh.translation);
+    assert!((hand.distance(elbow) - (1.0 + 0.38)).abs() < 1e-12, "{elbow} {hand}");
+}
+
 #[test]
 fn origins_turn_about_fixed_axes() {
     let text = r#"<robot><link name="a"><visual><origin rpy="0.1 -0.7 2"/><geometry><box size="1 1 1"/></geometry></visual></link></robot>"#;

@@ -250,6 +250,11 @@ fn splines_and_composed_motion_are_within_the_bound() {
     let spline: &[&[f32]] =
         &[&[0.0; 3], &[0.0; 3], &[6.0, 0.0, 0.0], &[0.0, -9.0, 0.0], &[1.0, 2.0, 0.0], &[0.0; 3]];
     let curve = place(&animated(NODE, &[(0, "translation", "CUBICSPLINE", &[1.0, 3.0], spline)]));
+    // A key before them, another after them.
+    let beside: &[&[f32]] = &[&[7.0; 3], &[7.0; 3], &[7.0; 3]];
+    let around = [beside, spline, beside].concat();
+    let times_s = &[0.0, 1.0, 3.0, 5.0];
+    let longer = place(&animated(NODE, &[(0, "translation", "CUBICSPLINE", times_s, &around)]));
     // A mirror above a turn: node 0 turns, node 1 goes up and turns on it, with the mesh 5 m beside.
     let nodes = r#"{"scale": [-2, 2, 2], "children": [1]}, {"children": [2]},
         {"children": [3]}, {"translation": [5, 0, 0], "mesh": 0}"#;
@@ -274,6 +279,7 @@ fn splines_and_composed_motion_are_within_the_bound() {
         );
         let found = curve(time_s).translation;
         assert!(found.distance(expected) < 1.01e-4, "{time_s}: {found} is not {expected}");
+        assert!(longer(time_s).translation.distance(expected) < 1.01e-4, "{time_s}");
         let turn = DAffine3::from_rotation_y((time_s - 1.0) * FRAC_PI_2);
         let expected = DAffine3::from_scale(DVec3::new(-2.0, 2.0, 2.0))
             * turn
