@@ -126,7 +126,8 @@ pub fn doubts(what: &str, poses: &[KeyedPose]) -> Vec<String> {
         x * x + y * y > 0.5
     };
     if 2 * poses.iter().filter(is_inverted).count() > poses.len() {
-        doubts.push(format!("{what} stands on its head: expected quaternions in the order x y z w"));
+        doubts
+            .push(format!("{what} stands on its head: expected quaternions in the order x y z w"));
     }
     doubts
 }

@@ -296,7 +296,7 @@ mod tests {
         stl[80] = 1;
         stl[100..104].copy_from_slice(&f32::NAN.to_le_bytes());
         let error = parse(&stl, MeshFormat::Stl).unwrap_err();
-        let start = "vertex 2 of 3: expected finite coordinates, found ";
+        let start = "face 1 of 1: expected finite coordinates, found ";
         assert!(error.to_string().starts_with(start), "{error}");
     }
 }

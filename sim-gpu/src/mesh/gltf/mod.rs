@@ -110,7 +110,9 @@ fn read(
     if reader.assembly.parts.is_empty() && file.meshes().len() > 0 {
         let found = match reader.numbers.iter().all(Option::is_none) {
             true => Some("meshes that no node of the scene has"),
-            false => reader.warnings.0.iter().any(|it| it == NO_SURFACE).then_some("points or lines"),
+            false => {
+                reader.warnings.0.iter().any(|it| it == NO_SURFACE).then_some("points or lines")
+            }
         };
         if let Some(found) = found {
             return Err(format!("expected at least one triangle, found only {found}"));
@@ -134,19 +136,15 @@ fn opened(bytes: &[u8]) -> Result<Gltf, String> {
     }
     // The crate knows fewer of them.
     json.extensions_required.clear();
-    if let Some(least) = json.asset.min_version.take() {
-        let number = |part: &str| part.parse::<u32>().ok();
-        let version = least.split_once('.').and_then(|(a, b)| number(a).zip(number(b)));
-        if version.is_none_or(|version| version > (2, 0)) {
-            return Err(format!(
-                "asset.minVersion: expected at most 2.0, found {least}: export it as glTF 2.0"
-            ));
-        }
+    let least = json.asset.min_version.take();
+    if let Some(found) = least.filter(|it| !["1.0", "1.1", "2.0"].contains(&&**it)) {
+        let expected = "asset.minVersion: expected at most 2.0";
+        return Err(format!("{expected}, found {found}: export it as glTF 2.0"));
     }
     // Positions need no bounds to be read, but the crate asks for them.
     for accessor in &mut json.accessors {
-        accessor.min.get_or_insert_default();
-        accessor.max.get_or_insert_default();
+        accessor.min.get_or_insert([0.0; 3].into());
+        accessor.max.get_or_insert([0.0; 3].into());
     }
     // The crate's own checks name the place in the JSON; they take this one for granted.
     let n = json.accessors.len();
