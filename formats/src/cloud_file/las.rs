@@ -65,25 +65,22 @@ fn read_header(reader: &mut impl Read) -> io::Result<(Header, u64)> {
     Ok((header, n_bytes.into()))
 }
 
-/// The bytes up to the end of the header that they state; of another file, those of the least header.
+/// The bytes up to the end of the header, whose size they state (LAS 1.4 R15, table 3).
 fn start(reader: &mut impl Read) -> io::Result<Vec<u8>> {
-    /// Where the size of the header lies, and the least (LAS 1.4 R15, table 3; LAS 1.2).
-    const SIZE: std::ops::Range<usize> = 94..96;
+    // The header of LAS 1.2 and before.
     const LEAST: usize = 227;
     let mut start = Vec::new();
-    let mut size = LEAST;
-    reader.take(size as u64).read_to_end(&mut start)?;
-    if start.len() == LEAST && start.starts_with(b"LASF") {
-        size = NumberType::U16.decode(&start[SIZE], ByteOrder::Little) as usize;
-        reader.take(size.saturating_sub(LEAST) as u64).read_to_end(&mut start)?;
+    reader.take(LEAST as u64).read_to_end(&mut start)?;
+    let stated = start.get(94..96).map_or(0.0, |it| NumberType::U16.decode(it, ByteOrder::Little));
+    let size = LEAST.max(stated as usize);
+    if start.len() == LEAST {
+        reader.take((size - LEAST) as u64).read_to_end(&mut start)?;
     }
-    match start.len() {
-        n if n < size && start.starts_with(b"LASF") => {
-            let cause = format!("the file ends after {n} of {size} bytes");
-            Err(io::Error::new(io::ErrorKind::UnexpectedEof, cause))
-        }
-        _ => Ok(start),
+    if start.starts_with(b"LASF") && start.len() < size {
+        let cause = format!("the file ends after {} of {size} bytes", start.len());
+        return Err(io::Error::new(io::ErrorKind::UnexpectedEof, cause));
     }
+    Ok(start)
 }
 
 /// Whether something may follow the points: waveforms or extended records (LAS 1.3, 1.4).

@@ -18,7 +18,13 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, ParseError> {
     let mut instead = std::collections::BTreeSet::new();
     let checked = read(bytes, |key, rest| {
         append_geometry(&mut geometry, key, rest);
-        instead.extend(without_surface(key));
+        instead.extend(match key {
+            b"l" => Some("lines"),
+            b"p" => Some("points"),
+            b"curv" | b"curv2" | b"surf" => Some("free-form curves and surfaces: export triangles"),
+            b"fo" => Some("faces by `fo`, which is obsolete: write `f`"),
+            _ => None,
+        });
         Ok(())
     })?;
     let options = LoadOptions { ignore_points: true, ignore_lines: true, ..LoadOptions::default() };
@@ -48,17 +54,6 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, ParseError> {
         return Err(Malformed::Syntax(cause).into());
     }
     Ok(parsed)
-}
-
-/// The kind of an element that is not read, by the first word of its line.
-fn without_surface(key: &[u8]) -> Option<&'static str> {
-    match key {
-        b"l" => Some("lines"),
-        b"p" => Some("points"),
-        b"curv" | b"curv2" | b"surf" => Some("free-form curves and surfaces: export triangles"),
-        b"fo" => Some("faces by `fo`, which is obsolete: write `f`"),
-        _ => None,
-    }
 }
 
 /// Appends a line of positions or of the positions of a face, as tobj reads them.

@@ -84,12 +84,12 @@ pub fn parse(
         return Err(fault(root, cause.to_owned()));
     }
     if builder.assembly.parts.is_empty() {
-        let (kind, other, way) = match import.collision {
-            true => ("collision", "visual", "do not ask for `collision`"),
-            false => ("visual", "collision", "`collision = true` takes it"),
+        let [kind, other] = match import.collision {
+            true => ["collision", "visual"],
+            false => ["visual", "collision"],
         };
         let found = match root.descendants().any(|node| node.has_tag_name(other)) {
-            true => format!("only {other} geometry: {way}"),
+            true => format!("only {other} geometry: `collision = {}` takes it", !import.collision),
             false => "none".to_owned(),
         };
         return Err(fault(root, format!("expected a link with {kind} geometry, found {found}")));

@@ -108,15 +108,11 @@ fn read(
         open[first..].reverse();
     }
     if reader.assembly.parts.is_empty() && file.meshes().len() > 0 {
-        let found = match reader.numbers.iter().all(Option::is_none) {
-            true => Some("meshes that no node of the scene has"),
-            false => {
-                reader.warnings.0.iter().any(|it| it == NO_SURFACE).then_some("points or lines")
-            }
+        let found = match reader.warnings.0.iter().any(|warning| warning == NO_SURFACE) {
+            true => "points or lines",
+            false => "meshes that are empty or in no node of the scene",
         };
-        if let Some(found) = found {
-            return Err(format!("expected at least one triangle, found only {found}"));
-        }
+        return Err(format!("expected at least one triangle, found only {found}"));
     }
     reader.assembly.warnings = reader.warnings.0;
     Ok(reader.assembly)

@@ -141,7 +141,7 @@ fn what_is_wrong_is_named_with_its_place() {
         ),
         (
             swap(r#""nodes": [{"mesh": 0}]"#, r#""nodes": [{}]"#),
-            "expected at least one triangle, found only meshes that no node of the scene has",
+            "expected at least one triangle, found only meshes that are empty or in no node of the scene",
         ),
         (
             glb(&good, &[&f32::NAN.to_le_bytes(), &buffer()[4..]].concat()),
