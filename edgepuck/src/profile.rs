@@ -108,7 +108,7 @@ fn described(sensor: &SensorProfile, pattern: &BeamPattern) -> String {
 }
 
 /// Numbers beyond those of the sensors on the market, which are probably in another unit: 5 to 100
-/// revolutions a second, 3 m of blindness, 3 cm of noise, 0.5 degrees of divergence, 1.5 cm of
+/// revolutions a second, 3 m of blindness, 10 km of range, 3 cm of noise, 0.5 degrees of divergence, 1.5 cm of
 /// quantum, 300 firings a revolution (SENSORS.md).
 fn slips(sensor: &SensorProfile, n_rays: usize) -> impl Iterator<Item = String> {
     let odd = |is_odd: bool, key: &str, found: f64, unit: &str| {
@@ -116,6 +116,7 @@ fn slips(sensor: &SensorProfile, n_rays: usize) -> impl Iterator<Item = String> 
     };
     let range = &sensor.range;
     let mut found = vec![odd(range.min_m > 30.0, "range.min_m", range.min_m, "metres")];
+    found.push(odd(range.max_m > 10_000.0, "range.max_m", range.max_m, "metres"));
     let quantum_m = range.quantum_m.unwrap_or_default();
     found.push(odd(quantum_m > 0.1, "range.quantum_m", quantum_m, "metres"));
     let sigma_m = sensor.noise.map_or(0.0, |noise| noise.typical_sigma_m);
@@ -133,6 +134,13 @@ fn slips(sensor: &SensorProfile, n_rays: usize) -> impl Iterator<Item = String> 
     {
         let cause = "uniform: the first and the last azimuth are the same direction";
         found.push(Some(cause.to_owned()));
+    }
+    if let Layout::Grid(grid) = &sensor.layout {
+        for (key, at, n) in [("cx", grid.cx, grid.width), ("cy", grid.cy, grid.height)] {
+            let most = f64::from(n) - 1.0;
+            let doubt = |at| format!("grid.{key} = {at}: the picture has pixels from 0 to {most}");
+            found.push(at.filter(|at| !(0.0..=most).contains(at)).map(doubt));
+        }
     }
     if let Layout::Rotating(head) = &sensor.layout {
         let quantum_deg = head.azimuth_quantum_deg.unwrap_or_default();

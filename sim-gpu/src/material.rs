@@ -224,6 +224,17 @@ impl Materials {
             named.push(materials.add(own, colour)?);
         }
         let from_vertices = choice.colours == Some(ColourSource::Vertices);
+        let missing = match choice.colours {
+            Some(ColourSource::Mtl) if appearance.names.is_empty() => Some("materials (usemtl)"),
+            Some(ColourSource::Vertices) if appearance.colours.iter().all(Option::is_none) => {
+                Some("colours of vertices (v x y z red green blue)")
+            }
+            _ => None,
+        };
+        materials.warnings.extend(missing.map(|missing| {
+            let all = otherwise.reflectivity;
+            format!("expected {missing}, found none: all faces have the reflectivity {all}")
+        }));
         for (triangle, material) in appearance.materials.iter().enumerate() {
             let paint = match material.map(|place| &named[place as usize]) {
                 Some(Named::Even(place)) => Paint::Even(*place),
@@ -517,6 +528,22 @@ mod tests {
             error.contains("/car.obj: vertex 1: expected three numbers within 0..=1"),
             "{error}"
         );
+    }
+
+    #[test]
+    fn colours_that_a_mesh_lacks_are_missed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.obj");
+        let warnings = |corner: &str, source| {
+            fs::write(&path, format!("v 0 0 0\nv 1 0 0\n{corner}\nf 1 2 3\n")).unwrap();
+            Materials::load(&path, &from(source), WHITE).unwrap().warnings
+        };
+        let white = "found none: all faces have the reflectivity 1";
+        let materials = format!("expected materials (usemtl), {white}");
+        assert_eq!(warnings("v 0 1 0 1 0 0", ColourSource::Mtl), [materials]);
+        let colours = format!("expected colours of vertices (v x y z red green blue), {white}");
+        assert_eq!(warnings("v 0 1 0", ColourSource::Vertices), [colours]);
+        assert!(warnings("v 0 1 0 1 0 0", ColourSource::Vertices).is_empty());
     }
 
     #[test]

@@ -51,6 +51,7 @@ fn a_profile_is_checked_and_what_looks_odd_of_it_is_said() {
          { azimuth_offset_deg = 0, elevation_deg = 10, firing_us = 0 }]\n",
             &[
                 "range.min_m = 500: is it in metres?",
+                "range.max_m = 50000: is it in metres?",
                 "range.quantum_m = 4: is it in metres?",
                 "noise.typical_sigma_m = 30: is it in metres?",
                 "footprint.divergence_deg = 3: is it in degrees?",
@@ -58,6 +59,12 @@ fn a_profile_is_checked_and_what_looks_odd_of_it_is_said() {
                 "rotating.sequence_us = 1000000: is it in microseconds?",
                 "a scan has only 6 rays",
             ],
+        ),
+        (
+            "camera.toml",
+            "name = \"camera\"\nrange = { min_m = 0.5, max_m = 5 }\n\
+         [grid]\nwidth = 640\nheight = 480\nfx = 500\nfy = 500\ncx = 5000\ncy = 239.5\n",
+            &["grid.cx = 5000: the picture has pixels from 0 to 639"],
         ),
     ];
     for (file, text, parts) in profiles {

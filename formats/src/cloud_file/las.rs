@@ -27,8 +27,8 @@ pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Cloud, Form
         FormatError::malformed(name, "header", "the points begin before the header ends")
     })?;
     records::skip(reader, gap).map_err(|error| error_in(name, "header", error))?;
+    let transforms = transforms(&header).map_err(|error| error_in(name, "header", error))?;
     let mut rows = Rows::new([Extra::Intensity(Unit::Las)]);
-    let transforms = transforms(&header);
     let size = usize::from(header.point_data_record_length);
     records::read(reader, size, n_points(&header), |record| {
         let [x, y, z] = [0, 1, 2].map(|axis| coordinate(transforms[axis], &record[4 * axis..]));
@@ -48,7 +48,8 @@ fn read_header(reader: &mut impl Read) -> io::Result<(Header, u64)> {
         las::Error::Io(error) => error,
         other => invalid(other),
     };
-    let header = Header::read_from(&mut *reader).map_err(wrong)?;
+    let start = start(reader)?;
+    let header = Header::read_from((&*start).chain(&mut *reader)).map_err(wrong)?;
     let format = Format::new(header.point_data_record_format).map_err(wrong)?;
     if format.is_compressed {
         return Err(invalid(COMPRESSED_LAS));
@@ -62,6 +63,24 @@ fn read_header(reader: &mut impl Read) -> io::Result<(Header, u64)> {
     }
     let n_bytes = header.header_size.max(header.version.header_size());
     Ok((header, n_bytes.into()))
+}
+
+/// The bytes up to the end of the header, whose size they state (LAS 1.4 R15, table 3).
+fn start(reader: &mut impl Read) -> io::Result<Vec<u8>> {
+    // The header of LAS 1.2 and before.
+    const LEAST: usize = 227;
+    let mut start = Vec::new();
+    reader.take(LEAST as u64).read_to_end(&mut start)?;
+    let stated = start.get(94..96).map_or(0.0, |it| NumberType::U16.decode(it, ByteOrder::Little));
+    let size = LEAST.max(stated as usize);
+    if start.len() == LEAST {
+        reader.take((size - LEAST) as u64).read_to_end(&mut start)?;
+    }
+    if start.starts_with(b"LASF") && start.len() < size {
+        let cause = format!("the file ends after {} of {size} bytes", start.len());
+        return Err(io::Error::new(io::ErrorKind::UnexpectedEof, cause));
+    }
+    Ok(start)
 }
 
 /// Whether something may follow the points: waveforms or extended records (LAS 1.3, 1.4).
@@ -79,12 +98,23 @@ fn n_points(header: &Header) -> u64 {
     }
 }
 
-fn transforms(header: &Header) -> [Transform; 3] {
-    [
+fn transforms(header: &Header) -> io::Result<[Transform; 3]> {
+    let transforms = [
         Transform { scale: header.x_scale_factor, offset: header.x_offset },
         Transform { scale: header.y_scale_factor, offset: header.y_offset },
         Transform { scale: header.z_scale_factor, offset: header.z_offset },
-    ]
+    ];
+    for (axis, Transform { scale, offset }) in ["x", "y", "z"].into_iter().zip(transforms) {
+        if scale == 0.0 || !scale.is_finite() {
+            let expected = "expected a finite number other than 0";
+            return Err(invalid(format!("scale of {axis}: {expected}, found {scale}")));
+        }
+        if !offset.is_finite() {
+            let expected = "expected a finite number";
+            return Err(invalid(format!("offset of {axis}: {expected}, found {offset}")));
+        }
+    }
+    Ok(transforms)
 }
 
 /// Every point format begins with x, y and z as i32, and the intensity as u16.

@@ -43,10 +43,11 @@ pub(super) fn read(reader: &mut impl BufRead, name: &Path) -> Result<Cloud, Form
     Ok(Cloud { pose: header.viewpoint.and_then(pose_of_viewpoint), ..rows.cloud() })
 }
 
-/// The pose of a VIEWPOINT, from the sensor's frame to that of the points; `None` if it is the identity, or its quaternion is 0.
+/// The pose of a VIEWPOINT, from the sensor's frame to that of the points; `None` if it is the identity.
+/// A quaternion of zeros is no rotation, as in PCL, whose matrix of it is the identity.
 fn pose_of_viewpoint([tx, ty, tz, w, x, y, z]: [f64; 7]) -> Option<[f64; 16]> {
     let square = w * w + x * x + y * y + z * z;
-    let s = 2.0 / square;
+    let s = if square > 0.0 { 2.0 / square } else { 0.0 };
     let pose = [
         [1.0 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y), tx],
         [s * (x * y + w * z), 1.0 - s * (x * x + z * z), s * (y * z - w * x), ty],

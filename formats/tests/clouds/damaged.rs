@@ -39,6 +39,9 @@ fn whole_files() -> Vec<(CloudFormat, Vec<u8>)> {
     let mut las = vec![0; 227 + 60];
     las[..4].copy_from_slice(b"LASF");
     (las[24], las[25], las[94], las[96], las[105], las[107]) = (1, 2, 227, 227, 20, 3);
+    for scale in [131, 139, 147] {
+        las[scale..scale + 8].copy_from_slice(&1.0f64.to_le_bytes());
+    }
     files.push((CloudFormat::Las, las));
     files
 }

@@ -9,6 +9,8 @@ const OFFSET_TO_POINTS: usize = 96;
 const POINT_FORMAT: usize = 104;
 const POINT_SIZE: usize = 105;
 const N_POINTS: usize = 107;
+const SCALES: usize = 131;
+const OFFSETS: usize = 155;
 const N_EVLRS: usize = 243;
 const N_POINTS_1_4: usize = 247;
 
@@ -68,6 +70,31 @@ fn what_is_no_cloud_is_refused() {
     assert_eq!(late, "header: unexpected end of file");
     let many = error("a.las", changed(whole(), N_POINTS, &[0xff; 4]));
     assert_eq!(many, "points: the file ends after 3 of 4294967295");
+}
+
+#[test]
+fn scales_and_offsets_that_place_no_point_are_refused() {
+    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+        let error = |at: usize, value: f64| {
+            error("a.las", changed(utm((1, 2), 1), at + 8 * axis, &value.to_le_bytes()))
+        };
+        for value in [0.0, f64::NAN, f64::INFINITY] {
+            let expected = "expected a finite number other than 0";
+            let expected = format!("header: scale of {name}: {expected}, found {value}");
+            assert_eq!(error(SCALES, value), expected);
+        }
+        let expected = format!("header: offset of {name}: expected a finite number, found NaN");
+        assert_eq!(error(OFFSETS, f64::NAN), expected);
+    }
+}
+
+#[test]
+fn a_file_that_ends_within_its_header_says_where() {
+    for (version, n, size) in [((1, 2), 100, 227), ((1, 4), 300, 375)] {
+        let whole = utm(version, 0);
+        let expected = format!("header: the file ends after {n} of {size} bytes");
+        assert_eq!(error("a.las", &whole[..n]), expected);
+    }
 }
 
 #[test]

@@ -1,5 +1,6 @@
 use super::{MANY, error, read};
 use formats::cloud_file::{CloudFormat, read_cloud, read_cloud_from};
+use std::path::Path;
 use test_support::{need, shared_data};
 
 const HEADER: &str = "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\n";
@@ -127,6 +128,11 @@ fn what_is_no_cloud_is_refused() {
         assert_eq!(refuse(header, b""), message);
     }
     let with = |rest: &str| format!("{xyz}{rest}");
+    // Without a rotation, as PCL reads a quaternion of zeros.
+    let still = pcd(&with("VIEWPOINT 1 2 3 0 0 0 0\nPOINTS 1\nDATA ascii\n"), b"1 2 3\n");
+    let pose = read_cloud_from(&*still, Some(CloudFormat::Pcd), Path::new("a")).unwrap().pose;
+    let expected = [1.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 2.0, 0.0, 0.0, 1.0, 3.0, 0.0, 0.0, 0.0, 1.0];
+    assert_eq!(pose, Some(expected));
     assert_eq!(refuse(&with("DATA ascii\n"), b""), "header: the line POINTS is missing");
     assert_eq!(
         refuse(&with("POINTS 1\nDATA zip\n"), b""),

@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use formats::FormatError;
-use formats::trajectory::{KeyedPose, check_cover, read_trajectory};
+use formats::trajectory::{KeyedPose, check_cover, doubts, read_trajectory};
 use glam::{DQuat, DVec3};
 
 /// The position and orientation of the sensor.
@@ -96,26 +96,14 @@ impl EgoMotion {
         if poses.len() == 1 {
             return vec!["there is one pose: the sensor is taken to stand still there".into()];
         }
-        let steps = || poses.windows(2).map(|pair| (pair[0].0, pair[1].0 - pair[0].0, pair));
-        let mut doubts = Vec::new();
-        let speeds = steps().map(|(at_s, dt_s, pair)| {
-            (pair[0].1.position_m.distance(pair[1].1.position_m) / dt_s, at_s)
+        let keyed = poses.iter().map(|(time_s, pose)| KeyedPose {
+            time_s: *time_s,
+            position_m: pose.position_m.into(),
+            quaternion_xyzw: pose.world_from_sensor.into(),
         });
-        if let Some((speed_m_s, at_s)) = speeds.max_by(|a, b| a.0.total_cmp(&b.0))
-            && speed_m_s > FASTEST_M_S
-        {
-            doubts.push(format!(
-                "the sensor moves at {speed_m_s:.0} m/s at {at_s} s: expected at most {FASTEST_M_S} \
-                 m/s; are the positions in metres and the times in seconds?"
-            ));
-        }
-        let is_inverted = |(_, pose): &&(f64, Pose)| (pose.world_from_sensor * DVec3::Z).z < 0.0;
-        if 2 * poses.iter().filter(is_inverted).count() > poses.len() {
-            doubts.push(
-                "the sensor stands on its head: expected quaternions in the order x y z w".into(),
-            );
-        }
-        if let Some((at_s, gap_s, _)) = steps().max_by(|a, b| a.1.total_cmp(&b.1))
+        let mut doubts = doubts("the sensor", &keyed.collect::<Vec<_>>());
+        let steps = poses.windows(2).map(|pair| (pair[0].0, pair[1].0 - pair[0].0));
+        if let Some((at_s, gap_s)) = steps.max_by(|a, b| a.1.total_cmp(&b.1))
             && gap_s > LONGEST_GAP_S
         {
             doubts.push(format!(
@@ -136,8 +124,6 @@ impl EgoMotion {
     }
 }
 
-/// Faster than cars, metres per second.
-const FASTEST_M_S: f64 = 100.0;
 /// Longer than the steps of odometry, GPS and SLAM, seconds.
 const LONGEST_GAP_S: f64 = 1.0;
 

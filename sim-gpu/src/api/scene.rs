@@ -52,6 +52,8 @@ pub struct Scene {
     /// Seed of all random numbers; 0 by default.
     pub seed: u64,
     instances: Vec<Instance>,
+    /// What is doubtful about the trajectories of its file.
+    pub(super) doubts: Vec<String>,
 }
 
 /// The handle of an [`Instance`] of a [`Scene`]: `scene[id]` is the instance.
@@ -124,6 +126,7 @@ impl Scene {
             attributes: attributes.into(),
             seed: 0,
             instances: Vec::new(),
+            doubts: Vec::new(),
         }
     }
 
@@ -166,10 +169,12 @@ impl Scene {
         &self.instances
     }
 
-    /// What is doubtful about the files of its meshes and materials: each line once, with the file.
+    /// What is doubtful about the files of its meshes and materials, each line once with the file, and
+    /// about the trajectories of its file.
     #[must_use]
     pub fn warnings(&self) -> Vec<&str> {
         let all = self.instances.iter().flat_map(|instance| instance.mesh.warnings());
+        let all = all.chain(&self.doubts);
         let mut told = HashSet::new();
         all.map(String::as_str).filter(|warning| told.insert(*warning)).collect()
     }

@@ -25,6 +25,12 @@ impl TryFrom<&SceneFile> for Scene {
         scene.effects.clone_from(&file.effects);
         scene.attributes.clone_from(&file.attributes);
         scene.sensors = file.sensors.iter().map(MountedSensor::from).collect();
+        let objects = file.objects.iter().map(|it| ("object", &it.name, &it.motion));
+        let sensors = file.sensors.iter().map(|it| ("sensor", &it.name, &it.motion));
+        for (kind, name, motion) in objects.chain(sensors) {
+            let doubts = motion.iter().flat_map(|it| it.doubts(&format!("{kind} {name:?}")));
+            scene.doubts.extend(doubts);
+        }
         for (i, object) in file.objects.iter().enumerate() {
             if let Some(import) = &object.import {
                 scene.add_object(object, import, &format!("object[{i}]"))?;

@@ -126,7 +126,10 @@ fn parse_as(bytes: &[u8], format: MeshFormat, folder: Option<&Path>) -> Result<P
         MeshFormat::Stl => stl::parse(bytes),
         MeshFormat::Glb | MeshFormat::Gltf => gltf::parse(text, folder),
     };
-    parsed.and_then(|parsed| check(&parsed.mesh).map(|()| parsed))
+    parsed.and_then(|mut parsed| {
+        parsed.mesh.settle_unused();
+        check(&parsed.mesh).map(|()| parsed)
+    })
 }
 
 /// The warning of meshes without area.
@@ -147,11 +150,7 @@ pub fn flat(mesh: &TriangleMesh) -> Option<String> {
 pub fn check(mesh: &TriangleMesh) -> Result<(), ParseError> {
     let n_vertices = mesh.vertices.len() as u64;
     Malformed::check_vertex_count(n_vertices)?;
-    if let Some(vertex) = mesh.vertices.iter().find(|vertex| !vertex.is_finite()) {
-        return Err(
-            Malformed::Syntax(format!("expected finite coordinates, found {vertex}")).into()
-        );
-    }
+    mesh.check_finite().map_err(Malformed::Syntax)?;
     let mut corners = mesh.triangles.iter().flatten();
     if let Some(index) = corners.find(|&&index| u64::from(index) >= n_vertices) {
         return Err(Malformed::IndexOutOfRange { found: index.to_string(), n_vertices }.into());
@@ -297,6 +296,7 @@ mod tests {
         stl[80] = 1;
         stl[100..104].copy_from_slice(&f32::NAN.to_le_bytes());
         let error = parse(&stl, MeshFormat::Stl).unwrap_err();
-        assert!(error.to_string().starts_with("expected finite coordinates, found "), "{error}");
+        let start = "face 1 of 1: expected finite coordinates, found ";
+        assert!(error.to_string().starts_with(start), "{error}");
     }
 }

@@ -15,8 +15,16 @@ use super::triangle_mesh::Parsed;
 /// first use.
 pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, ParseError> {
     let mut geometry = Vec::with_capacity(bytes.len());
+    let mut instead = std::collections::BTreeSet::new();
     let checked = read(bytes, |key, rest| {
         append_geometry(&mut geometry, key, rest);
+        instead.extend(match key {
+            b"l" => Some("lines"),
+            b"p" => Some("points"),
+            b"curv" | b"curv2" | b"surf" => Some("free-form curves and surfaces: export triangles"),
+            b"fo" => Some("faces by `fo`, which is obsolete: write `f`"),
+            _ => None,
+        });
         Ok(())
     })?;
     let options = LoadOptions { ignore_points: true, ignore_lines: true, ..LoadOptions::default() };
@@ -40,6 +48,11 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, ParseError> {
         }
     }
     parsed.dropped_faces = checked.dropped_faces;
+    if parsed.mesh.triangles.is_empty() && !instead.is_empty() {
+        let found = Vec::from_iter(instead).join(", ");
+        let cause = format!("expected at least one triangle, found only {found}");
+        return Err(Malformed::Syntax(cause).into());
+    }
     Ok(parsed)
 }
 
@@ -200,6 +213,19 @@ mod tests {
         let parsed = parse(text.as_bytes()).unwrap();
         assert_eq!(parsed.mesh.triangles, [[0, 1, 2], [0, 2, 3], [0, 3, 4]]);
         assert_eq!(parsed.dropped_faces, 2);
+    }
+
+    #[test]
+    fn what_a_file_has_in_place_of_triangles_is_named() {
+        for (lines, found) in [
+            ("p 1\nl 1 2\nl 2 3\n", "lines, points"),
+            ("fo 1 2 3\n", "faces by `fo`, which is obsolete: write `f`"),
+            ("surf 0 1 0 1 1 2 3 3\n", "free-form curves and surfaces: export triangles"),
+        ] {
+            let error = parse(format!("{CORNERS}{lines}").as_bytes()).unwrap_err().to_string();
+            assert_eq!(error, format!("expected at least one triangle, found only {found}"));
+            is_the_triangle(parse, format!("{CORNERS}{lines}f 1 2 3\n"));
+        }
     }
 
     #[test]

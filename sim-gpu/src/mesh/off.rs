@@ -3,8 +3,7 @@
 //! Source: the Geomview manual, section "OFF: Object File Format". ModelNet40 needs deviations: the
 //! keyword may be glued to the counts (`OFF490 518 0`, 2,862 of its 12,311 files). Comments, blank
 //! lines and any of the three line ends may occur anywhere; the number of edges may be missing. The
-//! rest of each line (colours, normals, texture coordinates) is ignored, and so is everything after
-//! the last face.
+//! rest of each line (colours, normals, texture coordinates) is ignored.
 
 use glam::DVec3;
 
@@ -42,6 +41,11 @@ fn read(tokens: &mut Tokens<'_>) -> Result<Parsed, Malformed> {
         }
         read_corners(tokens, n_vertices, &mut corners)?;
         parsed.add_face(&corners);
+    }
+    if tokens.next_data_line() {
+        parsed.warnings.push(format!(
+            "expected {n_faces} faces by the header, found more lines: they are not read"
+        ));
     }
     Ok(parsed)
 }
@@ -129,7 +133,18 @@ mod tests {
         is_the_triangle(parse, text.replace('\n', "\n\n  \n"));
         is_the_triangle(parse, text.replace('\n', " # 4 5 6\n# 7\n"));
         is_the_triangle(parse, text.trim_end());
-        is_the_triangle(parse, format!("{text}\n# the end\n17 trailing tokens\n"));
+        is_the_triangle(parse, format!("{text}\n# the end\n\n  \n"));
+    }
+
+    #[test]
+    fn more_lines_than_the_header_promises_are_told() {
+        let text = format!("OFF\n3 1 0\n{TRIANGLE}# another\n3 2 1 0\n");
+        let parsed = parse(text.as_bytes()).unwrap();
+        let warning = "expected 1 faces by the header, found more lines: they are not read";
+        assert_eq!(
+            (parsed.mesh.triangles.len(), &parsed.warnings[..]),
+            (1, &[warning.to_owned()][..])
+        );
     }
 
     #[test]

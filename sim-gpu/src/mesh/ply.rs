@@ -41,30 +41,39 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, ParseError> {
         Ok(places)
     };
     let mut parsed = Parsed::default();
-    let (mut corners, mut bad_index) = (Vec::new(), None);
-    let mut corner = |index: f64| {
+    let mut corners = Vec::new();
+    // The first that is no index, and the largest so far: vertices may come last.
+    let (mut bad_index, mut largest) = (None, (-1.0, [0; 2]));
+    let mut corner = |index: f64, place: [usize; 2]| {
         let corner = index as u32;
         if f64::from(corner) != index {
-            bad_index.get_or_insert(index);
+            bad_index.get_or_insert((index, place));
+        } else if index > largest.0 {
+            largest = (index, place);
         }
         corner
     };
+    let mut n_rows = [0; KINDS.len()];
     let name = Path::new("");
     let bytes = with_line_feeds(bytes);
-    read_elements(&mut &*bytes, name, &KINDS, choose, |kind, row| match kind {
-        VERTEX => parsed.mesh.vertices.push(DVec3::from_slice(row)),
-        FACE => {
-            corners.clear();
-            corners.extend(row.iter().map(|index| corner(*index)));
-            parsed.add_face(&corners);
-        }
-        _ => {
-            for strip in row.split(|index| *index == -1.0) {
-                for (number, indices) in strip.windows(3).enumerate() {
-                    let mut triangle = [0, 1, 2].map(|place| corner(indices[place]));
-                    // Every other triangle of a strip is turned over.
-                    triangle.swap(0, number % 2);
-                    parsed.add_face(&triangle);
+    read_elements(&mut &*bytes, name, &KINDS, choose, |kind, row| {
+        n_rows[kind] += 1;
+        let mut corner = |index: &f64| corner(*index, [kind, n_rows[kind]]);
+        match kind {
+            VERTEX => parsed.mesh.vertices.push(DVec3::from_slice(row)),
+            FACE => {
+                corners.clear();
+                corners.extend(row.iter().map(corner));
+                parsed.add_face(&corners);
+            }
+            _ => {
+                for strip in row.split(|index| *index == -1.0) {
+                    for (number, indices) in strip.windows(3).enumerate() {
+                        let mut triangle = [0, 1, 2].map(|place| corner(&indices[place]));
+                        // Every other triangle of a strip is turned over.
+                        triangle.swap(0, number % 2);
+                        parsed.add_face(&triangle);
+                    }
                 }
             }
         }
@@ -81,9 +90,11 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, ParseError> {
         }
     }
     let n_vertices = parsed.mesh.vertices.len() as u64;
-    match bad_index {
-        Some(index) => {
-            Err(Malformed::IndexOutOfRange { found: index.to_string(), n_vertices }.into())
+    match bad_index.or((largest.0 >= n_vertices as f64).then_some(largest)) {
+        Some((index, [kind, number])) => {
+            let cause = Malformed::IndexOutOfRange { found: index.to_string(), n_vertices };
+            let (kind, n) = (KINDS[kind], n_rows[kind]);
+            Err(Malformed::Syntax(format!("{kind} {number} of {n}: {cause}")).into())
         }
         None => Ok(parsed),
     }
@@ -197,7 +208,7 @@ mod tests {
         let alone = text.replace("element face 0\nproperty list uchar int vertex_indices\n", "");
         assert_eq!(parse(alone.as_bytes()).unwrap().mesh.triangles, expected);
         let bad = text.replace("3 3 2 0", "3 3 2 -2");
-        fails(parse, [(bad, "index -2 is out of range: there are 4 vertices")]);
+        fails(parse, [(bad, "tristrips 2 of 2: index -2 is out of range: there are 4 vertices")]);
         let cloud = "expected an element called face or tristrips, found a cloud of points";
         fails(parse, [(alone.replace("tristrips", "strips"), cloud)]);
     }
@@ -235,6 +246,18 @@ mod tests {
     }
 
     #[test]
+    fn a_vertex_that_is_not_finite_is_a_fault_only_if_a_face_uses_it() {
+        let text = header("ascii", "float", 4, 1) + "nan 0 inf\n2 0 0\n3 0 0\n2 1 0\n3 1 2 3\n";
+        let mesh = parse_any(text.as_bytes(), MeshFormat::Ply).unwrap().mesh;
+        // It has no part in the bounding box.
+        assert_eq!(mesh.vertices[0], DVec3::new(2.0, 0.0, 0.0));
+        assert_eq!(mesh.triangles, [[1, 2, 3]]);
+        let used = text.replace("3 1 2 3", "3 1 2 0");
+        let error = parse_any(used.as_bytes(), MeshFormat::Ply).unwrap_err().to_string();
+        assert!(error.starts_with("vertex 1 of 4: expected finite coordinates, found "), "{error}");
+    }
+
+    #[test]
     fn errors_name_their_cause_and_in_text_their_line() {
         let start = "line 1: expected a PLY file, found \"plx \"";
         let no_vertex = "ply\nformat ascii 1.0\nend_header\n";
@@ -254,15 +277,11 @@ mod tests {
         ];
         fails(parse, cases);
         let bad_faces = [
-            ("3 0 1 -1", "index -1 is out of range: there are 3 vertices"),
-            ("3 0 1 0.5", "index 0.5 is out of range: there are 3 vertices"),
+            ("3 0 1 -1", "face 1 of 1: index -1 is out of range: there are 3 vertices"),
+            ("3 0 1 0.5", "face 1 of 1: index 0.5 is out of range: there are 3 vertices"),
+            ("3 0 1 3", "face 1 of 1: index 3 is out of range: there are 3 vertices"),
         ];
         let with = |face: &str| header.clone() + &BODY.replace("3 0 1 2", face);
         fails(parse, bad_faces.map(|(face, message)| (with(face), message)));
-        let parsed = parse_any(with("3 0 1 3").as_bytes(), MeshFormat::Ply);
-        assert_eq!(
-            parsed.unwrap_err().to_string(),
-            "index 3 is out of range: there are 3 vertices"
-        );
     }
 }

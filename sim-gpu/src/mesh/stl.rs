@@ -55,10 +55,16 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, ParseError> {
         }
         corners.parsed.warnings.push(format!("{found}, of which the first {promised} are read"));
     }
-    for triangle in &triangles[..promised as usize] {
+    for (face, triangle) in (1..).zip(&triangles[..promised as usize]) {
         let (numbers, _) = triangle.as_chunks::<4>();
         let (positions, _) = numbers[3..].as_chunks::<3>();
-        positions.iter().for_each(|position| corners.push(position.map(f32::from_le_bytes)));
+        for position in positions.iter().map(|position| position.map(f32::from_le_bytes)) {
+            if position.iter().any(|number| !number.is_finite()) {
+                let expected = format!("face {face} of {promised}: expected finite coordinates");
+                return Err(Malformed::Syntax(format!("{expected}, found {position:?}")).into());
+            }
+            corners.push(position);
+        }
     }
     Ok(corners.parsed)
 }

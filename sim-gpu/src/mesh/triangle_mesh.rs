@@ -14,6 +14,37 @@ pub struct TriangleMesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
+impl TriangleMesh {
+    /// Moves vertices that are not finite and that no triangle uses to one that is used: the bounding
+    /// box is that of the triangles, and all indices stay.
+    pub(super) fn settle_unused(&mut self) {
+        if self.vertices.iter().all(|vertex| vertex.is_finite()) {
+            return;
+        }
+        let mut is_used = vec![false; self.vertices.len()];
+        for corner in self.triangles.iter().flatten() {
+            is_used.get_mut(*corner as usize).into_iter().for_each(|used| *used = true);
+        }
+        let Some(first) = is_used.iter().position(|used| *used) else { return };
+        let place = self.vertices[first];
+        for (vertex, is_used) in self.vertices.iter_mut().zip(is_used) {
+            if !is_used && !vertex.is_finite() {
+                *vertex = place;
+            }
+        }
+    }
+
+    /// The error of the first vertex that is not finite.
+    pub(super) fn check_finite(&self) -> Result<(), String> {
+        let n = self.vertices.len();
+        let number = self.vertices.iter().position(|vertex| !vertex.is_finite());
+        number.map_or(Ok(()), |at| {
+            let found = self.vertices[at];
+            Err(format!("vertex {} of {n}: expected finite coordinates, found {found}", at + 1))
+        })
+    }
+}
+
 /// The result of parsing a mesh file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Parsed {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use formats::FormatError;
-use formats::trajectory::{KeyedPose, read_trajectory};
+use formats::trajectory::{KeyedPose, doubts, read_trajectory};
 use glam::DQuat;
 
 use super::Pose;
@@ -78,6 +78,16 @@ impl Trajectory {
             before = pose;
         }
         (far_m, turned_rad)
+    }
+
+    /// As [`doubts`] says of the poses of `what`.
+    pub(crate) fn doubts(&self, what: &str) -> Vec<String> {
+        let keyed = self.0.iter().map(|(time_s, pose)| KeyedPose {
+            time_s: *time_s,
+            position_m: pose.position_m.into(),
+            quaternion_xyzw: pose.rotation.into(),
+        });
+        doubts(what, &keyed.collect::<Vec<_>>())
     }
 
     /// The times of the first and the last pose, seconds.

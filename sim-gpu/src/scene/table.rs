@@ -94,7 +94,8 @@ pub(super) struct SensorTable {
     /// The name of a built-in sensor, or the path of a sensor's file from the scene's.
     profile: String,
     name: Option<String>,
-    /// The sensor's position, metres; required without a trajectory.
+    /// The sensor's position, metres. Without a trajectory it is required, and so is an orientation:
+    /// `look_at_m`, angles or `quaternion_xyzw`.
     position_m: Option<[f64; 3]>,
     look_at_m: Option<[f64; 3]>,
     yaw_deg: Option<f64>,

@@ -14,7 +14,7 @@ use crate::config::{ConfigError, InvalidValue, positive, within};
 #[serde(deny_unknown_fields)]
 pub struct Table {
     /// A CSV file, relative to the profile, with the columns `azimuth_deg` and `elevation_deg`, or
-    /// with Livox's `Azimuth/deg` and `Zenith/deg`; other columns are ignored. Loading a sensor
+    /// with Livox's `Azimuth/deg` and `Zenith/deg`, each once; other columns are ignored. Loading a sensor
     /// moves the rows to `directions_deg`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub file: Option<PathBuf>,
@@ -139,14 +139,26 @@ fn read(file: &Path) -> Result<Vec<[f64; 2]>, ConfigError> {
     let line_of = |error: &csv::Error| error.position().map_or(0, csv::Position::line);
     let heading =
         csv.headers().map_err(|error| failed(line_of(&error), error.to_string()))?.clone();
-    let column =
-        |name: &str| heading.iter().position(|found| found.to_ascii_lowercase().starts_with(name));
+    // The whole name, because it has the unit: `azimuth_rad` is another one.
+    let column = |name: &str| -> Result<Option<usize>, ConfigError> {
+        let is_it = |found: &str| {
+            let found = found.to_ascii_lowercase();
+            matches!(found.strip_prefix(name), Some("_deg" | "/deg"))
+        };
+        let mut places = (0..heading.len()).filter(|&at| is_it(&heading[at]));
+        match (places.next(), places.next()) {
+            (Some(_), Some(again)) => {
+                Err(failed(1, format!("expected one column {}, found another", &heading[again])))
+            }
+            (place, _) => Ok(place),
+        }
+    };
     let missing = |name: &str| {
         let found = heading.iter().collect::<Vec<_>>().join(",");
         failed(1, format!("expected a column {name} between commas, found \"{found}\""))
     };
-    let azimuth = column("azimuth").ok_or_else(|| missing("azimuth_deg"))?;
-    let (upright, is_zenith) = match (column("elevation"), column("zenith")) {
+    let azimuth = column("azimuth")?.ok_or_else(|| missing("azimuth_deg"))?;
+    let (upright, is_zenith) = match (column("elevation")?, column("zenith")?) {
         (Some(column), _) => (column, false),
         (None, Some(column)) => (column, true),
         (None, None) => return Err(missing("elevation_deg")),

@@ -139,10 +139,8 @@ fn located(name: &str, robot: &Path) -> Result<PathBuf, String> {
     });
     let found = folders.find(|folder| folder.is_dir());
     let missing = || {
-        format!(
-            "expected a folder {package} around {} or in ROS_PACKAGE_PATH, found none",
-            folder.display()
-        )
+        let folder = absolute.parent().unwrap_or(folder).display();
+        format!("expected a folder {package} around {folder} or in ROS_PACKAGE_PATH, found none")
     };
     Ok(found.ok_or_else(missing)?.join(rest))
 }

@@ -10,7 +10,7 @@ use std::path::Path;
 
 use formats::foreign::foreign;
 use glam::DAffine3;
-use roxmltree::Document;
+use roxmltree::{Document, Node};
 
 use super::Import;
 use crate::mesh::{Assembly, Malformed, MeshError, ParseError, read};
@@ -54,6 +54,14 @@ pub fn parse(
         let found = root.tag_name().name();
         return Err(fault(root, format!("expected the element robot, found {found}")));
     }
+    let is_xacro = |node: &Node<'_, '_>| {
+        node.tag_name().namespace().is_some_and(|space| space.contains("xacro"))
+    };
+    if let Some(node) = root.descendants().find(is_xacro) {
+        let name = node.tag_name().name();
+        let cause = format!("expected URDF, found xacro:{name}: run `xacro` on the file first");
+        return Err(fault(node, cause));
+    }
     let robot = Robot::new(root)?;
     let mut builder = Builder::of(path);
     let positions = robot.positions(import, &mut builder.assembly.warnings)?;
@@ -76,8 +84,15 @@ pub fn parse(
         return Err(fault(root, cause.to_owned()));
     }
     if builder.assembly.parts.is_empty() {
-        let kind = if import.collision { "collision" } else { "visual" };
-        return Err(fault(root, format!("expected a link with {kind} geometry, found none")));
+        let [kind, other] = match import.collision {
+            true => ["collision", "visual"],
+            false => ["visual", "collision"],
+        };
+        let found = match root.descendants().any(|node| node.has_tag_name(other)) {
+            true => format!("only {other} geometry: `collision = {}` takes it", !import.collision),
+            false => "none".to_owned(),
+        };
+        return Err(fault(root, format!("expected a link with {kind} geometry, found {found}")));
     }
     Ok(builder.assembly)
 }

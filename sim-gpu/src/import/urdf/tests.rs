@@ -147,6 +147,14 @@ fn what_is_wrong_is_named_with_its_line() {
         ("<a/>".to_owned(), "line 1: expected the element robot, found a"),
         ("<robot/>".to_owned(), "line 1: expected one link without a joint above, found none"),
         ("<robot><link name=\"a\"/></robot>".to_owned(), "expected a link with visual geometry"),
+        (
+            "<robot><link name=\"a\"><collision><geometry><box size=\"1 1 1\"/></geometry></collision></link></robot>".to_owned(),
+            "expected a link with visual geometry, found only collision geometry: `collision = true` takes it",
+        ),
+        (
+            "<robot xmlns:x=\"http://www.ros.org/wiki/xacro\">\n<x:macro name=\"a\"/></robot>".to_owned(),
+            "line 2: expected URDF, found xacro:macro: run `xacro` on the file first",
+        ),
         (swap("</link>", ""), "line 25: expected URDF, which is XML: expected 'link' tag"),
         (
             swap(" type=\"revolute\"", ""),

@@ -45,7 +45,9 @@ impl<'a> Buffers<'a> {
             ));
         }
         let (Some(view), None) = (accessor.view(), accessor.sparse()) else {
-            return Err(format!("{place}: expected a buffer view, found sparse or no numbers"));
+            return Err(format!(
+                "{place}: expected a buffer view, found sparse or no numbers: export it without sparse accessors"
+            ));
         };
         let kind = accessor.data_type();
         let (size, width) = (kind.size(), dimensions.multiplicity());

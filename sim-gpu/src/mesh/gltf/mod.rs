@@ -23,10 +23,23 @@ use super::triangle_mesh::{Parsed, TriangleMesh};
 use animation::{Animation, Rest};
 use buffers::{Buffers, MOST_ELEMENTS, is_index};
 
-/// Extensions that change where triangles are, and are not read.
-const NOT_READ: [&str; 3] = ["KHR_draco_mesh_compression", "EXT_meshopt_compression", INSTANCING];
+/// The beginnings of the names of extensions that a file may require: they are read, or change no
+/// triangle's place.
+const ALLOWED: [&str; 8] = [
+    "KHR_mesh_quantization",
+    "KHR_materials_",
+    "KHR_texture_",
+    "EXT_texture_",
+    "MSFT_texture_",
+    "KHR_lights_",
+    "EXT_lights_",
+    "KHR_xmp",
+];
 /// Without it, the file has one of many instances, even where it is not required.
 const INSTANCING: &str = "EXT_mesh_gpu_instancing";
+
+/// The warning of points and lines.
+const NO_SURFACE: &str = "points and lines are left out, since no beam hits them";
 
 /// All nodes at rest as one mesh. Buffers in other files are in `folder`.
 pub(super) fn parse(bytes: &[u8], folder: Option<&Path>) -> Result<Parsed, ParseError> {
@@ -94,6 +107,13 @@ fn read(
         open.extend(node.children().map(|child| (child, mover, own)));
         open[first..].reverse();
     }
+    if reader.assembly.parts.is_empty() && file.meshes().len() > 0 {
+        let found = match reader.warnings.0.iter().any(|warning| warning == NO_SURFACE) {
+            true => "points or lines",
+            false => "meshes that are empty or in no node of the scene",
+        };
+        return Err(format!("expected at least one triangle, found only {found}"));
+    }
     reader.assembly.warnings = reader.warnings.0;
     Ok(reader.assembly)
 }
@@ -104,13 +124,24 @@ fn opened(bytes: &[u8]) -> Result<Gltf, String> {
     let Gltf { document, blob } = Gltf::from_slice_without_validation(bytes)
         .map_err(|error| format!("expected glTF 2.0: {error}"))?;
     let mut json = document.into_json();
-    let required = json.extensions_required.iter().filter(|name| NOT_READ.contains(&&***name));
+    let is_allowed = |name: &str| ALLOWED.iter().any(|start| name.starts_with(start));
+    let required = json.extensions_required.iter().filter(|name| !is_allowed(name));
     let used = json.extensions_used.iter().filter(|name| **name == INSTANCING);
     if let Some(extension) = required.chain(used).next() {
         return Err(format!("expected a file without {extension}: export it without"));
     }
-    // Others are of materials and textures.
+    // The crate knows fewer of them.
     json.extensions_required.clear();
+    let least = json.asset.min_version.take();
+    if let Some(found) = least.filter(|it| !["1.0", "1.1", "2.0"].contains(&&**it)) {
+        let expected = "asset.minVersion: expected at most 2.0";
+        return Err(format!("{expected}, found {found}: export it as glTF 2.0"));
+    }
+    // Positions need no bounds to be read, but the crate asks for them.
+    for accessor in &mut json.accessors {
+        accessor.min.get_or_insert([0.0; 3].into());
+        accessor.max.get_or_insert([0.0; 3].into());
+    }
     // The crate's own checks name the place in the JSON; they take this one for granted.
     let n = json.accessors.len();
     for (i, mesh) in json.meshes.iter().enumerate() {
@@ -126,11 +157,16 @@ fn opened(bytes: &[u8]) -> Result<Gltf, String> {
 /// The crate subtracts the header from the length that the header of a binary file tells.
 fn check_length(bytes: &[u8]) -> Result<(), String> {
     const HEADER: u32 = 12;
-    let [b'g', b'l', b'T', b'F', _, _, _, _, length @ ..] = bytes else { return Ok(()) };
-    match length.first_chunk().map(|length| u32::from_le_bytes(*length)) {
-        Some(length) if length < HEADER => {
+    if !bytes.starts_with(b"glTF") {
+        return Ok(());
+    }
+    let length = bytes.get(8..).and_then(<[u8]>::first_chunk).copied();
+    let (n, length) = (bytes.len(), length.map_or(HEADER, u32::from_le_bytes));
+    match length {
+        ..HEADER => {
             Err(format!("expected a length of {HEADER} or more in the header, found {length}"))
         }
+        _ if n < length as usize => Err(format!("the file ends after {n} of {length} bytes")),
         _ => Ok(()),
     }
 }
@@ -214,12 +250,9 @@ impl Reader<'_> {
                         format!("meshes[{mesh}].primitives[{primitive}]: {cause}")
                     })?;
                 }
-                if let Some(vertex) = read.mesh.vertices.iter().find(|vertex| !vertex.is_finite()) {
-                    let mesh = mesh.index();
-                    return Err(format!(
-                        "meshes[{mesh}]: expected finite coordinates, found {vertex}"
-                    ));
-                }
+                read.mesh.settle_unused();
+                let checked = read.mesh.check_finite();
+                checked.map_err(|cause| format!("meshes[{}]: {cause}", mesh.index()))?;
                 self.assembly.meshes.push(read);
                 self.assembly.meshes.len() - 1
             }
@@ -258,7 +291,7 @@ impl Reader<'_> {
     ) -> Result<(), String> {
         let mode = primitive.mode();
         if matches!(mode, Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip) {
-            self.warnings.add("points and lines are left out, since no beam hits them");
+            self.warnings.add(NO_SURFACE);
             return Ok(());
         }
         let positions = primitive.get(&gltf::Semantic::Positions);

@@ -73,8 +73,6 @@ fn an_instance_is_the_same_mesh_again_and_strips_and_fans_are_triangles() {
     let mirrored = r#"{"mesh": 0, "scale": [-1, 1, 1]}"#;
     let parsed = parse(&glb(&json(mirrored, 4, 3), &buffer()), None).unwrap();
     assert_eq!(parsed.mesh.triangles, [[0, 2, 1]]);
-    let lines = parse(&glb(&json(NODE, 1, 4), &buffer()), None).unwrap();
-    assert!(lines.mesh.triangles.is_empty() && lines.warnings[0].starts_with("points and lines"));
 }
 
 #[test]
@@ -128,6 +126,28 @@ fn what_is_wrong_is_named_with_its_place() {
             "expected a file without KHR_draco_mesh_compression",
         ),
         (
+            swap(r#""asset""#, r#""extensionsRequired": ["ACME_geo"], "asset""#),
+            "expected a file without ACME_geo: export it without",
+        ),
+        (
+            swap(r#"{"version": "2.0"}"#, r#"{"version": "2.0", "minVersion": "2.1"}"#),
+            "asset.minVersion: expected at most 2.0, found 2.1: export it as glTF 2.0",
+        ),
+        (glb(&good, &buffer())[..99].to_vec(), "the file ends after 99 of 700 bytes"),
+        (b"glTF\x02\0\0\0".to_vec(), "the file ends after 8 of 12 bytes"),
+        (
+            glb(&json(NODE, 1, 4), &buffer()),
+            "expected at least one triangle, found only points or lines",
+        ),
+        (
+            swap(r#""nodes": [{"mesh": 0}]"#, r#""nodes": [{}]"#),
+            "expected at least one triangle, found only meshes that are empty or in no node of the scene",
+        ),
+        (
+            glb(&good, &[&f32::NAN.to_le_bytes(), &buffer()[4..]].concat()),
+            "meshes[0]: vertex 1 of 4: expected finite coordinates, found ",
+        ),
+        (
             glb(&json(r#"{"mesh": 0, "children": [0]}"#, 4, 3), &buffer()),
             "nodes[0]: expected one parent",
         ),
@@ -139,6 +159,23 @@ fn what_is_wrong_is_named_with_its_place() {
         let error = parse(&bytes, None).unwrap_err().to_string();
         assert!(error.contains(expected), "{expected}: {error}");
     }
+}
+
+#[test]
+fn what_reading_does_not_need_may_be_missing_or_unknown() {
+    let good = json(NODE, 4, 3);
+    let read = |from: &str, to: &str| {
+        let changed = good.replace(from, to);
+        assert_ne!(changed, good);
+        parse(&glb(&changed, &buffer()), None).unwrap()
+    };
+    let expected = parse(&glb(&good, &buffer()), None).unwrap();
+    assert_eq!(read(r#""min": [0, 0, 0], "max": [1, 1, 0]"#, r#""name": "a""#), expected);
+    let required = r#""extensionsRequired": ["KHR_materials_unlit"], "asset""#;
+    assert_eq!(read(r#""asset""#, required), expected);
+    // The last vertex is of no triangle.
+    let bytes = [&buffer()[..36], &f32::NAN.to_le_bytes(), &buffer()[40..]].concat();
+    assert_eq!(parse(&glb(&good, &bytes), None).unwrap().mesh.vertices[3], DVec3::ZERO);
 }
 
 /// What animates a node: its number, the path, the interpolation, times and values.

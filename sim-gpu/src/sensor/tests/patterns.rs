@@ -344,7 +344,19 @@ fn a_table_that_cannot_be_used_is_named_with_its_line() {
     for (rows, expected) in [
         (
             "azimuth_deg;elevation_deg\n1;2\n",
-            "line 1: expected a column elevation_deg between commas, found \"azimuth_deg;elevation_deg\"",
+            "line 1: expected a column azimuth_deg between commas, found \"azimuth_deg;elevation_deg\"",
+        ),
+        (
+            "azimuth_rad,elevation_rad\n1,1\n",
+            "expected a column azimuth_deg between commas, found \"azimuth_rad,elevation_rad\"",
+        ),
+        (
+            "azimuth_deg,elevation_mrad\n1,1\n",
+            "expected a column elevation_deg between commas, found \"azimuth_deg,elevation_mrad\"",
+        ),
+        (
+            "azimuth_deg,elevation_deg,Azimuth/deg\n1,1,2\n",
+            "line 1: expected one column Azimuth/deg, found another",
         ),
         (
             "a,b\n1,2\n",
