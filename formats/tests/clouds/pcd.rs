@@ -26,7 +26,7 @@ fn text_is_read_by_its_columns() {
 fn a_viewpoint_is_the_pose_of_the_sensor() {
     let header =
         "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nVIEWPOINT 1 2 3 2 0 0 2\nPOINTS 1\nDATA ascii\n";
-    let (name, bytes) = (std::path::Path::new("a.pcd"), pcd(header, b"0 0 0\n"));
+    let (name, bytes) = (Path::new("a.pcd"), pcd(header, b"0 0 0\n"));
     let cloud = read_cloud_from(&bytes[..], Some(CloudFormat::Pcd), name).unwrap();
     let expected =
         [0.0, -1.0, 0.0, 1.0, 1.0, 0.0, 0.0, 2.0, 0.0, 0.0, 1.0, 3.0, 0.0, 0.0, 0.0, 1.0];
