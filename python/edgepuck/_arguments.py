@@ -5,8 +5,10 @@ from __future__ import annotations
 import functools
 import operator
 import os
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+from . import _edgepuck
 from ._edgepuck import Error
 
 
@@ -49,3 +51,20 @@ def number(name: str, index: Any, length: int) -> int:
     if not -length <= found < length:
         raise IndexError(f"expected the number of one of {length} {name}, found {found}")
     return found % length
+
+
+def check_extension(path: str | os.PathLike[str], extension: str) -> None:
+    """Check that the name of the file to write has this extension."""
+    if not os.fspath(path).lower().endswith(extension):
+        raise Error(f"path: expected a name with {extension}, found {os.fspath(path)}")
+
+
+def run(words: Sequence[str], called: Mapping[str, str]) -> None:
+    """Run a command of the program. Errors call the temporary files `called`, by their paths, as it says."""
+    try:
+        _edgepuck.run(["edgepuck", *words])
+    except Error as error:
+        told = str(error)
+        for file, name in called.items():
+            told = told.replace(file, name)
+        raise Error(told) from None

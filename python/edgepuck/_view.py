@@ -41,11 +41,15 @@ def view(
     >>> "<iframe" in view(scan)._repr_html_()
     True
     """
+    if not shown:
+        raise _edgepuck.Error("expected something to show, found nothing")
     with tempfile.TemporaryDirectory(prefix="edgepuck-") as folder:
         words = [_file(one, Path(folder, str(number))) for number, one in enumerate(shown)]
+        called = {word: f"argument {number}" for number, word in enumerate(words) if word.startswith(folder)}
         if truth is not None:
             words += ["--truth", _file(truth, Path(folder, "truth"))]
-        return page_of(words)
+            called |= {words[-1]: "truth"} if words[-1].startswith(folder) else {}
+        return page_of(words, called)
 
 
 def _file(
@@ -67,7 +71,10 @@ def _file(
         file = place / "detections.json"
         file.write_text(json.dumps({"objects": [_box(one) for one in shown]}))
     else:
-        points = np.asarray(shown, dtype=float)
+        try:
+            points = np.asarray(shown, dtype=float)
+        except (TypeError, ValueError):
+            points = np.zeros(())
         if points.ndim == 0:
             kinds = "points, a Scan, a DrawnScene, a Mesh, detections or a path"
             raise _edgepuck.Error(f"expected {kinds}, found {type(shown).__name__}")
