@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import operator
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from . import _edgepuck
@@ -59,12 +59,9 @@ def check_extension(path: str | os.PathLike[str], extension: str) -> None:
         raise Error(f"path: expected a name with {extension}, found {os.fspath(path)}")
 
 
-def run(words: Sequence[str], called: Mapping[str, str]) -> None:
-    """Run a command of the program. Errors call the temporary files `called`, by their paths, as it says."""
+def run(words: Sequence[str], folder: str) -> None:
+    """Run a command of the program. Errors name the files in the temporary `folder` without it."""
     try:
         _edgepuck.run(["edgepuck", *words])
     except Error as error:
-        told = str(error)
-        for file, name in called.items():
-            told = told.replace(file, name)
-        raise Error(told) from None
+        raise Error(str(error).replace(os.path.join(folder, ""), "")) from None

@@ -6,7 +6,7 @@ import html
 import os
 import tempfile
 import webbrowser
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from . import _arguments, _edgepuck
@@ -48,9 +48,8 @@ class View:
         return f'<iframe srcdoc="{page}" style="width: 100%; height: 480px; border: 0"></iframe>'
 
 
-def page_of(words: Sequence[str], called: Mapping[str, str]) -> View:
-    """The page that `edgepuck view` writes if it is called with `words`. Errors name files as in `called`."""
-    with tempfile.TemporaryDirectory(prefix="edgepuck-") as folder:
-        page = Path(folder, "page.html")
-        _arguments.run(["view", *words, "--out", os.fspath(page)], called)
-        return View(page.read_text(encoding="utf-8"))
+def page_of(words: Sequence[str], folder: str) -> View:
+    """The page that `edgepuck view` writes if it is called with `words`, by way of a temporary `folder`."""
+    page = Path(folder, "page.html")
+    _arguments.run(["view", *words, "--out", os.fspath(page)], folder)
+    return View(page.read_text(encoding="utf-8"))

@@ -18,18 +18,6 @@ from ._page import page_of
 # The columns in files whose names are keywords of Python, or too short there.
 _NAMES = {"return": "return_number", "sensor": "sensor_position"}
 
-# The types and axes of all columns, positions first.
-_TYPES = {
-    "positions": ("f4", ("n", 3)),
-    "origin": ("f8", (3,)),
-    "pose": ("f8", (4, 4)),
-    **dict.fromkeys(["range", "time", "intensity", "power"], ("f4", ("n",))),
-    **dict.fromkeys(["beam", "triangle", "object"], ("u4", ("n",))),
-    "ring": ("u2", ("n",)),
-    **dict.fromkeys(["reflectivity", "return_number", "medium"], ("u1", ("n",))),
-    **dict.fromkeys(["sensor_position", "attitude", "normal"], ("f4", ("n", 3))),
-}
-
 
 @dataclass(eq=False, repr=False)
 class Scan:
@@ -82,25 +70,14 @@ class Scan:
     def __post_init__(self) -> None:
         if self.pose is None:
             self.pose = np.eye(4)
-        self._fit()
+        positions = np.asarray(self.positions, dtype=np.float32)
+        if positions.ndim != 2 or positions.shape[1] != 3:
+            raise _edgepuck.Error(f"positions: expected shape [n, 3], found {list(positions.shape)}")
+        self.positions = positions
         if self.sensor_position is None:
             at = (self.pose[:3, 3] - self.origin).astype(np.float32)
             self.sensor_position = np.broadcast_to(at, self.positions.shape)
             self._is_at_rest = True
-
-    def _fit(self) -> None:
-        """Give the columns their types, without a copy if they have them, and check their shapes."""
-        for name, (kind, axes) in _TYPES.items():
-            value = getattr(self, name)
-            if value is None or (name == "sensor_position" and self._is_at_rest):
-                continue
-            column = _numbers(name, value, kind)
-            lengths = [len(self.positions) if axis == "n" and name != "positions" else axis for axis in axes]
-            is_fit = column.ndim == len(lengths) and all(map(_fits, column.shape, lengths))
-            if not is_fit:
-                expected = ", ".join(map(str, lengths))
-                raise _edgepuck.Error(f"{name}: expected shape [{expected}], found {list(column.shape)}")
-            setattr(self, name, column)
 
     def __len__(self) -> int:
         """The number of points."""
@@ -117,7 +94,7 @@ class Scan:
         with tempfile.TemporaryDirectory(prefix="edgepuck-") as folder:
             file = Path(folder, "scan.npz")
             self.save(file)
-            return page_of([str(file)], {})._repr_html_()
+            return page_of([str(file)], folder)._repr_html_()
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
         array = self.positions if dtype is None else self.positions.astype(dtype, copy=False)
@@ -157,10 +134,9 @@ class Scan:
         file is replaced, as by `numpy.save`. All but .csv keep the pose.
 
         Raises:
-            Error: The name has another extension, a column has a wrong type or shape, or the file cannot be
+            Error: The name has another extension, a column has another type or shape, or the file cannot be
                 written.
         """
-        self._fit()
         names = {name: column for column, name in _NAMES.items()}
         columns = {names.get(field.name, field.name): getattr(self, field.name) for field in fields(self)}
         left_out = {"sensor"} if self._is_at_rest else set()
@@ -182,21 +158,3 @@ def scan_of(columns: Mapping[str, Any]) -> Scan:
     pose = named.get("pose")
     pose = None if pose is None else np.array(pose).reshape(4, 4)
     return Scan(**{**named, "origin": np.array(named["origin"]), "pose": pose})
-
-
-def _fits(found: int, expected: int | str) -> bool:
-    return expected in (found, "n")
-
-
-def _numbers(name: str, value: Any, kind: str) -> NDArray[Any]:
-    """`value` as an array of this type."""
-    found = np.asarray(value)
-    if found.dtype == kind:
-        return found
-    is_number = found.dtype.kind in "iuf" or not found.size
-    with np.errstate(invalid="ignore", over="ignore"):
-        column = found.astype(kind) if is_number else found
-    if not is_number or (kind[0] == "u" and not np.array_equal(column, found)):
-        expected = f"whole numbers from 0 to {np.iinfo(kind).max}" if kind[0] == "u" else "numbers"
-        raise _edgepuck.Error(f"{name}: expected {expected}, found others, of type {found.dtype}")
-    return column

@@ -44,12 +44,10 @@ def view(
     if not shown:
         raise _edgepuck.Error("expected something to show, found nothing")
     with tempfile.TemporaryDirectory(prefix="edgepuck-") as folder:
-        words = [_file(one, Path(folder, str(number))) for number, one in enumerate(shown)]
-        called = {word: f"argument {number}" for number, word in enumerate(words) if word.startswith(folder)}
+        words = [_file(one, Path(folder, f"argument-{number}")) for number, one in enumerate(shown)]
         if truth is not None:
             words += ["--truth", _file(truth, Path(folder, "truth"))]
-            called |= {words[-1]: "truth"} if words[-1].startswith(folder) else {}
-        return page_of(words, called)
+        return page_of(words, folder)
 
 
 def _file(

@@ -232,7 +232,7 @@ def export(
     sampler = ("random" if is_sets else "fps") if sampler is None else sampler
     points = (1024 if is_sets else 64) if points is None else _arguments.whole("points", points, 1, 2**32)
     with tempfile.TemporaryDirectory() as folder:
-        checkpoint, names, table = (Path(folder, name) for name in ("model.pth", "classes.txt", "table.toml"))
+        checkpoint, names, table = (Path(folder, name) for name in ("model", "classes", "table.toml"))
         state = _folded(model) if half else {name: value.cpu() for name, value in model.state_dict().items()}
         torch.save({"model_state_dict": state}, checkpoint)
         names.write_text("\n".join(classes) + "\n")
@@ -243,8 +243,7 @@ def export(
         if isinstance(model, SetNetwork):
             table.write_text(_table(model))
             words += [f"--table={table}"]
-        called = {str(checkpoint): "model", str(names): "classes", str(table): "model"}
-        _arguments.run([str(word) for word in words], called)
+        _arguments.run([str(word) for word in words], folder)
 
 
 def _folded(model: nn.Module) -> dict[str, Tensor]:

@@ -99,10 +99,10 @@ pub fn scan_of(columns: &Bound<'_, PyDict>) -> PyResult<Scan> {
             "pose" => scan.pose = Some(column.extract()?),
             "positions" => scan.positions = points(&column.extract()?)?,
             name => match scan.slot(name.parse().map_err(raised)?) {
-                ColumnSlot::F32(slot) => *slot = Some(list(&column)?),
-                ColumnSlot::U8(slot) => *slot = Some(list(&column)?),
-                ColumnSlot::U16(slot) => *slot = Some(list(&column)?),
-                ColumnSlot::U32(slot) => *slot = Some(list(&column)?),
+                ColumnSlot::F32(slot) => *slot = Some(list(name, &column)?),
+                ColumnSlot::U8(slot) => *slot = Some(list(name, &column)?),
+                ColumnSlot::U16(slot) => *slot = Some(list(name, &column)?),
+                ColumnSlot::U32(slot) => *slot = Some(list(name, &column)?),
                 ColumnSlot::Vector(slot) => *slot = Some(points(&column.extract()?)?),
             },
         }
@@ -118,9 +118,17 @@ pub fn save_scan(path: PathBuf, columns: &Bound<'_, PyDict>) -> PyResult<()> {
     Ok(())
 }
 
-fn list<T: Element + Copy>(column: &Bound<'_, PyAny>) -> PyResult<Vec<T>> {
-    let column: PyReadonlyArray1<'_, T> = column.extract()?;
-    Ok(column.as_array().to_vec())
+fn list<T: Element + Copy>(name: &str, column: &Bound<'_, PyAny>) -> PyResult<Vec<T>> {
+    match column.extract::<PyReadonlyArray1<'_, T>>() {
+        Ok(column) => Ok(column.as_array().to_vec()),
+        Err(_) => {
+            let expected = numpy::dtype::<T>(column.py());
+            let (found, shape) = (column.getattr("dtype")?, column.getattr("shape")?);
+            let cause =
+                format!("expected type {expected} and shape [n], found {found} and {shape}");
+            Err(raised(format!("{name}: {cause}")))
+        }
+    }
 }
 
 /// `[n]`, where there are any.

@@ -72,6 +72,9 @@ FLOOR = np.stack([*np.meshgrid(*[np.linspace(-9.0, 9.0, 90)] * 2), np.full((90, 
         (lambda: ep.Scene().move(0), "expected a pose or a position, found neither"),
         (lambda: ep.Scene().scan(ep.Sensor("vlp16"), pose=np.eye(4), azimuth=0), "a distance, an elevation and an azimuth, found both"),
         (lambda: ep.Scene.of("robot.glb"), "expected a trimesh.Scene, found str"),
+        (lambda: ep.Scan(np.zeros((5, 2)), np.zeros(3)), "positions: expected shape [n, 3], found [5, 2]"),
+        (lambda: ep.Scan(BALL, [0.0] * 3, range=[1, 2]).save("x.npz"), "range: expected type float32 and shape [n], found int64 and"),
+        (lambda: ep.Scan(BALL, [0.0] * 3, range=BALL[:9, 0].astype("f4")).save("x.npz"), "range"),
         (lambda: ep.segment(FLOOR, min_points=-1), "min_points: expected a whole number from 1"),
         (lambda: ep.set_num_threads(-1), "threads: expected a whole number from 0, found -1"),
         (lambda: ep.Dataset("meshes", effects={}), "effects: expected the path of a TOML file, found dict"),
@@ -126,33 +129,6 @@ def test_a_file_without_points_is_told(tmp_path: Path) -> None:
     np.save(tmp_path / "empty.npy", np.zeros((0, 3)))
     with pytest.warns(UserWarning, match=r"empty\.npy: holds no points"):
         assert len(ep.Scan.read(tmp_path / "empty.npy")) == 0
-
-
-def test_the_columns_of_a_scan_get_their_types(tmp_path: Path) -> None:
-    scan = ep.Scan([[1.0, 2, 3], [4, 5, 6]], [0, 0, 0], ring=[1, 2], intensity=np.array([0.5, 1.0]))
-    assert (scan.positions.dtype, scan.ring.dtype, scan.intensity.dtype) == ("f4", "u2", "f4")
-    scan.save(tmp_path / "scan.npz")
-    np.testing.assert_array_equal(ep.Scan.read(tmp_path / "scan.npz").ring, [1, 2])
-    scan.ring = np.array([1, 2, 3])
-    with pytest.raises(ep.Error, match=r"ring: expected shape \[2\], found \[3\]"):
-        scan.save(tmp_path / "scan.npz")
-
-
-@pytest.mark.parametrize(
-    ("columns", "message"),
-    [
-        ({"positions": np.zeros((5, 2))}, "positions: expected shape [n, 3], found [5, 2]"),
-        ({"positions": "scan.npz"}, "positions: expected numbers, found others, of type <U8"),
-        ({"ring": [1.5]}, "ring: expected whole numbers from 0 to 65535, found others, of type float64"),
-        ({"reflectivity": [300]}, "reflectivity: expected whole numbers from 0 to 255"),
-        ({"range": [1, 2]}, "range: expected shape [1], found [2]"),
-        ({"pose": np.eye(3)}, "pose: expected shape [4, 4], found [3, 3]"),
-    ],
-)
-def test_a_scan_of_wrong_columns_is_refused(columns: dict, message: str) -> None:
-    with pytest.raises(ep.Error) as caught:
-        ep.Scan(**{"positions": np.zeros((1, 3)), "origin": np.zeros(3), **columns})
-    assert message in str(caught.value)
 
 
 def test_the_fields_x_y_and_z_are_points() -> None:

@@ -42,5 +42,5 @@ def test_what_cannot_be_shown_is_named() -> None:
         ep.view()
     with pytest.raises(ep.Error, match="expected points, a Scan, .* found Scene"):
         ep.view(ep.Scene())
-    with pytest.raises(ep.Error, match="^argument 0: expected something to show, found no point"):
+    with pytest.raises(ep.Error, match="^argument-0/points.npy: expected something to show, found no point"):
         ep.view(np.zeros((0, 3)))

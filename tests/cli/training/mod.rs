@@ -150,7 +150,10 @@ fn what_cannot_be_learnt_from_is_an_error_that_names_it() {
         ("--data set", "modelnet40_shape_names.txt; found set/packed/a, set/packed/b: name one"),
         ("--data nowhere", "nowhere: expected a packed NPZ"),
         ("--data set/packed/c", "; found set/packed/a, set/packed/b: name one"),
-        ("--data . --recipe scale.toml", "`augment.scale`: expected two finite factors above 0, ascending"),
+        (
+            "--data . --recipe scale.toml",
+            "`augment.scale`: expected two finite factors above 0, ascending",
+        ),
         ("--data twice.npz", "twice.npz: expected a name for each class, found two classes `ball`"),
         (
             "--data sphere.npz --recipe metric.toml",
