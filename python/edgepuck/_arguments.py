@@ -5,8 +5,10 @@ from __future__ import annotations
 import functools
 import operator
 import os
+from collections.abc import Sequence
 from typing import Any
 
+from . import _edgepuck
 from ._edgepuck import Error
 
 
@@ -49,3 +51,17 @@ def number(name: str, index: Any, length: int) -> int:
     if not -length <= found < length:
         raise IndexError(f"expected the number of one of {length} {name}, found {found}")
     return found % length
+
+
+def check_extension(path: str | os.PathLike[str], extension: str) -> None:
+    """Check that the name of the file to write has this extension."""
+    if not os.fspath(path).lower().endswith(extension):
+        raise Error(f"path: expected a name with {extension}, found {os.fspath(path)}")
+
+
+def run(words: Sequence[str], folder: str) -> None:
+    """Run a command of the program. Errors name the files in the temporary `folder` without it."""
+    try:
+        _edgepuck.run(["edgepuck", *words])
+    except Error as error:
+        raise Error(str(error).replace(os.path.join(folder, ""), "")) from None

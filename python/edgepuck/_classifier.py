@@ -87,9 +87,12 @@ class Classifier(Remade):
         is_batch = _is_batch(cloud)
         clouds: Any = cloud if is_batch else [cloud]
         found = []
-        for one in clouds:
-            points = points_of(one.positions if isinstance(one, Scan) else one)
-            found.append(Prediction(**self._classifier.classify(points, ground_z, isinstance(one, Scan))))
+        for i, one in enumerate(clouds):
+            try:
+                points = points_of(one.positions if isinstance(one, Scan) else one)
+                found.append(Prediction(**self._classifier.classify(points, ground_z, isinstance(one, Scan))))
+            except _edgepuck.Error as error:
+                raise _edgepuck.Error(f"cloud {i}: {error}" if is_batch else str(error)) from None
         return found if is_batch else found[0]
 
 

@@ -85,6 +85,8 @@ class Dataset:
         attributes: Sequence[str] = (),
         transform: Callable[[NDArray[np.float32]], Any] | None = None,
     ) -> None:
+        if not (effects is None or isinstance(effects, (str, os.PathLike))):
+            raise _edgepuck.Error(f"effects: expected the path of a TOML file, found {type(effects).__name__}")
         flags = {
             "sensor": place(sensor),
             "points": points,

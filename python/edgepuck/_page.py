@@ -9,7 +9,7 @@ import webbrowser
 from collections.abc import Sequence
 from pathlib import Path
 
-from . import _edgepuck
+from . import _arguments, _edgepuck
 
 
 class View:
@@ -20,8 +20,17 @@ class View:
         """The page: HTML with all that it needs."""
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the page. An existing file is replaced."""
-        Path(path).write_text(self.page, encoding="utf-8")
+        """Write a file with the extension .html. An existing file is replaced, and a missing folder is made.
+
+        Raises:
+            Error: The name has another extension, or the file cannot be written.
+        """
+        _arguments.check_extension(path, ".html")
+        try:
+            Path(path).parent.mkdir(parents=True, exist_ok=True)
+            Path(path).write_text(self.page, encoding="utf-8")
+        except OSError as error:
+            raise _edgepuck.Error(f"{os.fspath(path)}: {error.strerror}") from None
 
     def open(self) -> str:
         """Open the page in the browser, and return the path of its file."""
@@ -39,9 +48,8 @@ class View:
         return f'<iframe srcdoc="{page}" style="width: 100%; height: 480px; border: 0"></iframe>'
 
 
-def page_of(words: Sequence[str]) -> View:
-    """The page that `edgepuck view` writes if it is called with `words`."""
-    with tempfile.TemporaryDirectory(prefix="edgepuck-") as folder:
-        page = Path(folder, "page.html")
-        _edgepuck.run(["edgepuck", "view", *words, "--out", os.fspath(page)])
-        return View(page.read_text(encoding="utf-8"))
+def page_of(words: Sequence[str], folder: str) -> View:
+    """The page that `edgepuck view` writes if it is called with `words`, by way of a temporary `folder`."""
+    page = Path(folder, "page.html")
+    _arguments.run(["view", *words, "--out", os.fspath(page)], folder)
+    return View(page.read_text(encoding="utf-8"))

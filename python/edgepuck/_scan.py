@@ -70,6 +70,10 @@ class Scan:
     def __post_init__(self) -> None:
         if self.pose is None:
             self.pose = np.eye(4)
+        positions = np.asarray(self.positions, dtype=np.float32)
+        if positions.ndim != 2 or positions.shape[1] != 3:
+            raise _edgepuck.Error(f"positions: expected shape [n, 3], found {list(positions.shape)}")
+        self.positions = positions
         if self.sensor_position is None:
             at = (self.pose[:3, 3] - self.origin).astype(np.float32)
             self.sensor_position = np.broadcast_to(at, self.positions.shape)
@@ -90,7 +94,7 @@ class Scan:
         with tempfile.TemporaryDirectory(prefix="edgepuck-") as folder:
             file = Path(folder, "scan.npz")
             self.save(file)
-            return page_of([str(file)])._repr_html_()
+            return page_of([str(file)], folder)._repr_html_()
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
         array = self.positions if dtype is None else self.positions.astype(dtype, copy=False)
@@ -130,7 +134,8 @@ class Scan:
         file is replaced, as by `numpy.save`. All but .csv keep the pose.
 
         Raises:
-            Error: The name has another extension, or the file cannot be written.
+            Error: The name has another extension, a column has another type or shape, or the file cannot be
+                written.
         """
         names = {name: column for column, name in _NAMES.items()}
         columns = {names.get(field.name, field.name): getattr(self, field.name) for field in fields(self)}

@@ -19,9 +19,9 @@ def scan(
     scene: _edgepuck.Scene,
     sensor: _edgepuck.Sensor,
     *,
-    distance: float,
-    elevation: float,
-    azimuth: float,
+    distance: float | None,
+    elevation: float | None,
+    azimuth: float | None,
     pose: ArrayLike | None,
     noise: float,
     dropout: float,
@@ -32,7 +32,13 @@ def scan(
     """Scan `scene` by `sensor`. `Scene.scan` describes the arguments."""
     if isinstance(attributes, str):
         raise _edgepuck.Error(f"attributes: expected a list of names, found {attributes!r}")
-    at = [float(distance), float(elevation), float(azimuth)] if pose is None else matrix(pose)
+    around = [distance, elevation, azimuth]
+    if pose is None:
+        at = [usual if one is None else float(one) for one, usual in zip(around, (3.0, 20.0, 0.0), strict=True)]
+    elif around != [None] * 3:
+        raise _edgepuck.Error("expected a pose, or a distance, an elevation and an azimuth, found both")
+    else:
+        at = matrix(pose)
     names = None if attributes is None else list(attributes)
     key = None if seed is None else _arguments.seed(seed)
     return scan_of(scene.scan(sensor, at, encoded(noise, dropout, effects), names, key))

@@ -83,10 +83,12 @@ class Scene:
             up: The axis of the scene that points up, y or z: y in glTF.
 
         Raises:
-            Error: There is no node with a mesh.
+            Error: There is no node with a mesh, or it is not a scene.
         """
         if up not in ("y", "z"):
             raise _edgepuck.Error(f"up: expected one of y, z, found {up!r}")
+        if not (hasattr(scene, "graph") and hasattr(scene, "geometry")):
+            raise _edgepuck.Error(f"expected a trimesh.Scene, found {type(scene).__name__}")
         found, meshes = cls(), {}
         for node in scene.graph.nodes_geometry:
             matrix, name = scene.graph[node]
@@ -188,16 +190,19 @@ class Scene:
             position: The position of the one instance, metres, instead of `pose`.
 
         Raises:
-            Error: There is no such instance; the poses have a wrong shape or are not rotations.
+            Error: There is no such instance, or one is named twice; there is no pose; the poses have a wrong
+                shape or are not rotations.
         """
         if np.ndim(instance) > 0:
-            numbers = [whole("instance", number, 0, 2**32 - 1) for number in instance]  # type: ignore[union-attr]
+            numbers = _numbers("instance", instance)  # type: ignore[arg-type]
             if pose is None or position is not None:
                 raise _edgepuck.Error("expected the poses of all instances, and no position")
             _, poses = _rows("pose", pose, (len(numbers),))
             self._scene.move_all(numbers, poses)
             self._poses.update(zip(numbers, poses.tolist(), strict=True))
             return
+        if pose is None and position is None:
+            raise _edgepuck.Error("expected a pose or a position, found neither")
         rows = _pose(pose, position)
         number = whole("instance", instance, 0, 2**32 - 1)
         self._scene.move(number, rows)
@@ -207,9 +212,9 @@ class Scene:
         self,
         sensor: Sensor,
         *,
-        distance: float = 3.0,
-        elevation: float = 20.0,
-        azimuth: float = 0.0,
+        distance: float | None = None,
+        elevation: float | None = None,
+        azimuth: float | None = None,
         pose: ArrayLike | None = None,
         noise: float = 0.0,
         dropout: float = 0.0,
@@ -221,9 +226,9 @@ class Scene:
 
         Args:
             sensor: The sensor.
-            distance: The distance of the sensor from the origin, at which it looks, metres.
-            elevation: The elevation of the sensor above the horizon, degrees.
-            azimuth: The azimuth of the sensor, counterclockwise from x, degrees.
+            distance: The distance of the sensor from the origin, at which it looks, metres; 3 by default.
+            elevation: The elevation of the sensor above the horizon, degrees; 20 by default.
+            azimuth: The azimuth of the sensor, counterclockwise from x, degrees; 0 by default.
             pose: The pose of the sensor, instead of these three: a matrix of shape [4, 4] from the
                 frame of the sensor (x forward, z up) to the world.
             noise: Standard deviation of the noise of the ranges, metres.
@@ -300,7 +305,7 @@ class Scene:
         numbers: list[int] = []
         moved = np.empty((0, 16))
         if move is not None:
-            numbers = [whole("move", number, 0, 2**32 - 1) for number in move[0]]
+            numbers = _numbers("move", move[0])
             _, moved = _rows("move", move[1], (n, len(numbers)))
         key = None if seed is None else seed_of(seed)
         if isinstance(attributes, str):
@@ -374,6 +379,15 @@ def _remade(
     for number, rows in poses.items():
         scene._scene.move_all([number], np.array([rows]))
     return scene
+
+
+def _numbers(name: str, instances: Iterable[int]) -> list[int]:
+    """The numbers of different instances."""
+    numbers = [whole(name, number, 0, 2**32 - 1) for number in instances]
+    twice = sorted(number for number in set(numbers) if numbers.count(number) > 1)
+    if twice:
+        raise _edgepuck.Error(f"{name}: expected each instance once, found {twice[0]} twice")
+    return numbers
 
 
 def _rows(name: str, poses: ArrayLike, shape: tuple[int, ...]) -> tuple[int, NDArray[np.float64]]:

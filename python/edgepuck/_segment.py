@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _edgepuck
+from ._arguments import whole
 from ._classifier import points_of
 from ._scan import Scan
 
@@ -35,7 +36,8 @@ def segment(
     if isinstance(sweep, Scan):
         rings = sweep.ring if rings is None else rings
         sweep = sweep.in_sensor_frame()
-    return _edgepuck.segment(points_of(sweep), rings_of(rings), radius, min_points)
+    least = None if min_points is None else whole("min_points", min_points, 1, 2**32)
+    return _edgepuck.segment(points_of(sweep), rings_of(rings), radius, least)
 
 
 def rings_of(rings: ArrayLike | None) -> NDArray[np.uint16] | None:

@@ -41,11 +41,13 @@ def view(
     >>> "<iframe" in view(scan)._repr_html_()
     True
     """
+    if not shown:
+        raise _edgepuck.Error("expected something to show, found nothing")
     with tempfile.TemporaryDirectory(prefix="edgepuck-") as folder:
-        words = [_file(one, Path(folder, str(number))) for number, one in enumerate(shown)]
+        words = [_file(one, Path(folder, f"argument-{number}")) for number, one in enumerate(shown)]
         if truth is not None:
             words += ["--truth", _file(truth, Path(folder, "truth"))]
-        return page_of(words)
+        return page_of(words, folder)
 
 
 def _file(
@@ -67,7 +69,10 @@ def _file(
         file = place / "detections.json"
         file.write_text(json.dumps({"objects": [_box(one) for one in shown]}))
     else:
-        points = np.asarray(shown, dtype=float)
+        try:
+            points = np.asarray(shown, dtype=float)
+        except (TypeError, ValueError):
+            points = np.zeros(())
         if points.ndim == 0:
             kinds = "points, a Scan, a DrawnScene, a Mesh, detections or a path"
             raise _edgepuck.Error(f"expected {kinds}, found {type(shown).__name__}")

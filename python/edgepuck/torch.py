@@ -12,7 +12,7 @@ from pathlib import Path
 import torch
 from torch import Tensor, nn
 
-from . import _edgepuck
+from . import _arguments, _edgepuck
 
 
 class PointNet(nn.Module):
@@ -208,12 +208,12 @@ def export(
     calibrate: str | os.PathLike[str] | None = None,
     half: bool = False,
 ) -> None:
-    """Write a model file for `edgepuck.Classifier` and `infer-cpu`.
+    """Write a model file for `edgepuck.Classifier` and `infer-cpu`. An existing file is replaced.
 
     Args:
         model: The network.
         path: The file, `.safetensors`.
-        classes: The names of the classes in the order of the logits.
+        classes: The names of the classes in the order of the logits, all different.
         sampler: The sampler of points: all, random, fps, voxel or cpl. The default is fps, or random for a
             `SetNetwork`, which chooses its own farthest points.
         points: The number of points that the sampler chooses. The default is 64, or 1,024 for a `SetNetwork`.
@@ -222,23 +222,28 @@ def export(
         half: Fold the batch norms into the layers before them, and write f16: half the size, about the same answers.
 
     Raises:
-        Error: The file cannot be written, or the numbers of classes and logits differ.
+        Error: The file cannot be written, its name has another extension, the numbers of classes and logits
+            differ, or a value is out of its limits.
     """
+    _arguments.check_extension(path, ".safetensors")
+    if isinstance(classes, str) or not all(isinstance(name, str) for name in classes):
+        raise _edgepuck.Error(f"classes: expected a list of names, found {classes!r}")
     is_sets = isinstance(model, SetNetwork)
-    sampler, points = sampler or ("random" if is_sets else "fps"), points or (1024 if is_sets else 64)
+    sampler = ("random" if is_sets else "fps") if sampler is None else sampler
+    points = (1024 if is_sets else 64) if points is None else _arguments.whole("points", points, 1, 2**32)
     with tempfile.TemporaryDirectory() as folder:
-        checkpoint, names, table = (Path(folder, name) for name in ("model.pth", "classes.txt", "table.toml"))
+        checkpoint, names, table = (Path(folder, name) for name in ("model", "classes", "table.toml"))
         state = _folded(model) if half else {name: value.cpu() for name, value in model.state_dict().items()}
         torch.save({"model_state_dict": state}, checkpoint)
         names.write_text("\n".join(classes) + "\n")
-        words = ["import-weights", checkpoint, f"--out={os.fspath(path)}", f"--classes={names}"]
+        words = ["import-weights", checkpoint, f"--out={os.fspath(path)}", f"--classes={names}", "--overwrite"]
         words += [f"--sampler={sampler}", f"--points={points}", "--provenance=edgepuck.torch.export"]
-        words += [f"--training-set={training_set}"] if training_set else []
-        words += [f"--calibrate={os.fspath(calibrate)}"] if calibrate else []
+        words += [] if training_set is None else [f"--training-set={training_set}"]
+        words += [] if calibrate is None else [f"--calibrate={os.fspath(calibrate)}"]
         if isinstance(model, SetNetwork):
             table.write_text(_table(model))
             words += [f"--table={table}"]
-        _edgepuck.run(["edgepuck", *map(str, words)])
+        _arguments.run([str(word) for word in words], folder)
 
 
 def _folded(model: nn.Module) -> dict[str, Tensor]:

@@ -38,12 +38,17 @@ pub fn sweep(py: Python<'_>, array: &PyReadonlyArray2<'_, f32>) -> PyResult<Vec<
     Ok(points)
 }
 
-/// The columns of `scan` by their names in files.
-pub fn scan(py: Python<'_>, mut scan: Scan) -> PyResult<Bound<'_, PyDict>> {
+/// The columns of a `scan` that was cast.
+pub fn cast(py: Python<'_>, scan: Scan) -> PyResult<Bound<'_, PyDict>> {
     if scan.is_empty() {
         let cause = "no beam returned a point: expected an object in the sensor's range and view";
         warn(py, &[cause])?;
     }
+    columns(py, scan)
+}
+
+/// The columns of `scan` by their names in files.
+fn columns(py: Python<'_>, mut scan: Scan) -> PyResult<Bound<'_, PyDict>> {
     let columns = PyDict::new(py);
     columns.set_item("origin", scan.origin)?;
     columns.set_item("pose", scan.pose.as_ref())?;
@@ -77,10 +82,14 @@ pub fn read_points<'py>(
     let from =
         from.map_err(|_| raised(format!("sender: expected an address, found {sender:?}")))?;
     let read = py.detach(|| PointsArgs { format, metadata, from }.read(&path));
-    scan(py, read.map_err(raised)?)
+    let read = read.map_err(raised)?;
+    if read.is_empty() {
+        warn(py, &[format!("{}: holds no points", path.display())])?;
+    }
+    columns(py, read)
 }
 
-/// A scan of the `columns` of [`scan`].
+/// A scan of the columns of [`columns`].
 pub fn scan_of(columns: &Bound<'_, PyDict>) -> PyResult<Scan> {
     let mut scan = Scan::default();
     for (name, column) in columns {
@@ -90,10 +99,10 @@ pub fn scan_of(columns: &Bound<'_, PyDict>) -> PyResult<Scan> {
             "pose" => scan.pose = Some(column.extract()?),
             "positions" => scan.positions = points(&column.extract()?)?,
             name => match scan.slot(name.parse().map_err(raised)?) {
-                ColumnSlot::F32(slot) => *slot = Some(list(&column)?),
-                ColumnSlot::U8(slot) => *slot = Some(list(&column)?),
-                ColumnSlot::U16(slot) => *slot = Some(list(&column)?),
-                ColumnSlot::U32(slot) => *slot = Some(list(&column)?),
+                ColumnSlot::F32(slot) => *slot = Some(list(name, &column)?),
+                ColumnSlot::U8(slot) => *slot = Some(list(name, &column)?),
+                ColumnSlot::U16(slot) => *slot = Some(list(name, &column)?),
+                ColumnSlot::U32(slot) => *slot = Some(list(name, &column)?),
                 ColumnSlot::Vector(slot) => *slot = Some(points(&column.extract()?)?),
             },
         }
@@ -109,9 +118,17 @@ pub fn save_scan(path: PathBuf, columns: &Bound<'_, PyDict>) -> PyResult<()> {
     Ok(())
 }
 
-fn list<T: Element + Copy>(column: &Bound<'_, PyAny>) -> PyResult<Vec<T>> {
-    let column: PyReadonlyArray1<'_, T> = column.extract()?;
-    Ok(column.as_array().to_vec())
+fn list<T: Element + Copy>(name: &str, column: &Bound<'_, PyAny>) -> PyResult<Vec<T>> {
+    match column.extract::<PyReadonlyArray1<'_, T>>() {
+        Ok(column) => Ok(column.as_array().to_vec()),
+        Err(_) => {
+            let expected = numpy::dtype::<T>(column.py());
+            let (found, shape) = (column.getattr("dtype")?, column.getattr("shape")?);
+            let cause =
+                format!("expected type {expected} and shape [n], found {found} and {shape}");
+            Err(raised(format!("{name}: {cause}")))
+        }
+    }
 }
 
 /// `[n]`, where there are any.

@@ -1,4 +1,4 @@
-use crate::error::{raised, raised_with_causes, warn};
+use crate::error::{argument_error, raised, raised_with_causes, warn};
 use crate::process::{self, LazyCaster};
 use edgepuck_dataset as dataset;
 use formats::Split;
@@ -99,16 +99,6 @@ impl Clouds {
         let points = Array3::from_shape_vec(shape, rows.concat()).map_err(raised)?;
         Ok((points.into_pyarray(py), labels.into_pyarray(py)))
     }
-}
-
-/// The message of an error in flags, without their dashes: in Python they are arguments.
-fn argument_error(error: &anyhow::Error) -> String {
-    let text = formats::outcome::joined_causes(error);
-    let cause = text.split("\n\n").next().unwrap_or_default();
-    let cause = cause.trim_start_matches("error: ").trim_end().replace("'--", "'");
-    let in_python =
-        |word: &str| word.strip_prefix("--").map_or(word.to_owned(), |flag| flag.replace('-', "_"));
-    cause.split(' ').map(in_python).collect::<Vec<_>>().join(" ")
 }
 
 impl Clouds {

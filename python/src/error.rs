@@ -20,6 +20,16 @@ pub fn raised_with_causes(error: anyhow::Error) -> PyErr {
     raised(formats::outcome::joined_causes(&error))
 }
 
+/// The message of an error in flags, without their dashes: in Python they are arguments.
+pub fn argument_error(error: &anyhow::Error) -> String {
+    let text = formats::outcome::joined_causes(error);
+    let cause = text.split("\n\n").next().unwrap_or_default();
+    let cause = cause.trim_start_matches("error: ").trim_end().replace("'--", "'");
+    let in_python =
+        |word: &str| word.strip_prefix("--").map_or(word.to_owned(), |flag| flag.replace('-', "_"));
+    cause.split(' ').map(in_python).collect::<Vec<_>>().join(" ")
+}
+
 /// Gives each line to Python's `warnings`, for the line that called the package.
 pub fn warn<Line: AsRef<str>>(py: Python<'_>, lines: &[Line]) -> PyResult<()> {
     let category = py.get_type::<PyUserWarning>();

@@ -4,7 +4,7 @@
 //! child, and an adapter that the parent opened is not the child's. So both are made when they are
 //! first needed and kept with the number of the process. Nothing is started by an import.
 
-use crate::error::{raised, raised_with_causes};
+use crate::error::{argument_error, raised};
 use edgepuck_program::Outcome;
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -97,10 +97,13 @@ fn is_worker(py: Python<'_>) -> PyResult<bool> {
 
 /// Use this many threads in this process from now on; 0 is the default.
 #[pyfunction]
-pub fn set_num_threads(threads: usize) {
+pub fn set_num_threads(threads: i64) -> PyResult<()> {
+    let expected = || raised(format!("threads: expected a whole number from 0, found {threads}"));
+    let threads = usize::try_from(threads).map_err(|_| expected())?;
     *lock(&THREADS) = Some(Own::new(threads));
     let old = lock(&POOL).take();
     drop(old);
+    Ok(())
 }
 
 /// An adapter, opened by each process that casts.
@@ -135,7 +138,8 @@ pub fn adapters(py: Python<'_>) -> Vec<String> {
 /// Run a command of the program `edgepuck`, whose name comes first, and raise what it reports.
 #[pyfunction(name = "run")]
 pub fn run_command(py: Python<'_>, words: Vec<OsString>) -> PyResult<()> {
-    match py.detach(|| edgepuck_program::cli::run_words(words)).map_err(raised_with_causes)? {
+    let ran = py.detach(|| edgepuck_program::cli::run_words(words));
+    match ran.map_err(|error| raised(argument_error(&error)))? {
         Outcome::Success => Ok(()),
         other => Err(raised(format!("the command ended with {other:?}"))),
     }

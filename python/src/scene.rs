@@ -142,7 +142,7 @@ impl Scene {
         scene.seed = seed.unwrap_or(scene.seed);
         sensor.sensor.rays(&scene.effects).map_err(raised)?;
         let scan = process::run(py, || scene.scan(&sensor.sensor, pose).with(&caster).run())?;
-        arrays::scan(py, scan.map_err(raised)?.points)
+        arrays::cast(py, scan.map_err(raised)?.points)
     }
 
     /// The columns of a batch, `[n, n_beams]`, and the seed of each row; `moved` has the poses of the
@@ -182,7 +182,7 @@ impl Scene {
         let columns = scans
             .into_iter()
             .zip(&scene.sensors)
-            .map(|(scan, mounted)| Ok((mounted.name.clone(), arrays::scan(py, scan.points)?)));
+            .map(|(scan, mounted)| Ok((mounted.name.clone(), arrays::cast(py, scan.points)?)));
         columns.collect()
     }
 }

@@ -67,7 +67,7 @@ impl Scenes {
             objects.append(of_object)?;
         }
         told.set_item("objects", objects)?;
-        told.set_item("scan", arrays::scan(py, sweep.scan)?)?;
+        told.set_item("scan", arrays::cast(py, sweep.scan)?)?;
         Ok(told)
     }
 }

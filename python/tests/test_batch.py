@@ -123,6 +123,7 @@ def test_many_instances_move_at_once_and_stay_so_when_pickled() -> None:
         ([0, 2], np.stack([np.eye(4)] * 2), "expected the number of one of 2 instances, found 2"),
         ([0, -1], np.stack([np.eye(4)] * 2), "instance: expected a whole number from 0"),
         ([0, 1], None, "expected the poses of all instances"),
+        ([1, 1], np.stack([np.eye(4)] * 2), "instance: expected each instance once, found 1 twice"),
     ],
 )
 def test_of_many_instances_all_move_or_none(numbers, poses, message: str) -> None:

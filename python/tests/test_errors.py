@@ -9,6 +9,7 @@ import edgepuck as ep
 
 SQUARE = [[0, 0, 0], [1, 0, 0], [1, 1, 0]]
 CUBE = ep.Mesh(*ep.box((1, 1, 1)))
+BALL = np.random.default_rng(1).normal(size=(200, 3))
 FLOOR = np.stack([*np.meshgrid(*[np.linspace(-9.0, 9.0, 90)] * 2), np.full((90, 90), -1.5)], -1).reshape(-1, 3)
 
 
@@ -66,8 +67,18 @@ FLOOR = np.stack([*np.meshgrid(*[np.linspace(-9.0, 9.0, 90)] * 2), np.full((90, 
         (lambda: ep.Scene().add(CUBE, scale=[1, -1, 1]), "scale: expected a number above 0, found -1"),
         (lambda: ep.Scene().add(CUBE, reflectivity=80), "reflectivity: expected a number within 0..=1, found 80"),
         (lambda: ep.Scene().add(CUBE, retroreflection=5), "retroreflection: expected a number within 0..=1"),
-        (lambda: ep.Scene().move(0), "expected the number of one of 0 instances, found 0"),
-        (lambda: ep.Scene().move(-1), "instance: expected a whole number"),
+        (lambda: ep.Scene().move(0, np.eye(4)), "expected the number of one of 0 instances, found 0"),
+        (lambda: ep.Scene().move(-1, np.eye(4)), "instance: expected a whole number"),
+        (lambda: ep.Scene().move(0), "expected a pose or a position, found neither"),
+        (lambda: ep.Scene().scan(ep.Sensor("vlp16"), pose=np.eye(4), azimuth=0), "a distance, an elevation and an azimuth, found both"),
+        (lambda: ep.Scene.of("robot.glb"), "expected a trimesh.Scene, found str"),
+        (lambda: ep.Scan(np.zeros((5, 2)), np.zeros(3)), "positions: expected shape [n, 3], found [5, 2]"),
+        (lambda: ep.Scan(BALL, [0.0] * 3, range=[1, 2]).save("x.npz"), "range: expected type float32 and shape [n], found int64 and"),
+        (lambda: ep.Scan(BALL, [0.0] * 3, range=BALL[:9, 0].astype("f4")).save("x.npz"), "range"),
+        (lambda: ep.segment(FLOOR, min_points=-1), "min_points: expected a whole number from 1"),
+        (lambda: ep.set_num_threads(-1), "threads: expected a whole number from 0, found -1"),
+        (lambda: ep.Dataset("meshes", effects={}), "effects: expected the path of a TOML file, found dict"),
+        (lambda: ep.Classifier("edge-64")([BALL, BALL[:0]]), "cloud 1: the cloud has no points"),
         (lambda: ep.Scene().scan("vlp32c"), "expected an edgepuck.Sensor, found str"),
     ],
 )
@@ -114,6 +125,12 @@ def test_a_scan_of_nothing_is_told() -> None:
     assert len(scan.positions) == 0
 
 
+def test_a_file_without_points_is_told(tmp_path: Path) -> None:
+    np.save(tmp_path / "empty.npy", np.zeros((0, 3)))
+    with pytest.warns(UserWarning, match=r"empty\.npy: holds no points"):
+        assert len(ep.Scan.read(tmp_path / "empty.npy")) == 0
+
+
 def test_the_fields_x_y_and_z_are_points() -> None:
     post = np.array([[5.0, 0.0, 0.05 * i - 1.0] for i in range(30)], np.float32)
     fields = [("ring", "u2"), ("x", "f4"), ("y", "f4"), ("z", "f4")]
@@ -138,6 +155,7 @@ def test_the_fields_x_y_and_z_are_points() -> None:
         ({"seed": 2**64}, "seed"),
         ({"attributes": "range"}, "list of names"),
         ({"noise": 0.1, "effects": {"noise": {"sigma_m": 0.1}}}, "expected it once"),
+        ({"pose": np.eye(4), "distance": 5}, "expected a pose, or a distance, an elevation and an azimuth, found both"),
         ({"pose": 2 * np.diag([1, 1, 1, 0.5])}, "rotation"),
     ],
 )
@@ -157,6 +175,7 @@ def test_a_scan_that_cannot_be_made_is_refused(cube: tuple, wanted: dict, messag
         ({"points": 0}, "points"),
         ({"views": 0}, "views"),
         ({"views": 2**32}, "views"),
+        ({"views": 65536}, "views: expected at most 65535 where each scan is a file, found 65536"),
         ({"seed": -1}, "seed"),
         ({"cache_mb": -1}, "cache_mb"),
         ({"distance": "far"}, "distance"),

@@ -46,6 +46,27 @@ def test_an_exported_network_answers_as_in_pytorch(kind: type, n_points: int, sh
     np.testing.assert_allclose(found, logits, atol=1e-2 * np.abs(logits).max())
 
 
+@pytest.mark.parametrize(
+    ("path", "settings", "message"),
+    [
+        ("m.npz", {}, "path: expected a name with .safetensors, found"),
+        ("m.safetensors", {"classes": ["a"]}, "classes: 1 class names for 2 logits"),
+        ("m.safetensors", {"classes": ["a", "a"]}, "classes: expected a name for each class, found two classes `a`"),
+        ("m.safetensors", {"classes": [0, 1]}, "classes: expected a list of names, found [0, 1]"),
+        ("m.safetensors", {"points": 0}, "points: expected a whole number from 1"),
+    ],
+)
+def test_what_cannot_be_exported_is_named(path: str, settings: dict, message: str, tmp_path: Path) -> None:
+    export(PointNet(2), tmp_path / "m.safetensors", classes=["a", "b"])
+    before = (tmp_path / "m.safetensors").read_bytes()
+    with pytest.raises(ep.Error) as caught:
+        export(PointNet(2), tmp_path / path, **{"classes": ["a", "b"], **settings})
+    assert message in str(caught.value)
+    assert (tmp_path / "m.safetensors").read_bytes() == before
+    export(PointNet(2), tmp_path / "m.safetensors", classes=["b", "a"])
+    assert (tmp_path / "m.safetensors").read_bytes() != before
+
+
 RECIPE = """
 points = 300
 batch = 10

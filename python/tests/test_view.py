@@ -14,8 +14,13 @@ def test_scans_arrays_meshes_and_detections_become_a_page(tmp_path: Path) -> Non
     found = ep.detect(scene.scan)
     page = ep.view(scene, found, np.zeros((5, 4)), truth=found)
     assert page.page.count('"truth":true') == 2 * len(found)
-    page.save(tmp_path / "page.html")
-    assert (tmp_path / "page.html").read_text(encoding="utf-8") == page.page
+    for _ in range(2):
+        page.save(tmp_path / "new" / "page.html")
+    assert (tmp_path / "new" / "page.html").read_text(encoding="utf-8") == page.page
+    with pytest.raises(ep.Error, match=r"path: expected a name with \.html, found page\.png"):
+        page.save("page.png")
+    with pytest.raises(ep.Error, match="page.html/page.html: "):
+        page.save(tmp_path / "new" / "page.html" / "page.html")
     mesh = ep.view(ep.Mesh(*ep.box((1.0, 2.0, 3.0)), normalize="none"))
     assert re.search(r'"meshes":\[\{"name":"mesh"', mesh.page)
 
@@ -33,3 +38,9 @@ def test_what_cannot_be_shown_is_named() -> None:
         ep.view(np.zeros(4))
     with pytest.raises(ep.Error, match="nowhere.npz"):
         ep.view("nowhere.npz")
+    with pytest.raises(ep.Error, match="expected something to show, found nothing"):
+        ep.view()
+    with pytest.raises(ep.Error, match="expected points, a Scan, .* found Scene"):
+        ep.view(ep.Scene())
+    with pytest.raises(ep.Error, match="^argument-0/points.npy: expected something to show, found no point"):
+        ep.view(np.zeros((0, 3)))

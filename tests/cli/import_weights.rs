@@ -243,6 +243,12 @@ fn bad_tables_and_class_lists_are_named() {
     folder.write("names.txt", "cup\nbowl\n");
     let message = "names.txt: 2 class names for 3 logits";
     folder.refuses(1, &[(&words("--classes names.txt"), message)]);
+    folder.write("names.txt", "cup\nbowl\ncup\n");
+    let message = "names.txt: expected a name for each class, found two classes `cup`";
+    folder.refuses(1, &[(&words("--classes names.txt"), message)]);
+    let words_for_npz = words("").replace("m.safetensors", "m.npz");
+    let message = "--out: expected a name with .safetensors, found m.npz";
+    folder.refuses(2, &[(&words_for_npz, message)]);
     folder.exits(2, &words("--normalization box"));
     assert!(!folder.at("m.safetensors").exists());
 }

@@ -30,10 +30,13 @@ fn packed(path: &Path, split: Split) -> Option<PathBuf> {
 }
 
 /// The beginnings of the names of packed files of `split` in the folder `path`, or in that of a
-/// dataset's packed files.
+/// dataset's packed files; where there is no such folder, in the one above.
 fn prefixes(path: &Path, split: Split) -> Vec<String> {
     let ending = format!("-{split}.npz");
-    let folders = [path.to_path_buf(), path.join("packed")];
+    let above = path.parent().unwrap_or(path);
+    let folder = if path.is_dir() { path } else { above };
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let folders = [folder.to_path_buf(), folder.join("packed")];
     let files = folders.iter().filter_map(|folder| folder.read_dir().ok()).flatten().flatten();
     let files = files.map(|file| file.path().to_string_lossy().into_owned());
     let mut names: Vec<String> =
@@ -115,7 +118,7 @@ impl Clouds {
             );
             return Err(Error::Data { path: path.to_path_buf(), cause });
         }
-        let mut clouds = Self::checked(set, path)?;
+        let mut clouds = Self::checked(normalization, set, path)?;
         if !normalization.is_metric() {
             clouds.normalize();
         } else if (0..clouds.len()).all(|i| is_in_unit_sphere(clouds.set.cloud(i))) {
@@ -136,7 +139,11 @@ impl Clouds {
         }
     }
 
-    fn checked(mut set: LabelledSet, path: &Path) -> Result<Self, Error> {
+    fn checked(
+        normalization: Normalization,
+        mut set: LabelledSet,
+        path: &Path,
+    ) -> Result<Self, Error> {
         let refuse = |cause: String| Err(Error::Data { path: path.to_path_buf(), cause });
         if set.is_empty() {
             return refuse("expected clouds, found none".to_owned());
@@ -152,6 +159,12 @@ impl Clouds {
             }
             if let Some(point) = points.iter().position(|p| !p.iter().all(|x| x.is_finite())) {
                 return refuse(format!("point {point} of {} is not finite", name(cloud)));
+            }
+            // A far object may have a single point in a sweep.
+            let least = if normalization.is_metric() { 2 } else { 1 };
+            if points.len() >= least && points.iter().all(|point| *point == points[0]) {
+                let cause = "expected points of an object, found all in one place";
+                return refuse(format!("{}: {cause}, {:?}", name(cloud), points[0]));
             }
         }
         let most = set.labels.iter().max().map_or(0, |label| label + 1);

@@ -51,6 +51,15 @@ pub enum Error {
         /// The difference.
         cause: String,
     },
+    /// A run's folder in which another process trains.
+    #[error(
+        "{}: expected the folder of a run that no other process trains, found another `train` in it: \
+         wait until that ends, or choose another --out", path.display()
+    )]
+    Busy {
+        /// The folder.
+        path: PathBuf,
+    },
     /// A model or a cloud that infer-cpu refuses.
     #[error(transparent)]
     Infer(#[from] infer_cpu::Error),

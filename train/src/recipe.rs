@@ -421,9 +421,10 @@ impl Recipe {
         checks.extend([
             share_below_1("augment.drop", augment.drop),
             (
-                augment.scale.iter().all(|factor| factor.is_finite() && *factor > 0.0),
+                augment.scale.iter().all(|factor| factor.is_finite() && *factor > 0.0)
+                    && augment.scale.is_sorted(),
                 "augment.scale",
-                "expected two finite factors above 0",
+                "expected two finite factors above 0, ascending",
             ),
             non_negative("augment.shift", augment.shift),
             non_negative("augment.jitter", augment.jitter),

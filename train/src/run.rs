@@ -1,6 +1,6 @@
 //! A run from a recipe to a model. Its folder keeps a checkpoint that resumes it.
 
-use std::fs;
+use std::fs::{self, File, TryLockError};
 use std::path::{Path, PathBuf};
 
 use formats::model_card::ModelCard;
@@ -104,6 +104,7 @@ impl Job<'_> {
         let test = test.map(|path| Test::read(recipe, &classes, path, data)).transpose()?;
         let folder = out.with_extension("run");
         fs::create_dir_all(&folder).map_err(|source| FormatError::io(&folder, source))?;
+        let _lock = lock(&folder)?;
         atomic::sweep_leftovers(&folder)?;
         let mut run = Run::open(folder, &self, &clouds, report)?;
         while run.trainer.epoch < run.trainer.recipe.epochs {
@@ -144,6 +145,19 @@ impl<'a> Test<'a> {
     fn accuracy(&self, model: &Path) -> Result<String, Error> {
         let confusion = confusion(model, &self.clouds, &Options::default())?;
         Ok(accuracy_report::summary(&confusion, self.n_classes, self.path))
+    }
+}
+
+/// Locks the run's `folder` until the returned file is dropped, or the process ends.
+fn lock(folder: &Path) -> Result<File, Error> {
+    // The file stays: if it were removed, two processes could hold locks on two files of its name.
+    let path = folder.join("lock");
+    let file = File::options().create(true).truncate(false).write(true).open(&path);
+    let file = file.map_err(|source| FormatError::io(&path, source))?;
+    match file.try_lock() {
+        Err(TryLockError::WouldBlock) => Err(Error::Busy { path: folder.to_path_buf() }),
+        // Some network file systems have no locks.
+        Ok(()) | Err(TryLockError::Error(_)) => Ok(file),
     }
 }
 

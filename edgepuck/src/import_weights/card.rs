@@ -102,6 +102,10 @@ impl CardArgs {
         if names.len() != n_logits {
             bail!("{}: {} class names for {n_logits} logits", path.display(), names.len());
         }
+        if let Some(i) = (0..names.len()).find(|&i| names[..i].contains(&names[i])) {
+            let (file, name) = (path.display(), &names[i]);
+            bail!("{file}: expected a name for each class, found two classes `{name}`");
+        }
         Ok(names)
     }
 }

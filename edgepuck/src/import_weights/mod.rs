@@ -12,7 +12,7 @@ use checkpoint::Checkpoint;
 use formats::FormatError;
 use formats::labelled::read_labelled;
 use formats::model_card::ModelCard;
-use formats::outputs::Overwrite;
+use formats::outputs::{Overwrite, need_extension};
 use formats::weights::{Tensor, tensor_part, write_half_weights, write_weights};
 use infer_cpu::{Classifier, Options};
 use table::{Names, Table};
@@ -23,7 +23,7 @@ pub struct ImportWeightsArgs {
     #[arg(value_name = "CHECKPOINT")]
     checkpoint: PathBuf,
 
-    /// Model file to write
+    /// Model file to write (.safetensors)
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 
@@ -43,6 +43,7 @@ pub struct ImportWeightsArgs {
 }
 
 pub fn run(args: &ImportWeightsArgs) -> anyhow::Result<Outcome> {
+    need_extension("--out", &args.out, &["safetensors"])?;
     args.overwrite.check([&*args.out])?;
     let checkpoint = Checkpoint::open(&args.checkpoint)?;
     let tables = match &args.table {

@@ -74,8 +74,9 @@ pub(crate) fn read_points<R: Read + Seek>(
     if key != POSITIONS || !npz.has(ORIGIN) {
         return Ok((cloud, [0.0; 3]));
     }
-    let origin = npz.array::<f64>(ORIGIN)?.elements;
-    let origin = origin.try_into().map_err(|_| npz.error(ORIGIN, "expected three numbers"))?;
+    let origin: Option<[f64; 3]> = npz.array::<f64>(ORIGIN)?.elements.try_into().ok();
+    let origin = origin.filter(|origin| origin.iter().all(|x| x.is_finite()));
+    let origin = origin.ok_or_else(|| npz.error(ORIGIN, "expected three finite numbers"))?;
     Ok((cloud, origin))
 }
 

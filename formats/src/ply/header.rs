@@ -116,7 +116,10 @@ pub(super) fn read_header<R: BufRead>(
         match (keyword, &words[..]) {
             ("" | "obj_info", _) => {}
             ("comment", ["origin", words @ ..]) => {
-                let origin = numbers(words).and_then(|numbers| numbers.try_into().ok());
+                let origin = numbers(words).and_then(|numbers| <[f64; 3]>::try_from(numbers).ok());
+                if origin.is_some_and(|origin| !origin.iter().all(|x| x.is_finite())) {
+                    return Err(line.error("expected an origin of three finite numbers"));
+                }
                 frame.origin = frame.origin.or(origin);
             }
             ("comment", ["pose", words @ ..]) => {

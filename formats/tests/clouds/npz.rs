@@ -74,10 +74,13 @@ fn what_is_no_cloud_is_refused_with_its_key() {
         "origin: expected 8 bytes for each element of shape [3], found 3 bytes of |u1"
     );
     let short = npy("<f8", "False", "(2,)", &[0; 16]);
-    assert_eq!(
-        error("a.npz", npz(&[("positions", cloud()), ("origin", short)])),
-        "origin: expected three numbers"
-    );
+    let nan = npy("<f8", "False", "(3,)", &[255; 24]);
+    for origin in [short, nan] {
+        assert_eq!(
+            error("a.npz", npz(&[("positions", cloud()), ("origin", origin)])),
+            "origin: expected three finite numbers"
+        );
+    }
     let offsets = npy("<i8", "False", "(3,)", &[0; 24]);
     assert_eq!(
         error("a.npz", npz(&[("points", cloud()), ("offsets", offsets)])),

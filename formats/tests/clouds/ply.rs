@@ -123,6 +123,8 @@ fn what_is_no_cloud_is_refused() {
         error("a.ply", ply("zip", "", b"")),
         "line 2: expected ascii, binary_little_endian or binary_big_endian, found `zip`"
     );
+    let origin = ply("ascii", "comment origin 1 nan 3\n", b"");
+    assert_eq!(error("a.ply", origin), "line 4: expected an origin of three finite numbers");
     assert_eq!(error("a.ply", "plywood"), "header: expected `ply` as the first line");
     assert_eq!(error("a.ply", "ply\nend_header\n"), "header: the line `format` is missing");
     assert_eq!(error("a.ply", "ply\n"), "header: the file ends before `end_header`");

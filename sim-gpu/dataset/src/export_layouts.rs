@@ -15,7 +15,7 @@ use std::path::Path;
 const HASH_DIGITS: usize = 12;
 
 /// Most views of a mesh if each scan is a file of its own.
-const MOST_VIEWS: usize = 65_535;
+pub(crate) const MOST_VIEWS: usize = 65_535;
 
 /// Checks that the layouts of `config` can hold a dataset of `classes`. It is called before a run,
 /// since layouts are written at the end.
@@ -44,6 +44,11 @@ pub fn check_layouts(config: &DatasetConfig, classes: &[String]) -> Result<(), D
             }
         }
     }
+    Ok(check_views(config)?)
+}
+
+/// Checks that each mesh has no more views than `config` can hold.
+pub(crate) fn check_views(config: &DatasetConfig) -> Result<(), InvalidValue> {
     let counts = config.sets.iter().map(|set| set.viewpoints.count());
     let most = counts.max().unwrap_or(0);
     if most > MOST_VIEWS && !config.layouts.contains(&Layout::Webdataset) {
@@ -51,7 +56,7 @@ pub fn check_layouts(config: &DatasetConfig, classes: &[String]) -> Result<(), D
             "expected at most {MOST_VIEWS} where each scan is a file, found {most}; the layout \
              webdataset takes any number"
         );
-        return Err(InvalidValue::new("views", cause).into());
+        return Err(InvalidValue::new("views", cause));
     }
     Ok(())
 }

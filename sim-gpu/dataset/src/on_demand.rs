@@ -1,6 +1,7 @@
 use crate::clouds::Source;
 use crate::config::{DatasetConfig, Variant, Viewpoints};
 use crate::error::DatasetError;
+use crate::export_layouts::{MOST_VIEWS, check_views};
 use crate::mesh::{doubts, materials, read, warnings};
 use crate::record::{Cloud, Entry};
 use crate::view::{self, Rig, View, patterns};
@@ -65,8 +66,8 @@ impl Clouds {
     /// since labels are indices into their classes. Up to `cache_bytes` of meshes stay in memory.
     ///
     /// # Errors
-    /// If there is not exactly one set, if the settings simplify meshes, or if the effects do not
-    /// fit the sensor.
+    /// If there is not exactly one set, if there are too many views, if the settings simplify meshes, or if
+    /// the effects do not fit the sensor.
     pub fn new(
         config: DatasetConfig,
         meshes: &[MeshEntry],
@@ -84,6 +85,7 @@ impl Clouds {
         if let Viewpoints::Views(views) = &set.viewpoints {
             views.validate()?;
         }
+        check_views(&config)?;
         config.effects.for_sensor(set.sensor.profile())?;
         let patterns = patterns(&config)?;
         let variant =
@@ -299,8 +301,10 @@ impl Clouds {
         let target = Target::new(Surface::new(mesh, kept), Builder::Sah);
         let centre = DVec3::from_array(record.views_around);
         let scene = view::scene(config, target, centre, materials);
-        let poses = config.sets[0].poses(config.seed, &record.entry.id(), centre);
-        let sensors_m: Vec<DVec3> = poses.iter().map(|pose| pose.position_m).collect();
+        // Tars have any number of views, more than memory can hold.
+        let (id, first_views) = (record.entry.id(), 0..self.views().min(MOST_VIEWS) as u32);
+        let pose = |view| config.sets[0].pose(config.seed, &id, centre, view);
+        let sensors_m: Vec<DVec3> = first_views.map(|view| pose(view).position_m).collect();
         told.extend(doubts(&record.source, config, &scene, &sensors_m));
         let (known, new) = &mut *self.warnings.lock().unwrap_or_else(PoisonError::into_inner);
         new.extend(told.into_iter().filter(|warning| known.insert(warning.clone())));

@@ -83,6 +83,10 @@ fn a_network_of_clusters_is_trained_and_answers_unknown() {
     let wrong: usize =
         csv.lines().filter(|line| line.split(',').nth(1) == Some("all")).map(missed).sum();
     assert!(svg.contains(&format!("{wrong} objects named wrongly")), "{wrong}: {svg:.500}");
+    let unsuited = "warning: edge-64: expected a model of clusters in metres";
+    assert!(!stderr(&ran).contains("expected a model of clusters"), "{}", stderr(&ran));
+    let of_wholes = train(folder.path(), "eval --model edge-64 --data test.npz");
+    assert!(of_wholes.status.success() && stderr(&of_wholes).contains(unsuited));
     std::fs::write(folder.path().join("map.toml"), "cra = \"car\"").unwrap();
     for (words, code, cause) in [
         ("--known plane", 2, "--known: expected some of car, person, wall, found plane"),

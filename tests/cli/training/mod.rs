@@ -117,6 +117,9 @@ fn what_cannot_be_learnt_from_is_an_error_that_names_it() {
     let mut broken = clouds(12);
     broken[7].0[1][2] = f32::NAN;
     npz("nan.npz", &broken, &CLASSES);
+    let mut in_one_place = clouds(12);
+    in_one_place[8].0 = vec![[1.0, 2.0, 3.0]; 32];
+    npz("place.npz", &in_one_place, &CLASSES);
     let of_one = clouds(12).into_iter().map(|(points, _)| (points, 0)).collect::<Vec<_>>();
     npz("missing.npz", &of_one, &CLASSES);
     npz("one.npz", &of_one, &CLASSES[..1]);
@@ -132,8 +135,11 @@ fn what_cannot_be_learnt_from_is_an_error_that_names_it() {
     npz("set/packed/b-train.npz", &clouds(9), &CLASSES);
     std::fs::write(folder.path().join("bad.toml"), "epoch = 3").unwrap();
     std::fs::write(folder.path().join("zero.toml"), "epochs = 0").unwrap();
+    std::fs::write(folder.path().join("scale.toml"), "[augment]\nscale = [2, 1]").unwrap();
+    let in_one_place = "cloud 8 (rod_0008): expected points of an object, found all in one place";
     for (words, expected) in [
         ("--data nan.npz", "point 1 of cloud 7 (disc_0007) is not finite"),
+        ("--data place.npz", in_one_place),
         (
             "--data missing.npz",
             "missing.npz: expected clouds of every class, found none of disc: make",
@@ -146,6 +152,11 @@ fn what_cannot_be_learnt_from_is_an_error_that_names_it() {
         ("--data empty.npz", "empty.npz: expected clouds, found none: its train part is empty"),
         ("--data set", "modelnet40_shape_names.txt; found set/packed/a, set/packed/b: name one"),
         ("--data nowhere", "nowhere: expected a packed NPZ"),
+        ("--data set/packed/c", "; found set/packed/a, set/packed/b: name one"),
+        (
+            "--data . --recipe scale.toml",
+            "`augment.scale`: expected two finite factors above 0, ascending",
+        ),
         ("--data twice.npz", "twice.npz: expected a name for each class, found two classes `ball`"),
         (
             "--data sphere.npz --recipe metric.toml",
@@ -176,6 +187,24 @@ fn what_cannot_be_learnt_from_is_an_error_that_names_it() {
         );
         assert!(!folder.path().join("m.safetensors").exists());
     }
+    let ran = train(folder.path(), "eval --model edge-64 --data place.npz");
+    assert!(!ran.status.success() && stderr(&ran).contains(in_one_place), "{}", stderr(&ran));
+}
+
+#[test]
+fn a_folder_in_which_a_run_goes_on_is_refused_to_another() {
+    let folder = folder();
+    let words = "train --data . --recipe small.toml --out m.safetensors --overwrite";
+    std::fs::create_dir(folder.path().join("m.run")).unwrap();
+    let lock = std::fs::File::create(folder.path().join("m.run/lock")).unwrap();
+    lock.lock().unwrap();
+    let ran = train(folder.path(), words);
+    let expected = "m.run: expected the folder of a run that no other process trains";
+    assert!(!ran.status.success() && stderr(&ran).contains(expected), "{}", stderr(&ran));
+    assert_eq!(std::fs::read_dir(folder.path().join("m.run")).unwrap().count(), 1);
+    drop(lock);
+    let ran = train(folder.path(), words);
+    assert!(ran.status.success(), "{}", stderr(&ran));
 }
 
 #[test]

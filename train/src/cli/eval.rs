@@ -82,10 +82,10 @@ pub fn run(args: &EvalArgs) -> anyhow::Result<()> {
         let twice = args.data[i].display();
         return Err(Usage(format!("--data: expected each file once, found {twice} twice")).into());
     }
-    let (card, names) = {
+    let (card, names, unsuited) = {
         let classifier = Classifier::load(&args.model, &options(args))?;
         let names: Vec<String> = classifier.classes().iter().map(ToString::to_string).collect();
-        (classifier.card().clone(), names)
+        (classifier.card().clone(), names, classifier.unsuited_to_clusters())
     };
     let read = |path| Clouds::read_for(card.normalization, path, Split::Test, MOST_POINTS);
     let clouds = args.data.iter().map(|path| read(path)).collect::<Result<Vec<_>, _>>()?;
@@ -95,6 +95,9 @@ pub fn run(args: &EvalArgs) -> anyhow::Result<()> {
         let LabelledSet { range_m, sensor, ids, .. } = &clouds.set;
         range_m.is_some() || sensor.is_some() || ids.is_some()
     };
+    if let Some(warning) = unsuited.filter(|_| clouds.iter().any(has_remarks)) {
+        formats::say!("warning: {}: {warning}", args.model.display());
+    }
     match (&args.data[..], &clouds[..]) {
         ([data], [clouds]) if !is_asked && !has_remarks(clouds) => {
             report_clouds(args, data, clouds, &names)
