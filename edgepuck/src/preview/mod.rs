@@ -254,7 +254,7 @@ mod tests {
             let [low, high] = corners.unwrap_or_default();
             let corners = [[low, 0.0], [high, 0.0], [high, 0.5], [low, 0.5]];
             let tint = RGBColor(9, 9, 9);
-            let outline = panel::Outline { corners, class: "car", score: Some(0.5), tint };
+            let outline = Outline { corners, class: "car", score: Some(0.5), tint };
             let outlines = if high > low { vec![outline] } else { vec![] };
             draw_from_above(&scan, &[tint; 99], &outlines, "", &out).unwrap();
             fs::read(&out).unwrap()
