@@ -47,7 +47,7 @@ fn what_is_doubtful_about_a_mesh_is_told_once_by_every_command() {
     folder.write("own/cups/crossed.obj", crossed);
     folder.write(
         "own.toml",
-        "sensor = [{ profile = \"vlp16\" }]\nmount = { height_m = [2, 2] }\n[[object]]\n\
+        "sensor = [{ profile = \"vlp16\" }]\nmount = { height_m = [1, 1] }\n[[object]]\n\
          kind = \"mesh\"\nclass = \"cup\"\ncount = [1, 1]\nplace = \"anywhere\"\n\
          distance_m = [2, 3]\nmeshes = \"cups\"\nheight_m = [1, 1]\n",
     );

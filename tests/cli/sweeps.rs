@@ -370,6 +370,6 @@ fn what_cannot_be_used_is_named_and_nothing_is_written() {
         "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\n\
          property float y\nproperty float z\nend_header\n",
     );
-    folder.refuses(3, &[("preview empty.ply --out out.png", "empty.ply: expected points to draw")]);
+    folder.refuses(3, &[("preview empty.ply --out out.png", "empty.ply: expected points, meshes")]);
     assert!(!folder.at("out").exists(), "something was written");
 }

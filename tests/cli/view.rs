@@ -139,10 +139,7 @@ fn folders_captures_meshes_and_scenes_are_shown() {
         &[
             ("view nowhere.npz --out a.html", "nowhere.npz"),
             ("view bad.json --out a.html", "bad.json: objects: expected boxes as of detect"),
-            (
-                "view negative.json --out a.html",
-                "objects[0]: expected metres up to 1e7, and no size",
-            ),
+            ("view negative.json --out a.html", "negative.json: objects[0]: expected boxes"),
         ],
     );
     assert!(!folder.at("a.html").exists());

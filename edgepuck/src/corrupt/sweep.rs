@@ -73,8 +73,8 @@ pub(super) fn run(
     }
     if !written.is_empty() {
         write_list(&written, &args.out)?;
+        begun.into_iter().for_each(UnfinishedFolder::finish);
     }
-    begun.into_iter().for_each(UnfinishedFolder::finish);
     if too_weak_before > 0 {
         formats::say!(
             "warning: {too_weak_before} of the points are below the profile's detection limit as \
