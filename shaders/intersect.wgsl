@@ -71,15 +71,19 @@ fn intersect(origin: vec3f, shear: Shear, triangle: LeafTriangle) -> Candidate {
     let w = edge(ax, ay, bx, by);
     let least = min(min(u, v), w);
     let most = max(max(u, v), w);
-    // Beside no edge by more than the displacement; the shear makes a side at most sqrt(3) longer.
+    // A ray within DISPLACEMENT of the triangle is outside no side by more than this: the shear makes
+    // a side at most sqrt(3) longer.
     let margin = 2.0 * DISPLACEMENT * triangle.longest;
     if least < -margin && most > margin {
         return Candidate(false, 0.0, 0.0, NO_HIT);
     }
-    let near_edge = within(u, cx - bx, cy - by)
-        || within(v, cx - ax, cy - ay)
-        || within(w, bx - ax, by - ay);
-    if least < 0.0 && most > 0.0 && !near_edge {
+    let near_u = within(u, cx - bx, cy - by);
+    let near_v = within(v, cx - ax, cy - ay);
+    let near_w = within(w, bx - ax, by - ay);
+    // Outside by the sides that the ray is not near.
+    let left = (u < 0.0 && !near_u) || (v < 0.0 && !near_v) || (w < 0.0 && !near_w);
+    let right = (u > 0.0 && !near_u) || (v > 0.0 && !near_v) || (w > 0.0 && !near_w);
+    if left && right {
         return Candidate(false, 0.0, 0.0, NO_HIT);
     }
     let az = row(shear.z, a);
@@ -88,7 +92,8 @@ fn intersect(origin: vec3f, shear: Shear, triangle: LeafTriangle) -> Candidate {
     let determinant = u + v + w;
     // A triangle seen edge-on is met anywhere along its extent.
     var t = min(min(az, bz), cz);
-    var error = DISPLACEMENT + (max(max(az, bz), cz) - t);
+    let extent = max(max(az, bz), cz) - t;
+    var error = DISPLACEMENT + extent;
     if determinant != 0.0 {
         t = fma(w, cz, fma(v, bz, u * az)) / determinant;
         // The normal in sheared space has the determinant as its z: their ratio is
@@ -96,10 +101,11 @@ fn intersect(origin: vec3f, shear: Shear, triangle: LeafTriangle) -> Candidate {
         let slope_x = edge(by - ay, bz - az, cy - ay, cz - az);
         let slope_y = edge(bz - az, bx - ax, cz - az, cx - ax);
         let slope = (abs(slope_x) + abs(slope_y)) / abs(determinant);
-        error = DISPLACEMENT * (1.0 + slope);
+        let rounding = EDGE_ROUNDING * triangle.longest * triangle.longest * extent / abs(determinant);
+        error = DISPLACEMENT * (1.0 + slope) + rounding;
     }
     // Near an edge the ray may truly miss the triangle; a triangle within its error of the origin
     // may truly lie behind it.
-    let is_open = near_edge || t < error;
+    let is_open = near_u || near_v || near_w || t < error;
     return Candidate(t + error >= 0.0, t, error, select(NO_HIT, t - error, is_open));
 }

@@ -96,9 +96,7 @@ pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
 /// Runs the command line `words` like [`main`], but returns errors to the caller instead of
 /// printing them. `--help` is an error.
 pub fn run_words(words: impl IntoIterator<Item = OsString>) -> anyhow::Result<Outcome> {
-    let done = run(&parsed(words)?.command);
-    formats::atomic::forget_new();
-    done
+    run(&parsed(words)?.command)
 }
 
 /// The command line `words`. The examples of commands that `infer-cpu` has too are of this program.
@@ -125,6 +123,7 @@ fn run_as_program(command: &Command) -> anyhow::Result<Outcome> {
 }
 
 fn run(command: &Command) -> anyhow::Result<Outcome> {
+    formats::atomic::forget_new();
     match command {
         Command::GenDataset(args) => gen_dataset::run(args),
         Command::GenScenes(args) => gen_scenes::run(args),

@@ -45,6 +45,10 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         )
     );
     panes[0].frames.truncate(1);
+    // Meshes are drawn where there are no points.
+    for frame in panes[0].frames.iter_mut().filter(|frame| frame.n_points() > 0) {
+        frame.meshes.clear();
+    }
     let (told, is_empty) = (panes[0].told(), panes[0].is_empty());
     let Some(shown) = panes[0].frames.pop().filter(|_| !is_empty) else {
         formats::say!("{}: expected points, meshes or boxes to draw, found none", file.display());

@@ -41,13 +41,15 @@ fn new() -> MutexGuard<'static, BTreeSet<PathBuf>> {
     NEW.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Notes that nothing is at `path`: this process may make a file or a folder there, and replace none.
+/// Notes whether this process may only make a file or a folder at `path`, and replace none.
 #[cfg(feature = "cli")]
-pub(crate) fn expect_new(path: &Path) {
-    new().insert(behind_links(path));
+pub(crate) fn expect_new(path: &Path, is_new: bool) {
+    let path = behind_links(path);
+    let mut new = new();
+    let _ = if is_new { new.insert(path) } else { new.remove(&path) };
 }
 
-/// Forgets which outputs are new: for a process that runs several commands.
+/// Forgets which outputs are new: for a process that runs several commands, one after the other.
 #[cfg(feature = "cli")]
 pub fn forget_new() {
     new().clear();
@@ -90,14 +92,18 @@ impl UnfinishedFolder {
     /// # Errors
     /// Errors of the system; another program made the folder since this one looked.
     pub fn begin(path: &Path) -> Result<Self, FormatError> {
-        if new().remove(path) {
+        let is_new = new().remove(path);
+        if is_new {
             make_folder_of(path)?;
+        }
+        let mut unfinished = unfinished();
+        if is_new {
             fs::create_dir(path).map_err(|source| match source.kind() {
                 io::ErrorKind::AlreadyExists => FormatError::io(path, made_meanwhile()),
                 _ => FormatError::io(path, source),
             })?;
         }
-        unfinished().insert(path.to_path_buf());
+        unfinished.insert(path.to_path_buf());
         Ok(Self(path.to_path_buf()))
     }
 
@@ -385,7 +391,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let [file, made] = ["scan.bin", "made"].map(|name| folder.path().join(name));
         for path in [&file, &made] {
-            expect_new(path);
+            expect_new(path, true);
         }
         fs::write(&file, "theirs").unwrap();
         fs::create_dir(&made).unwrap();
@@ -393,9 +399,13 @@ mod tests {
         assert!(refused.contains("scan.bin") && refused.contains("meanwhile"), "{refused}");
         assert!(UnfinishedFolder::begin(&made).is_err() && made.is_dir());
         assert_eq!(fs::read(&file).unwrap(), b"theirs");
+        // What a later command may replace, it replaces.
+        expect_new(&file, true);
+        expect_new(&file, false);
+        write_bytes(&file, "ours").unwrap();
         // What this process made itself, it may replace.
         let own = folder.path().join("own.bin");
-        expect_new(&own);
+        expect_new(&own, true);
         write_bytes(&own, "first").unwrap();
         write_bytes(&own, "second").unwrap();
         assert_eq!(fs::read(&own).unwrap(), b"second");

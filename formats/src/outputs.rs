@@ -43,9 +43,7 @@ impl Overwrite {
             return Err(refused(path, "it exists already: --overwrite replaces it"));
         }
         check_place(path)?;
-        if !self.overwrite && !path.exists() {
-            expect_new(path);
-        }
+        expect_new(path, !self.overwrite && !path.exists());
         Ok(())
     }
 

@@ -102,34 +102,35 @@ fn pose_of(line: &str, at_s: f64) -> Result<KeyedPose, String> {
 /// Faster than cars, metres per second.
 const FASTEST_M_S: f64 = 100.0;
 
-/// Why `poses` are probably not those of `what`, such as "the sensor", on the ground, in metres and
-/// seconds; empty if nothing speaks against it.
+/// Why `poses` are probably not those of `what`, such as "the sensor", in metres and seconds, if something
+/// speaks against it.
 #[must_use]
-pub fn doubts(what: &str, poses: &[KeyedPose]) -> Vec<String> {
-    let mut doubts = Vec::new();
+pub fn doubtful_speed(what: &str, poses: &[KeyedPose]) -> Option<String> {
     let speeds = poses.windows(2).map(|pair| {
         let (a, b) = (&pair[0], &pair[1]);
         let square = |axis: usize| (b.position_m[axis] - a.position_m[axis]).powi(2);
         ([0, 1, 2].map(square).iter().sum::<f64>().sqrt() / (b.time_s - a.time_s), a.time_s)
     });
-    if let Some((speed_m_s, at_s)) = speeds.max_by(|a, b| a.0.total_cmp(&b.0))
-        && speed_m_s > FASTEST_M_S
-    {
-        doubts.push(format!(
+    let (speed_m_s, at_s) = speeds.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (speed_m_s > FASTEST_M_S).then(|| {
+        format!(
             "{what} moves at {speed_m_s:.0} m/s at {at_s} s: expected at most {FASTEST_M_S} m/s; are \
              the positions in metres and the times in seconds?"
-        ));
-    }
-    // The z axis points down.
+        )
+    })
+}
+
+/// Why the rotations of `poses` are probably not those of `what`, which stands upright.
+#[must_use]
+pub fn doubtful_rotation(what: &str, poses: &[KeyedPose]) -> Option<String> {
+    // 0.5 is a z axis that is level, and 1 one that points down.
+    const MOST: f64 = 0.6;
     let is_inverted = |pose: &&KeyedPose| {
         let [x, y, ..] = pose.quaternion_xyzw;
-        x * x + y * y > 0.5
+        x * x + y * y > MOST
     };
-    if 2 * poses.iter().filter(is_inverted).count() > poses.len() {
-        doubts
-            .push(format!("{what} stands on its head: expected quaternions in the order x y z w"));
-    }
-    doubts
+    (2 * poses.iter().filter(is_inverted).count() > poses.len())
+        .then(|| format!("{what} stands on its head: expected quaternions in the order x y z w"))
 }
 
 /// Times of packets that are further outside of poses have none: a recording may begin and end

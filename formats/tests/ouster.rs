@@ -262,7 +262,7 @@ fn the_transform_of_the_lidar_turns_its_azimuths() {
         metadata["lidar_to_sensor_transform"] = json!(whole);
         let yaw_rad = parse(&metadata).unwrap().yaw_rad();
         assert_eq!(yaw_rad, quarters * std::f64::consts::FRAC_PI_2);
-        // Column 0 looks along the lidar's x, which is clockwise of the sensor's by less than nothing.
+        // Azimuths are clockwise: a lidar that is turned by a yaw begins at minus the yaw.
         let (bytes, mut returns) = (packet(Profile::Single, 0, 0), Vec::new());
         let mut packets = formats::packets::Decoder::new(Some(&parse(&metadata).unwrap()), &bytes);
         let facts = packets.as_mut().unwrap().decode(&bytes, &mut returns).unwrap();

@@ -26,9 +26,15 @@ class View:
             Error: The name has another extension, or the file cannot be written.
         """
         _arguments.check_extension(path, ".html")
+        page = Path(path)
+        part = page.with_name(f".{page.name}.tmp")
         try:
-            Path(path).parent.mkdir(parents=True, exist_ok=True)
-            Path(path).write_text(self.page, encoding="utf-8")
+            page.parent.mkdir(parents=True, exist_ok=True)
+            try:
+                part.write_text(self.page, encoding="utf-8")
+                part.replace(page)
+            finally:
+                part.unlink(missing_ok=True)
         except OSError as error:
             raise _edgepuck.Error(f"{os.fspath(path)}: {error.strerror}") from None
 

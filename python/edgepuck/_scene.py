@@ -384,9 +384,9 @@ def _remade(
 def _numbers(name: str, instances: Iterable[int]) -> list[int]:
     """The numbers of different instances."""
     numbers = [whole(name, number, 0, 2**32 - 1) for number in instances]
-    twice = sorted(number for number in set(numbers) if numbers.count(number) > 1)
-    if twice:
-        raise _edgepuck.Error(f"{name}: expected each instance once, found {twice[0]} twice")
+    if len(set(numbers)) < len(numbers):
+        twice = min(number for number in numbers if numbers.count(number) > 1)
+        raise _edgepuck.Error(f"{name}: expected each instance once, found {twice} twice")
     return numbers
 
 

@@ -16,7 +16,7 @@ struct LeafTriangle {
     a: vec3f,
     index: u32,
     b: vec3f,
-    // The length of the longest side.
+    // The length of the longest side, and some rounding.
     longest: f32,
     c: vec3f,
     _padding_c: u32,

@@ -1,5 +1,6 @@
 //! Reading TOML files that users write: sensors, poses and scenes.
 
+use std::ffi::OsStr;
 use std::fmt;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -113,8 +114,10 @@ pub fn read<T: DeserializeOwned, U, E: Into<Vec<InvalidValue>>>(
     if text.len() as u64 > MAX_FILE_BYTES {
         return Err(ConfigError::TooLong { file: file.to_owned() });
     }
-    // What is no TOML at all, such as a mesh, would have a mistake in each line.
-    let other = file.extension().filter(|extension| !extension.eq_ignore_ascii_case("toml"));
+    // A mesh would have a mistake in each line.
+    const MESHES: [&str; 7] = ["obj", "off", "ply", "stl", "glb", "gltf", "urdf"];
+    let is_mesh = |name: &&OsStr| MESHES.iter().any(|mesh| name.eq_ignore_ascii_case(mesh));
+    let other = file.extension().filter(is_mesh);
     match other.filter(|_| text.parse::<toml::Table>().is_err()) {
         Some(extension) => Err(ConfigError::Content {
             file: file.to_owned(),

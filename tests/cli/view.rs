@@ -100,7 +100,7 @@ fn folders_captures_meshes_and_scenes_are_shown() {
     // A picture shows the first of what a page shows.
     let boxes = frame(&data(&folder, "truth.html"), 0)["boxes"].as_array().unwrap().len();
     for (inputs, told) in [
-        (mesh, "1 meshes: scan.png".to_owned()),
+        (mesh, "1 mesh: scan.png".to_owned()),
         ("drive.truth.jsonl", format!("{boxes} boxes: scan.png")),
         ("drive.pcap drive.truth.jsonl", " boxes: scan.png".to_owned()),
     ] {

@@ -49,8 +49,8 @@ pub fn read(file: &Path, points: &PointsArgs) -> anyhow::Result<Content> {
     }))
 }
 
-/// What is first seen of a file or a folder of any kind, but for boxes that are only described beside
-/// it: of a capture, its first whole turn; of a folder, what has points first.
+/// The first frame with points of a file or a folder of any kind, or else the first: of a capture, the first
+/// whole turn. It has no boxes of a file beside it.
 pub fn first_frame(file: &Path, points: &PointsArgs) -> anyhow::Result<Content> {
     let frames = match points.is_capture(file) {
         true => vec![cloud(file, points)?],

@@ -113,12 +113,13 @@ impl Pane {
     pub fn told(&self) -> String {
         let sum = |of: fn(&Frame) -> usize| self.frames.iter().map(of).sum::<usize>();
         let all = [
-            (sum(Frame::n_points), "points"),
-            (sum(|frame| frame.meshes.len()), "meshes"),
-            (sum(|frame| frame.boxes.len()), "boxes"),
+            (sum(Frame::n_points), ["point", "points"]),
+            (sum(|frame| frame.meshes.len()), ["mesh", "meshes"]),
+            (sum(|frame| frame.boxes.len()), ["box", "boxes"]),
         ];
+        let all = all.iter().filter(|(n, _)| *n > 0);
         let told: Vec<_> =
-            all.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}")).collect();
+            all.map(|(n, words)| format!("{n} {}", words[usize::from(*n > 1)])).collect();
         match self.frames.len() {
             1 => told.join(", "),
             n => format!("{} in {n} frames", told.join(", ")),

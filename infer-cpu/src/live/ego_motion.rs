@@ -1,7 +1,9 @@
 use std::path::Path;
 
 use formats::FormatError;
-use formats::trajectory::{KeyedPose, check_cover, doubts, read_trajectory};
+use formats::trajectory::{
+    KeyedPose, check_cover, doubtful_rotation, doubtful_speed, read_trajectory,
+};
 use glam::{DQuat, DVec3};
 
 /// The position and orientation of the sensor.
@@ -101,7 +103,9 @@ impl EgoMotion {
             position_m: pose.position_m.into(),
             quaternion_xyzw: pose.world_from_sensor.into(),
         });
-        let mut doubts = doubts("the sensor", &keyed.collect::<Vec<_>>());
+        let keyed: Vec<_> = keyed.collect();
+        let found = [doubtful_speed, doubtful_rotation].map(|doubt| doubt("the sensor", &keyed));
+        let mut doubts: Vec<String> = found.into_iter().flatten().collect();
         let steps = poses.windows(2).map(|pair| (pair[0].0, pair[1].0 - pair[0].0));
         if let Some((at_s, gap_s)) = steps.max_by(|a, b| a.1.total_cmp(&b.1))
             && gap_s > LONGEST_GAP_S

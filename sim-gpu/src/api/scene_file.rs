@@ -28,7 +28,9 @@ impl TryFrom<&SceneFile> for Scene {
         let objects = file.objects.iter().map(|it| ("object", &it.name, &it.motion));
         let sensors = file.sensors.iter().map(|it| ("sensor", &it.name, &it.motion));
         for (kind, name, motion) in objects.chain(sensors) {
-            let doubts = motion.iter().flat_map(|it| it.doubts(&format!("{kind} {name:?}")));
+            let doubts = motion
+                .iter()
+                .flat_map(|it| it.doubts(&format!("{kind} {name:?}"), kind == "sensor"));
             scene.doubts.extend(doubts);
         }
         for (i, object) in file.objects.iter().enumerate() {

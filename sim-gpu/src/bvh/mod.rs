@@ -34,9 +34,9 @@ const MAX_LEAF: usize = 4;
 
 /// How far boxes reach beyond their triangles, in the unit frame, whose coordinates are at most 1.
 ///
-/// A box must not reject a ray that a triangle inside it accepts. By rounding, a triangle test
-/// may accept a ray that passes 56 units of 2^-24 outside the triangle (`cpu::intersect`), and a
-/// slab test moves the planes of a box by 4 more (`cpu::traverse`). 2^-18 is 64 such units.
+/// A box must not reject a ray that truly meets a triangle inside it. In units of 2^-24, the ray and
+/// the triangle are off by 17 (`cpu::intersect`), and a slab test moves the planes of a box by 4 more
+/// (`cpu::traverse`). 2^-18 is 64 such units.
 const BOX_PADDING: f32 = 1.0 / (1 << 18) as f32;
 
 /// An algorithm that builds hierarchies.

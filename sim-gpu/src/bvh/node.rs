@@ -37,7 +37,7 @@ pub struct LeafTriangle {
     pub index: u32,
     /// The middle corner.
     pub b: [f32; 3],
-    /// The length of the longest side.
+    /// The length of the longest side, and 16u for the rounding of two corners in sheared space.
     pub longest: f32,
     /// The highest corner.
     pub c: [f32; 3],
@@ -98,7 +98,9 @@ impl LeafTriangle {
     pub(super) fn new(corners: [[f32; 3]; 3], index: u32) -> Self {
         let [a, b, c] = canonical_corners(corners);
         let length = |[p, q]: [[f32; 3]; 2]| Vec3::from_array(p).distance(Vec3::from_array(q));
+        const ROUNDING: f32 = 16.0 / 16_777_216.0;
         let longest = [[a, b], [b, c], [a, c]].map(length).into_iter().fold(0.0, f32::max);
+        let longest = longest + ROUNDING;
         Self { a, index, b, longest, c, _padding_c: 0 }
     }
 }

@@ -32,14 +32,14 @@ pub struct WideNode {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct WideChild(u32);
 
-/// A leaf of up to four triangles. Unused places hold a triangle without area.
+/// A leaf of up to four triangles. Unused places hold a triangle without area, which no ray meets.
 #[repr(C, align(64))]
 #[derive(Clone, Copy, Debug)]
 pub struct Leaf4 {
     /// Each triangle's corners in canonical order: of the lowest corners x of all,
     /// y of all, z of all, then of the middle ones and of the highest.
     pub corners: [[[f32; LEAF]; 3]; 3],
-    /// The length of each triangle's longest side; negative in unused places, near which no ray passes.
+    /// `LeafTriangle::longest` of each; -1 in unused places, so that the test rejects every ray.
     pub longest: [f32; LEAF],
     pub(crate) indices: [u32; LEAF],
     /// How many triangles there are.

@@ -12,7 +12,7 @@ const WIDEST: f32 = 0.3;
 ///
 /// In units u = 2^-24, with boxes within 1 of the origin, origins within 2 and slopes within
 /// 1.3: a slope is off by 3u, a crossing by 13u, their sum at a box by 23u. The triangle test
-/// accepts triangles up to 48u from the ray (`intersect::DISPLACEMENT`).
+/// accepts triangles up to 56u from the ray (`intersect::DISPLACEMENT`).
 const MARGIN: f32 = 128.0 / 16_777_216.0;
 
 type Interval = [f32; 2];

@@ -5,7 +5,7 @@
 //! of `traverse` for a single ray to the bit.
 
 use super::frustum::Frustum;
-use super::intersect::DISPLACEMENT;
+use super::intersect::{DISPLACEMENT, EDGE_ROUNDING};
 use super::traverse::{FAR_SCALE, Instructions, Nearest, PACKET, Prepared};
 use crate::bvh::{Entered, LEAF, Leaf4, MAX_DEPTH, Stack, WIDTH, WideBvh, WideChild, WideNode};
 use crate::lanes::each;
@@ -237,11 +237,19 @@ impl<S: Simd> Packet<S> {
         if live.to_bitmask() == 0 {
             return;
         }
-        let near_edge = within(u, c.x - b.x, c.y - b.y)
-            | within(v, c.x - a.x, c.y - a.y)
-            | within(w, b.x - a.x, b.y - a.y);
+        let near = [
+            within(u, c.x - b.x, c.y - b.y),
+            within(v, c.x - a.x, c.y - a.y),
+            within(w, b.x - a.x, b.y - a.y),
+        ];
+        let near_edge = near[0] | near[1] | near[2];
         let zero = self.by.splat(0.0);
-        let outside = least.simd_lt(zero) & most.simd_gt(zero);
+        let left = (u.simd_lt(zero) & !near[0])
+            | (v.simd_lt(zero) & !near[1])
+            | (w.simd_lt(zero) & !near[2]);
+        let right = (u.simd_gt(zero) & !near[0])
+            | (v.simd_gt(zero) & !near[1])
+            | (w.simd_gt(zero) & !near[2]);
         let per_z = self.shear[2];
         let (az, bz, cz) = (a.along * per_z, b.along * per_z, c.along * per_z);
         let determinant = u + v + w;
@@ -249,14 +257,16 @@ impl<S: Simd> Packet<S> {
         let slope_x = edge(b.y - a.y, bz - az, c.y - a.y, cz - az);
         let slope_y = edge(bz - az, b.x - a.x, cz - az, c.x - a.x);
         let slope = (slope_x.abs() + slope_y.abs()) / determinant.abs();
-        let error = (slope + 1.0) * DISPLACEMENT;
         let (first, last) = (az.min(bz).min(cz), az.max(bz).max(cz));
+        let longest = leaf.longest[i];
+        let rounding = (last - first) * (EDGE_ROUNDING * longest * longest) / determinant.abs();
+        let error = (slope + 1.0) * DISPLACEMENT + rounding;
         let edge_on = determinant.simd_eq(zero);
         let t = edge_on.select(first, t);
         let error = edge_on.select((last - first) + DISPLACEMENT, error);
         let is_open = near_edge | t.simd_lt(error);
         let rival = is_open.select(t - error, self.by.splat(NO_HIT));
-        let met = zero.simd_le(t + error) & (near_edge | !outside) & live;
+        let met = zero.simd_le(t + error) & !(left & right) & live;
         nearest.consider(met, [t, error, rival], leaf.indices[i]);
     }
 

@@ -3,7 +3,7 @@
 
 use crate::bvh::MAX_DEPTH;
 use crate::cpu::aim::BEFORE;
-use crate::cpu::intersect::DISPLACEMENT;
+use crate::cpu::intersect::{DISPLACEMENT, EDGE_ROUNDING};
 use crate::cpu::traverse::{FAR_SCALE, LEAST_COMPONENT};
 use crate::effects::{Effects, RayEffect, RayInput};
 use crate::ray::{AMBIGUOUS, MISS, NO_HIT, SENT};
@@ -60,6 +60,7 @@ pub(super) fn reads_random_bits(effects: &Effects) -> bool {
 pub(super) fn constants() -> String {
     let floats = [
         ("DISPLACEMENT", DISPLACEMENT),
+        ("EDGE_ROUNDING", EDGE_ROUNDING),
         ("FAR_SCALE", FAR_SCALE),
         ("LEAST_COMPONENT", LEAST_COMPONENT),
         ("NO_HIT", NO_HIT),

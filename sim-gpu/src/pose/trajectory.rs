@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use formats::FormatError;
-use formats::trajectory::{KeyedPose, doubts, read_trajectory};
+use formats::trajectory::{KeyedPose, doubtful_rotation, doubtful_speed, read_trajectory};
 use glam::DQuat;
 
 use super::Pose;
@@ -80,14 +80,16 @@ impl Trajectory {
         (far_m, turned_rad)
     }
 
-    /// As [`doubts`] says of the poses of `what`.
-    pub(crate) fn doubts(&self, what: &str) -> Vec<String> {
+    /// As [`doubtful_speed`] says of the poses of `what`, and [`doubtful_rotation`] of those of a sensor.
+    pub(crate) fn doubts(&self, what: &str, is_sensor: bool) -> Vec<String> {
         let keyed = self.0.iter().map(|(time_s, pose)| KeyedPose {
             time_s: *time_s,
             position_m: pose.position_m.into(),
             quaternion_xyzw: pose.rotation.into(),
         });
-        doubts(what, &keyed.collect::<Vec<_>>())
+        let keyed: Vec<_> = keyed.collect();
+        let rotation = is_sensor.then(|| doubtful_rotation(what, &keyed)).flatten();
+        doubtful_speed(what, &keyed).into_iter().chain(rotation).collect()
     }
 
     /// The times of the first and the last pose, seconds.

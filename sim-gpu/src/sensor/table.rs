@@ -147,9 +147,10 @@ fn read(file: &Path) -> Result<Vec<[f64; 2]>, ConfigError> {
         };
         let mut places = (0..heading.len()).filter(|&at| is_it(&heading[at]));
         match (places.next(), places.next()) {
-            (Some(_), Some(again)) => {
-                Err(failed(1, format!("expected one column {}, found another", &heading[again])))
-            }
+            (Some(_), Some(again)) => Err(failed(
+                1,
+                format!("expected one column of {name}, found {} too", &heading[again]),
+            )),
             (place, _) => Ok(place),
         }
     };

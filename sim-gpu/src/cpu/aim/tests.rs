@@ -68,6 +68,9 @@ fn rays_pass_the_true_ones_within_the_account() {
                     let true_direction = turn * beam;
                     let aside = aside - true_direction * aside.dot(true_direction);
                     assert!(aside.abs().max_element() <= bound, "{aside} of {origin} {beam}");
+                    // As a length, 8.2u and 3.7u (`intersect::DISPLACEMENT`).
+                    let bound = if length == 0.0 { 8.2 } else { 8.2 + 3.7 };
+                    assert!(aside.length() <= bound * U, "{aside} of {origin} {beam}");
                 }
             }
         }

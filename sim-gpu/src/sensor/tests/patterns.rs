@@ -356,7 +356,7 @@ fn a_table_that_cannot_be_used_is_named_with_its_line() {
         ),
         (
             "azimuth_deg,elevation_deg,Azimuth/deg\n1,1,2\n",
-            "line 1: expected one column Azimuth/deg, found another",
+            "line 1: expected one column of azimuth, found Azimuth/deg too",
         ),
         (
             "a,b\n1,2\n",
