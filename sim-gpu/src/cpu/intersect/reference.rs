@@ -147,8 +147,9 @@ fn the_error_bounds_the_distance_of_slivers() {
         let inside = a + (corners[1] - a) * p + (corners[2] - a) * q;
         let Some(back) = (point(10)).try_normalize() else { continue };
         let (origin, direction) = (inside + back * 2.0, -back);
-        let leaf =
-            &Bvh::build(Builder::Morton, &[0], |_| corners.map(Vec3::to_array)).wide.leaves[1];
+        let leaf = &Bvh::build(Builder::Morton, &[0], |_| corners.map(|corner| corner.to_array()))
+            .wide
+            .leaves[1];
         let corner = |c: usize| leaf.corners[c].map(|axis| axis[0]);
         let canonical = [0, 1, 2].map(corner);
         let Some([t, error, rival]) = intersect(origin, direction, canonical, leaf.longest[0])
