@@ -225,15 +225,16 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let write = |name: &str, text| fs::write(folder.path().join(name), text).unwrap();
         write("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
-        // Half a metre in millimetres, within 0.1 s, and no rotation as w x y z.
+        // Half a metre in millimetres within 0.1 s, of an object upside down; no rotation as w x y z.
         write("a.tum", "0 0 0 0 1 0 0 0\n0.1 500 0 0 1 0 0 0\n");
+        write("b.tum", "0 0 0 1 1 0 0 0\n0.1 0 0 1 1 0 0 0\n");
         let text = "[[object]]\nmesh = \"a.off\"\ntrajectory = \"a.tum\"\n\
-                    [[sensor]]\nprofile = \"vlp16\"\nposition_m = [0, 0, 1]\nyaw_deg = 0\n";
+                    [[sensor]]\nprofile = \"vlp16\"\ntrajectory = \"b.tum\"\n";
         write("scene.toml", text);
         let scene = Scene::read(folder.path().join("scene.toml")).unwrap();
         let [speed, head] = scene.warnings()[..] else { panic!("{:?}", scene.warnings()) };
         assert!(speed.starts_with("object \"a\" moves at 5000 m/s at 0 s: "), "{speed}");
-        assert!(head.starts_with("object \"a\" stands on its head: "), "{head}");
+        assert!(head.starts_with("sensor \"vlp16\" stands on its head: "), "{head}");
     }
 
     #[test]
