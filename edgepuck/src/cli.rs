@@ -123,7 +123,7 @@ fn run_as_program(command: &Command) -> anyhow::Result<Outcome> {
 }
 
 fn run(command: &Command) -> anyhow::Result<Outcome> {
-    formats::atomic::forget_new();
+    formats::new_outputs::forget();
     match command {
         Command::GenDataset(args) => gen_dataset::run(args),
         Command::GenScenes(args) => gen_scenes::run(args),

@@ -5,11 +5,12 @@ use edgepuck_segment::OrientedBox;
 use formats::FormatError;
 use formats::foreign::read_text;
 use formats::periodic::shorter_way;
-use glam::{DMat3, DMat4, DQuat, DVec3};
+use glam::{DMat3, DMat4, DVec3};
 use sim_gpu::glam;
 use std::f64::consts::TAU;
 use std::path::Path;
 
+use crate::cuboid;
 use crate::street::StreetClass;
 
 /// The most that products of a rotation's rows may be off: KITTI rounds to 7 digits, others to 3.
@@ -162,17 +163,11 @@ pub fn line(
     )
 }
 
-/// The corners of a box around the base and then around the top, metres.
+/// The [corners](cuboid::corners) of a box.
 pub fn corners(place: &OrientedBox) -> [DVec3; 8] {
     let OrientedBox { centre_m, size_m, yaw_rad } = *place;
-    let turned = DQuat::from_rotation_z(yaw_rad.into());
-    let [ahead, aside, up] =
-        [0, 1, 2].map(|axis| turned * DVec3::AXES[axis] * f64::from(size_m[axis]) * 0.5);
-    let at = |level: f64, [x, y]: [f64; 2]| {
-        DVec3::from(centre_m.map(f64::from)) + x * ahead + y * aside + level * up
-    };
-    let around = [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]];
-    [0, 1, 2, 3, 4, 5, 6, 7].map(|i| at(if i < 4 { -1.0 } else { 1.0 }, around[i % 4]))
+    let [centre_m, size_m] = [centre_m, size_m].map(|of| DVec3::from(of.map(f64::from)));
+    cuboid::corners(centre_m, size_m, yaw_rad.into())
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@ pub mod cli;
 mod cluster;
 mod colours;
 mod corrupt;
+mod cuboid;
 #[cfg(feature = "models")]
 pub mod detect;
 mod effect_flags;

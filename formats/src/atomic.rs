@@ -17,6 +17,7 @@ use tempfile::TempPath;
 use crate::error::FormatError;
 #[cfg(feature = "dataset")]
 use crate::hash::{FileHash, HashedFile, Hasher, Hashing};
+use crate::new_outputs;
 
 const PREFIX: &str = ".edgepuck-";
 const SUFFIX: &str = ".tmp";
@@ -31,45 +32,6 @@ static UNFINISHED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
     UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// The outputs that did not exist when this process looked, and that it may not replace: one that is
-/// there when it is finished is another program's.
-static NEW: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
-
-fn new() -> MutexGuard<'static, BTreeSet<PathBuf>> {
-    NEW.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// Notes whether this process may only make a file or a folder at `path`, and replace none.
-#[cfg(feature = "cli")]
-pub(crate) fn expect_new(path: &Path, is_new: bool) {
-    let path = behind_links(path);
-    let mut new = new();
-    let _ = if is_new { new.insert(path) } else { new.remove(&path) };
-}
-
-/// Forgets which outputs are new: for a process that runs several commands, one after the other.
-#[cfg(feature = "cli")]
-pub fn forget_new() {
-    new().clear();
-}
-
-fn made_meanwhile() -> io::Error {
-    let cause = "another program made it meanwhile: name another, or replace it by --overwrite";
-    io::Error::new(io::ErrorKind::AlreadyExists, cause)
-}
-
-/// The file to which the symbolic links at `path` lead, which need not exist; `path` if there are none.
-fn behind_links(path: &Path) -> PathBuf {
-    // As many as Linux follows.
-    const MOST_LINKS: usize = 40;
-    let mut path = path.to_path_buf();
-    for _ in 0..MOST_LINKS {
-        let Ok(target) = fs::read_link(&path) else { break };
-        path = path.parent().unwrap_or(Path::new("")).join(target);
-    }
-    path
 }
 
 /// Removes the files and folders that are not complete yet, and begins no others: for a process that
@@ -92,14 +54,16 @@ impl UnfinishedFolder {
     /// # Errors
     /// Errors of the system; another program made the folder since this one looked.
     pub fn begin(path: &Path) -> Result<Self, FormatError> {
-        let is_new = new().remove(path);
+        let is_new = new_outputs::take(path);
         if is_new {
             make_folder_of(path)?;
         }
         let mut unfinished = unfinished();
         if is_new {
             fs::create_dir(path).map_err(|source| match source.kind() {
-                io::ErrorKind::AlreadyExists => FormatError::io(path, made_meanwhile()),
+                io::ErrorKind::AlreadyExists => {
+                    FormatError::io(path, new_outputs::made_meanwhile())
+                }
                 _ => FormatError::io(path, source),
             })?;
         }
@@ -113,7 +77,7 @@ impl UnfinishedFolder {
     /// As [`UnfinishedFolder::begin`].
     pub fn begin_new(path: &Path) -> Result<Option<Self>, FormatError> {
         let has_entries = fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_some());
-        if has_entries && !new().contains(path) { Ok(None) } else { Self::begin(path).map(Some) }
+        if has_entries && !new_outputs::has(path) { Ok(None) } else { Self::begin(path).map(Some) }
     }
 
     /// Keeps the folder.
@@ -224,7 +188,7 @@ impl Temporary {
     fn persist(self, path: &Path) -> io::Result<()> {
         let Self { path: temporary, known } = self;
         let unfinished = unfinished();
-        let persisted = match new().remove(path) {
+        let persisted = match new_outputs::take(path) {
             true => persist_new(temporary, path),
             false => temporary.persist(path).map_err(|error| error.error),
         };
@@ -236,7 +200,7 @@ impl Temporary {
 
 fn persist_new(temporary: TempPath, path: &Path) -> io::Result<()> {
     temporary.persist_noclobber(path).or_else(|error| match error.error.kind() {
-        io::ErrorKind::AlreadyExists => Err(made_meanwhile()),
+        io::ErrorKind::AlreadyExists => Err(new_outputs::made_meanwhile()),
         // Some file systems cannot do both at once.
         _ if !path.exists() => error.path.persist(path).map_err(|error| error.error),
         _ => Err(error.error),
@@ -266,7 +230,7 @@ impl Unfinished {
 
 impl<W: Write> Unfinished<W> {
     fn open(path: &Path, open: impl FnOnce(File) -> W) -> Result<Self, FormatError> {
-        let path = behind_links(path);
+        let path = new_outputs::behind_links(path);
         let (file, temporary) = Temporary::of(&path)?;
         let writer = BufWriter::with_capacity(BUFFER, open(file));
         Ok(Self { path, writer, temporary })
@@ -391,7 +355,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let [file, made] = ["scan.bin", "made"].map(|name| folder.path().join(name));
         for path in [&file, &made] {
-            expect_new(path, true);
+            new_outputs::expect(path, true);
         }
         fs::write(&file, "theirs").unwrap();
         fs::create_dir(&made).unwrap();
@@ -400,12 +364,12 @@ mod tests {
         assert!(UnfinishedFolder::begin(&made).is_err() && made.is_dir());
         assert_eq!(fs::read(&file).unwrap(), b"theirs");
         // What a later command may replace, it replaces.
-        expect_new(&file, true);
-        expect_new(&file, false);
+        new_outputs::expect(&file, true);
+        new_outputs::expect(&file, false);
         write_bytes(&file, "ours").unwrap();
         // What this process made itself, it may replace.
         let own = folder.path().join("own.bin");
-        expect_new(&own, true);
+        new_outputs::expect(&own, true);
         write_bytes(&own, "first").unwrap();
         write_bytes(&own, "second").unwrap();
         assert_eq!(fs::read(&own).unwrap(), b"second");

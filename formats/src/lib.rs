@@ -69,6 +69,9 @@ pub mod labelled_sweep;
 #[doc(hidden)]
 pub mod modelnet_h5_list;
 #[doc(hidden)]
+#[cfg(feature = "files")]
+pub mod new_outputs;
+#[doc(hidden)]
 #[cfg(feature = "cli")]
 pub mod outcome;
 #[doc(hidden)]

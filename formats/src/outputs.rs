@@ -1,6 +1,6 @@
 //! The one rule for outputs that exist already, and for the names of outputs.
 
-use crate::atomic::expect_new;
+use crate::new_outputs;
 use crate::outcome::Usage;
 use anyhow::Context;
 use std::path::{Path, PathBuf};
@@ -43,7 +43,7 @@ impl Overwrite {
             return Err(refused(path, "it exists already: --overwrite replaces it"));
         }
         check_place(path)?;
-        expect_new(path, !self.overwrite && !path.exists());
+        new_outputs::expect(path, !self.overwrite && !path.exists());
         Ok(())
     }
 

@@ -149,11 +149,13 @@ pub fn read(
     path: &Path,
     each: impl FnMut(&UdpPacket<'_>) -> ControlFlow<()>,
 ) -> Result<Counts, FormatError> {
-    if path == Path::new("-") {
-        let cause = "expected a file, found standard input, which cannot be read twice";
-        return Err(FormatError::malformed(path, "name", cause));
-    }
-    let file = File::open(path).map_err(|source| FormatError::io(path, source))?;
+    let file = File::open(path).map_err(|source| match path.to_str() {
+        Some("-") => {
+            let cause = "expected a file, found standard input: write it to a file first";
+            FormatError::malformed(path, "name", cause)
+        }
+        _ => FormatError::io(path, source),
+    })?;
     read_from(file, path, each).map_err(|error| or_foreign_file(path, "a capture", error))
 }
 

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use formats::foreign::read_text;
 use serde::de::DeserializeOwned;
 
+use crate::mesh::MeshFormat;
 use mistakes::Mistakes;
 
 mod mistakes;
@@ -115,8 +116,8 @@ pub fn read<T: DeserializeOwned, U, E: Into<Vec<InvalidValue>>>(
         return Err(ConfigError::TooLong { file: file.to_owned() });
     }
     // A mesh would have a mistake in each line.
-    const MESHES: [&str; 7] = ["obj", "off", "ply", "stl", "glb", "gltf", "urdf"];
-    let is_mesh = |name: &&OsStr| MESHES.iter().any(|mesh| name.eq_ignore_ascii_case(mesh));
+    let is_mesh =
+        |name: &&OsStr| MeshFormat::from_path(file).is_some() || name.eq_ignore_ascii_case("urdf");
     let other = file.extension().filter(is_mesh);
     match other.filter(|_| text.parse::<toml::Table>().is_err()) {
         Some(extension) => Err(ConfigError::Content {

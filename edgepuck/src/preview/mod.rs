@@ -104,7 +104,7 @@ pub fn draw(shown: &shown::Frame, noisy: Option<&Scan>, title: &str, out: &Path)
 fn frame_around(scans: &[&Scan], shown: &shown::Frame) -> Frame {
     let of_meshes: Vec<_> = shown.meshes.iter().flat_map(|mesh| &mesh.position).copied().collect();
     let of_boxes = shown.boxes.iter().flat_map(Placed::corners);
-    let of_boxes: Vec<_> = of_boxes.map(|corner| corner.map(|x| x as f32)).collect();
+    let of_boxes: Vec<_> = of_boxes.map(|corner| corner.as_vec3().to_array()).collect();
     let points = scans.iter().map(|scan| &*scan.positions);
     Frame::around(&points.chain([&*of_meshes, &*of_boxes]).collect::<Vec<_>>())
 }

@@ -14,7 +14,7 @@ use serde::{Serialize, Serializer};
 use sim_gpu::{Pose, Trajectory, glam};
 use std::path::{Path, PathBuf};
 
-use crate::Usage;
+use crate::{Usage, cuboid};
 
 /// A file, or a drive or a folder of sweeps.
 #[derive(Serialize)]
@@ -210,16 +210,9 @@ impl Pane {
 }
 
 impl Placed {
-    /// Its corners: those of the base counterclockwise, then those of the top.
-    pub fn corners(&self) -> [[f64; 3]; 8] {
-        let turned = DQuat::from_rotation_z(self.yaw);
-        let corner = |place: usize| {
-            let (ahead, left) = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)][place % 4];
-            let up = if place < 4 { -1.0 } else { 1.0 };
-            let from_centre = DVec3::new(ahead, left, up) * DVec3::from(self.size) / 2.0;
-            (DVec3::from(self.centre) + turned * from_centre).to_array()
-        };
-        std::array::from_fn(corner)
+    /// Its [corners](cuboid::corners).
+    pub fn corners(&self) -> [DVec3; 8] {
+        cuboid::corners(self.centre.into(), self.size.into(), self.yaw)
     }
 
     /// The box in the frame of a sensor with this pose.
