@@ -32,6 +32,22 @@ class Graph:
         name = "shape." + ".".join(map(str, sizes))
         return self.constant(name, numpy.array(sizes, numpy.int64))
 
+    def model(self, name, inputs, outputs):
+        """The model of all nodes so far; `inputs` and `outputs` are shapes, all f32, by names."""
+
+        def infos(shapes):
+            return [
+                helper.make_tensor_value_info(key, TensorProto.FLOAT, shape)
+                for key, shape in shapes.items()
+            ]
+
+        constants = list(self.constants.values())
+        made = helper.make_graph(self.nodes, name, infos(inputs), infos(outputs), constants)
+        opset = helper.make_opsetid("", OPSET)
+        model = helper.make_model(made, opset_imports=[opset], ir_version=IR_VERSION)
+        onnx.checker.check_model(model)
+        return model
+
     def dense(self, key, x, relu=True):
         weights, bias = self.layers[key]
         inputs = [x, self.constant(f"{key}.w", weights), self.constant(f"{key}.b", bias)]
@@ -112,14 +128,4 @@ def pointnet(layers, form):
     x = graph.dense("fc2", graph.dense("fc1", graph.pooled(x, "global")))
     graph.op("LogSoftmax", [graph.dense("fc3", x, relu=False)], "logp", axis=1)
     classes = len(layers["fc3"][1])
-    made = helper.make_graph(
-        graph.nodes,
-        "pointnet",
-        [helper.make_tensor_value_info("x", TensorProto.FLOAT, [1, 3, "n"])],
-        [helper.make_tensor_value_info("logp", TensorProto.FLOAT, [1, classes])],
-        list(graph.constants.values()),
-    )
-    opset = helper.make_opsetid("", OPSET)
-    model = helper.make_model(made, opset_imports=[opset], ir_version=IR_VERSION)
-    onnx.checker.check_model(model)
-    return model
+    return graph.model("pointnet", {"x": [1, 3, "n"]}, {"logp": [1, classes]})
