@@ -41,8 +41,7 @@ def main():
     for file, points in zip(files, clouds):
         numpy.save(file, points)
     models = [NARROW / "tiny.safetensors", NARROW / "plain.safetensors"]
-    models += [WEIGHTS / f"{name}.safetensors" for name in ("untrained-test", "pointnet-64")]
-    models += [WEIGHTS / f"{name}.safetensors" for name in ("pointnet-1024", "shapes-rotational-64")]
+    models += [WEIGHTS / f"{name}.safetensors" for name in ("untrained-test", "shapes-rotational-64")]
     ties = 0
     for model in models:
         compare_all_points(model, clouds, files)

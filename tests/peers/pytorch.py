@@ -77,14 +77,14 @@ class Trunk(nn.Module):
 
 
 class PointNet(nn.Module):
-    """From [batch, 3, n] to logits [batch, 40]."""
+    """From [batch, 3, n] to logits [batch, classes]."""
 
-    def __init__(self, widths, t_nets, norms):
+    def __init__(self, widths, t_nets, norms, classes=40):
         super().__init__()
         self.feat = Trunk(widths, t_nets, norms)
         self.fc1, self.bn1 = nn.Linear(widths[-1], 512), norm(512, norms)
         self.fc2, self.bn2 = nn.Linear(512, 256), norm(256, norms)
-        self.fc3 = nn.Linear(256, 40)
+        self.fc3 = nn.Linear(256, classes)
 
     def forward(self, x):
         x = self.feat(x)
@@ -103,12 +103,10 @@ def main():
     for t_nets, widths in ((True, BASELINE), (False, [48, 64, 96, 200])):
         compare("random, batch norms" + ", T-Nets" * t_nets, *untrained(widths, t_nets, random),
                 clouds, files)
-    for name, widths, t_nets in (
-        ("pointnet-1024", BASELINE, True),
-        ("pointnet-64", [64, 64, 128, 256, 1024], False),
-    ):
-        file = ROOT / f"assets/weights/{name}.safetensors"
-        compare(name, bundled(file, PointNet(widths, t_nets, norms=False)), file, clouds, files)
+    name, widths = "shapes-rotational-64", [64, 64, 128, 256, 1024]
+    file = ROOT / f"assets/weights/{name}.safetensors"
+    network = PointNet(widths, t_nets=False, norms=False, classes=10)
+    compare(name, bundled(file, network), file, clouds, files)
     print(f"torch {torch.__version__}: all agree")
 
 

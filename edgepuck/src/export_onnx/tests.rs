@@ -15,7 +15,7 @@ fn bundled(name: &str) -> PathBuf {
 
 /// Bundled models, and narrow ones: `tiny` with batch norms and T-Nets.
 fn models() -> Vec<PathBuf> {
-    let wide = ["untrained-test", "pointnet-64", "pointnet-1024", "edge-64", "cpl-64"];
+    let wide = ["untrained-test", "shapes-rotational-64", "edge-64", "cpl-64"];
     let narrow = root().join("infer-cpu/tests/golden");
     let mut models = wide.map(bundled).to_vec();
     models.extend(["tiny", "plain"].map(|name| narrow.join(name).with_extension("safetensors")));
@@ -29,7 +29,7 @@ fn exported(path: &Path, n_points: Option<usize>) -> ModelProto {
 
 /// A network of two set abstractions.
 fn sets() -> (ModelCard, Net) {
-    let (card, mut net) = model_file::read(&bundled("pointnet-64")).unwrap();
+    let (card, mut net) = model_file::read(&bundled("shapes-rotational-64")).unwrap();
     let layer = |name: &str, inputs: usize, outputs: usize| {
         let (weight, bias) = (vec![0.5; inputs * outputs], vec![0.0; outputs]);
         Dense { name: name.to_owned(), inputs, outputs, weight, bias, relu: true }
@@ -91,12 +91,12 @@ fn every_value_is_made_once_before_it_is_used_and_every_constant_is_used() {
 
 #[test]
 fn weights_bear_pytorch_s_names_and_shapes_and_hold_the_norms() {
-    let graph = graph_of(&bundled("pointnet-1024"), None);
+    let graph = graph_of(&bundled("untrained-test"), None);
     for (name, shape) in [
-        ("feat.conv1.weight", &[64, 3, 1][..]),
-        ("feat.stn.conv3.weight", &[1024, 128, 1]),
-        ("feat.fstn.fc3.weight", &[4096, 256]),
-        ("fc3.bias", &[40]),
+        ("feat.conv1.weight", &[8, 3, 1][..]),
+        ("feat.stn.conv3.weight", &[64, 16, 1]),
+        ("feat.fstn.fc3.weight", &[64, 16]),
+        ("fc3.bias", &[4]),
     ] {
         assert_eq!(constant(&graph, name).dims, shape, "{name}");
     }
@@ -118,7 +118,7 @@ fn inputs_and_outputs_are_what_the_network_looks_at() {
     };
     let names = |name: &str, n_points| names_of(graph_of(&bundled(name), n_points));
     let is = |inputs: &str, outputs: &str| (inputs.to_owned(), outputs.to_owned());
-    assert_eq!(names("pointnet-64", None), is("points", "logits"));
+    assert_eq!(names("shapes-rotational-64", None), is("points", "logits"));
     assert_eq!(names("edge-64", None), is("points cloud", "logits"));
     assert_eq!(names("edge-64", Some(64)), is("cloud", "logits kept"));
     assert_eq!(names_of(graph_of_sets()), is("points centres", "logits"));
@@ -139,7 +139,7 @@ fn the_file_states_its_opset_and_the_model_s_card() {
 
 #[test]
 fn what_onnx_cannot_choose_by_is_refused() {
-    let (card, mut net) = model_file::read(&bundled("pointnet-1024")).unwrap();
+    let (card, mut net) = model_file::read(&bundled("untrained-test")).unwrap();
     let refused = |net: &Net| export(net, &card, Some(16)).unwrap_err().to_string();
     (net.front, net.stn) = (None, None);
     assert!(refused(&net).contains("neither a front end"), "{}", refused(&net));

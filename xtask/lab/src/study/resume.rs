@@ -25,7 +25,7 @@ pub fn network(out: &Path, name: &str, recipe: Recipe, clouds: &Clouds) -> anyho
     let job = Job { recipe, clouds, data: name, data_name: name, out, overwrite: false };
     let mut report = |progress: Progress<'_>| {
         if let Progress::Epoch(epoch) = progress {
-            eprintln!("{epoch}");
+            eprintln!("{name}: {epoch}");
         }
     };
     job.run(None, &mut report).map(|_| ()).with_context(|| format!("cannot train {name}"))

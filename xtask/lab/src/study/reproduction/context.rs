@@ -1,13 +1,11 @@
 //! The plan, the data and the networks that experiments share.
 
-use crate::study::resume;
 use anyhow::{Context, Result, ensure};
 use formats::split::Split;
 use serde::{Deserialize, Serialize};
-use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::rc::Rc;
+use std::sync::{Arc, Mutex, PoisonError};
 use train::clouds::Clouds;
 use train::recipe::Recipe;
 
@@ -18,7 +16,7 @@ pub struct ExperimentContext {
     /// The folder of the scans and surfaces of meshes.
     pub scans: PathBuf,
     pub out: PathBuf,
-    pub read: RefCell<BTreeMap<String, Rc<Clouds>>>,
+    pub read: Mutex<BTreeMap<String, Arc<Clouds>>>,
 }
 
 impl ExperimentContext {
@@ -52,7 +50,7 @@ impl ExperimentContext {
             plan: &'a Plan,
         }
         let surface = self.scans("surfaces/surface", Split::Train)?;
-        let noisy = self.scans("lidar/packed/rotational-noisy", Split::Test)?;
+        let noisy = self.scans("vlp32c/packed/rotational-noisy", Split::Test)?;
         let all = [self.clouds(Split::Train)?, self.clouds(Split::Test)?, surface, noisy];
         let sha256 = all.map(|clouds| clouds.digest());
         let version = env!("CARGO_PKG_VERSION");
@@ -60,7 +58,7 @@ impl ExperimentContext {
     }
 
     /// One half of ModelNet40's clouds, or of as many as the plan wants.
-    pub fn clouds(&self, split: Split) -> Result<Rc<Clouds>> {
+    pub fn clouds(&self, split: Split) -> Result<Arc<Clouds>> {
         self.remember(&format!("clouds {split}"), || {
             let clouds = Clouds::read(&self.clouds, split, self.plan.most_points())?;
             Ok(match (self.plan.most_per_class, split) {
@@ -73,28 +71,26 @@ impl ExperimentContext {
     }
 
     /// One half of the set `name` of scans or surfaces, such as
-    /// `lidar/packed/rotational-noisy`.
-    pub fn scans(&self, name: &str, split: Split) -> Result<Rc<Clouds>> {
+    /// `vlp32c/packed/rotational-noisy`.
+    pub fn scans(&self, name: &str, split: Split) -> Result<Arc<Clouds>> {
         self.remember(&format!("{name} {split}"), || {
             Ok(Clouds::read(&self.scans.join(name), split, self.plan.most_points())?)
         })
     }
 
-    fn remember(&self, key: &str, read: impl FnOnce() -> Result<Clouds>) -> Result<Rc<Clouds>> {
-        if let Some(clouds) = self.read.borrow().get(key) {
-            return Ok(Rc::clone(clouds));
+    fn remember(&self, key: &str, read: impl FnOnce() -> Result<Clouds>) -> Result<Arc<Clouds>> {
+        let mut known = self.read.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(clouds) = known.get(key) {
+            return Ok(Arc::clone(clouds));
         }
-        let clouds = Rc::new(read()?);
-        self.read.borrow_mut().insert(key.to_owned(), Rc::clone(&clouds));
+        let clouds = Arc::new(read()?);
+        known.insert(key.to_owned(), Arc::clone(&clouds));
         Ok(clouds)
     }
 
-    /// The network called `name`, trained by `recipe` on `clouds` unless it is
-    /// there.
-    pub fn network(&self, name: &str, recipe: Recipe, clouds: &Clouds) -> Result<PathBuf> {
-        let out = self.out.join("models").join(format!("{name}.safetensors"));
-        resume::network(&out, name, recipe, clouds)?;
-        Ok(out)
+    /// The file of the network called `name`.
+    pub fn model(&self, name: &str) -> PathBuf {
+        self.out.join("models").join(format!("{name}.safetensors"))
     }
 }
 
@@ -112,7 +108,7 @@ pub struct Plan {
     /// Points that one network is tested at.
     pub tested_points: Vec<usize>,
     pub kept: Vec<usize>,
-    /// Front ends of Critical Points Layers; the first is the paper's.
+    /// Front ends of Critical Points Layers.
     pub fronts: Vec<Vec<usize>>,
     /// Points that networks are trained at, of scans and surfaces of meshes.
     pub mesh_points: usize,
