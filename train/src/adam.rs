@@ -10,6 +10,12 @@ use crate::parameter::Parameter;
 /// Number of elements that one thread updates at a time.
 const CHUNK: usize = 1 << 14;
 
+/// Weights and mean gradients closer to 0 than this become 0. A weight that only the L2 term moves
+/// shrinks by a factor in each step. It would become subnormal, and a product of subnormal numbers
+/// takes a hundred times as long as another. No output depends on a weight of this size: the rest
+/// of its sum is rounded to 2^-24 of it.
+const LEAST: f32 = 1e-20;
+
 /// Adam's constants.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -53,10 +59,33 @@ impl Adam {
             .for_each(|((value, gradient), (mean, square))| {
                 for i in 0..value.len() {
                     let g = gradient[i] + l2 * value[i];
-                    mean[i] += (1.0 - beta1) * (g - mean[i]);
+                    mean[i] = or_zero(mean[i] + (1.0 - beta1) * (g - mean[i]));
                     square[i] = beta2 * square[i] + (1.0 - beta2) * g * g;
-                    value[i] -= size * mean[i] / (square[i].sqrt() * root + epsilon);
+                    let moved = size * mean[i] / (square[i].sqrt() * root + epsilon);
+                    value[i] = or_zero(value[i] - moved);
                 }
             });
+    }
+}
+
+/// `x`, or 0 if it is closer to 0 than [`LEAST`].
+fn or_zero(x: f32) -> f32 {
+    if x.abs() < LEAST { 0.0 } else { x }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_weight_that_only_the_l2_term_moves_ends_at_0_and_is_never_subnormal() {
+        let mut weight = Parameter::new("w".to_owned(), vec![2], vec![0.1, -1e-19]);
+        let adam = Adam::default();
+        for step in 1..=20_000 {
+            adam.update(&mut weight, step, adam.rate);
+            let all = weight.value.iter().chain(&weight.mean);
+            assert!(all.clone().all(|x| !x.is_subnormal()), "step {step}: {weight:?}");
+        }
+        assert_eq!(weight.value, [0.0; 2]);
     }
 }
