@@ -27,7 +27,7 @@ pub struct SampleSurfacesArgs {
           value_parser = clap::value_parser!(u32).range(1..))]
     min_points: u32,
 
-    /// The meshes' upward axis: y or z [default: y for OBJ, z for others]
+    /// The meshes' upward axis: y or z [default: y for OBJ and glTF, z for others]
     #[arg(long, value_name = "AXIS")]
     up: Option<Up>,
 

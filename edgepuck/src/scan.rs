@@ -86,7 +86,7 @@ struct MeshArgs {
     #[arg(long, value_name = "HOW")]
     normalize: Option<Normalize>,
 
-    /// The meshes' upward axis: y or z [default: y for OBJ, z for others]
+    /// The meshes' upward axis: y or z [default: y for OBJ and glTF, z for others]
     #[arg(long, value_name = "AXIS")]
     up: Option<Up>,
 

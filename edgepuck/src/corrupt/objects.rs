@@ -25,7 +25,7 @@ pub(super) struct ObjectArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     points: Option<u32>,
 
-    /// For meshes: the upward axis [default: y for OBJ, z for others]
+    /// For meshes: the upward axis [default: y for OBJ and glTF, z for others]
     #[arg(long, value_name = "AXIS")]
     up: Option<Up>,
 }

@@ -84,7 +84,7 @@ pub struct Settings {
     #[arg(long, default_value = "m", value_name = "UNIT")]
     units: Unit,
 
-    /// The meshes' upward axis: y or z [default: y for OBJ, z for others]
+    /// The meshes' upward axis: y or z [default: y for OBJ and glTF, z for others]
     #[arg(long, value_name = "AXIS")]
     up: Option<Up>,
 

@@ -40,7 +40,7 @@ const PAGES: [Page; 4] = [
     ),
     (
         "scene-recipe-reference.md",
-        "# Keys of recipes of scenes\n\nA recipe of `gen-scenes` and `gen-drive` is a TOML file: \
+        "# Keys of scene recipes\n\nA recipe of `gen-scenes` and `gen-drive` is a TOML file: \
          `street`, `room` and `yard` are built in, and `assets/scenes` in the repository has them. \
          A list of 2 numbers is the least and the greatest.",
         SCENES,
@@ -52,11 +52,10 @@ const PAGES: [Page; 4] = [
     ),
     (
         "train-recipe-reference.md",
-        "# Keys of recipes of trainings\n\nA recipe of `train` is a TOML file: [Train](train.md) has an \
+        "# Keys of training recipes\n\nA recipe of `train` is a TOML file: [Train](train.md) has an \
          example, and the folder of a run has its recipe with all keys. The built-in recipes are \
-         `edge-64`, `set-64`, `lidar-64` and `street-128`. Training expects clouds of every class in the training \
-         part, those of `unknown` included, which few sweeps lack: the bundled `street-128` learnt from \
-         2,000. Lengths of clouds in the unit sphere are in radii, those of clusters in metres.",
+         `edge-64`, `set-64`, `lidar-64` and `street-128`. The training part must have clouds of every class, also of \
+         those that `unknown` lists. A set of only a few sweeps usually lacks some. Lengths of clouds in the unit sphere are in radii, those of clusters in metres.",
         TRAIN,
         &[("", "train/src/recipe.rs", "Recipe")],
     ),
