@@ -139,8 +139,6 @@ streams! {
     VaryValidation { cloud: u32 } = "vary validation", cloud;
     /// A negative, which is no object.
     Negative { purpose: &'a str, number: usize, epoch: u32 } = "negative {purpose} {number}", epoch;
-    /// The critical points that a cloud keeps in a step.
-    Gumbel { step: u64, cloud: u32 } = "gumbel {step}", cloud;
     /// What dropout leaves out.
     Dropout {} = "dropout", 0;
     /// The parts that LIME leaves out.

@@ -10,11 +10,14 @@ use crate::parameter::Parameter;
 /// Number of elements that one thread updates at a time.
 const CHUNK: usize = 1 << 14;
 
-/// Weights and mean gradients closer to 0 than this become 0. A weight that only the L2 term moves
-/// shrinks by a factor in each step. It would become subnormal, and a product of subnormal numbers
-/// takes a hundred times as long as another. No output depends on a weight of this size: the rest
-/// of its sum is rounded to 2^-24 of it.
-const LEAST: f32 = 1e-20;
+/// A weight closer to 0 than this becomes 0, and so do its moments below these. A weight that only
+/// the L2 term moves shrinks by a factor in each step until it is subnormal, and arithmetic of
+/// subnormal numbers takes a hundred times as long. The results are the same but for rounding: sums
+/// of products with other weights, which are some 1e-2, are rounded to 1e-9, and [`Adam::epsilon`]
+/// outweighs the root of such a square.
+const LEAST_WEIGHT: f32 = 1e-12;
+const LEAST_MEAN: f32 = 1e-20;
+const LEAST_SQUARE: f32 = 1e-30;
 
 /// Adam's constants.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -59,18 +62,18 @@ impl Adam {
             .for_each(|((value, gradient), (mean, square))| {
                 for i in 0..value.len() {
                     let g = gradient[i] + l2 * value[i];
-                    mean[i] = or_zero(mean[i] + (1.0 - beta1) * (g - mean[i]));
-                    square[i] = beta2 * square[i] + (1.0 - beta2) * g * g;
+                    mean[i] = or_zero(mean[i] + (1.0 - beta1) * (g - mean[i]), LEAST_MEAN);
+                    square[i] = or_zero(beta2 * square[i] + (1.0 - beta2) * g * g, LEAST_SQUARE);
                     let moved = size * mean[i] / (square[i].sqrt() * root + epsilon);
-                    value[i] = or_zero(value[i] - moved);
+                    value[i] = or_zero(value[i] - moved, LEAST_WEIGHT);
                 }
             });
     }
 }
 
-/// `x`, or 0 if it is closer to 0 than [`LEAST`].
-fn or_zero(x: f32) -> f32 {
-    if x.abs() < LEAST { 0.0 } else { x }
+/// `x`, or 0 if it is closer to 0 than `least`.
+fn or_zero(x: f32, least: f32) -> f32 {
+    if x.abs() < least { 0.0 } else { x }
 }
 
 #[cfg(test)]
@@ -81,11 +84,14 @@ mod tests {
     fn a_weight_that_only_the_l2_term_moves_ends_at_0_and_is_never_subnormal() {
         let mut weight = Parameter::new("w".to_owned(), vec![2], vec![0.1, -1e-19]);
         let adam = Adam::default();
-        for step in 1..=20_000 {
+        for step in 1..=100_000 {
             adam.update(&mut weight, step, adam.rate);
-            let all = weight.value.iter().chain(&weight.mean);
-            assert!(all.clone().all(|x| !x.is_subnormal()), "step {step}: {weight:?}");
+            let all = [&weight.value, &weight.mean, &weight.square].into_iter().flatten();
+            assert!(all.into_iter().all(|x| !x.is_subnormal()), "step {step}: {weight:?}");
         }
-        assert_eq!(weight.value, [0.0; 2]);
+        assert_eq!(
+            (weight.value, weight.mean, weight.square),
+            (vec![0.0; 2], vec![0.0; 2], vec![0.0; 2])
+        );
     }
 }

@@ -163,7 +163,7 @@ fn unfold(model: &mut Model, recipe: &Recipe, clouds: &Clouds) {
     let drawn = Recipe { batch: CLOUDS, clouds_per_epoch: Some(CLOUDS), ..recipe.clone() };
     let batch = std::thread::scope(|scope| batches::start(scope, clouds, &drawn, 0).recv());
     let batch = batch.expect("invariant: an epoch of one batch");
-    let rates = Rates { momentum: 1.0, orthogonality: 0.0, step: 0 };
+    let rates = Rates { momentum: 1.0, orthogonality: 0.0 };
     for place in 0..model.layers().len() {
         model.learn(&batch, None, rates);
         if let Some(norm) = model.layers().swap_remove(place).norm {

@@ -49,10 +49,9 @@ impl Model {
         let Some(encoder) = &mut self.encoder else {
             return network.learn(batch, kept, rates);
         };
-        let selection = encoder.forward(batch, rates);
-        let wanted = encoder.is_relaxed();
-        let (mut loss, dpoints) = network.learn_points(&selection.batch, kept, rates, wanted);
-        loss.total += encoder.backward(batch, &selection, dpoints.as_ref());
+        let selected = encoder.forward(batch, rates);
+        let mut loss = network.learn(&selected, kept, rates);
+        loss.total += encoder.backward(batch);
         loss
     }
 }

@@ -10,7 +10,6 @@ use crate::layer::{EdgeLayer, HiddenLayer, LayerMut, Module, orthogonality};
 use crate::loss::{self, Loss};
 use crate::matrix::Matrix;
 use crate::mlp::{DenseHead, SharedMlp};
-use crate::selector::{CriticalPointSelector, Selection};
 use crate::shape::Shape;
 use crate::t_net::TNet;
 
@@ -21,16 +20,12 @@ pub struct Rates {
     pub momentum: f32,
     /// The weight of the feature transform's regulariser.
     pub orthogonality: f32,
-    /// The step's number, which keys the noise of a relaxed selection.
-    pub step: u64,
 }
 
 /// A PointNet in training.
 #[derive(Clone, Debug)]
 pub struct PointNet {
     stn: Option<TNet>,
-    /// Selects points by the input T-Net, if `cpl.shared` is set.
-    selector: Option<CriticalPointSelector>,
     edges: Vec<EdgeLayer>,
     stem: HiddenLayer,
     fstn: Option<TNet>,
@@ -57,43 +52,18 @@ impl PointNet {
         let pooled = trunk[trunk.len() - 1];
         let head =
             DenseHead::new("", &[&[pooled], &shape.head[..], &[n_classes]].concat(), 0, seed);
-        Self {
-            stn,
-            selector: None,
-            edges,
-            stem,
-            fstn,
-            trunk: SharedMlp::new("feat.", trunk, 2, false, seed),
-            head,
-        }
-    }
-
-    /// Selects the points for the other layers by the input T-Net.
-    pub fn select_by_t_net(&mut self, selector: CriticalPointSelector) {
-        self.selector = Some(selector);
+        Self { stn, edges, stem, fstn, trunk: SharedMlp::new("feat.", trunk, 2, false, seed), head }
     }
 
     /// Runs the forward and backward pass of a batch, which sets the gradients of the parameters.
     /// `kept` is the dropout mask, `[clouds, last hidden width]`.
     pub fn learn(&mut self, batch: &Batch, kept: Option<Matrix>, rates: Rates) -> Loss {
-        self.learn_points(batch, kept, rates, false).0
-    }
-
-    /// Does the same as [`PointNet::learn`]. If `wants_points`, also returns the gradient of the
-    /// points' coordinates through the trunk and the T-Nets, without the part through the
-    /// neighborhoods.
-    pub fn learn_points(
-        &mut self,
-        batch: &Batch,
-        kept: Option<Matrix>,
-        rates: Rates,
-        wants_points: bool,
-    ) -> (Loss, Option<Matrix>) {
-        let (whole, momentum) = (batch, rates.momentum);
-        let selection = self.select(whole, rates);
-        let batch = selection.as_ref().map_or(whole, |selection| &selection.batch);
+        let momentum = rates.momentum;
         let (x, rows) = (batch.points(), batch.rows());
-        let transformed = self.stn.as_ref().map(|stn| stn.transforms.forward(x, rows));
+        let transformed = self.stn.as_mut().map(|stn| {
+            stn.predict(x, rows, momentum);
+            stn.transforms.forward(x, rows)
+        });
         let transformed = transformed.as_ref().map_or(x.view(), |transformed| transformed.view());
         let with_edges = self.edge_features(batch, transformed, momentum);
         let entry = with_edges.as_ref().map_or(transformed, |with_edges| with_edges.view());
@@ -123,8 +93,8 @@ impl PointNet {
             dstem = through + predicted.expect("invariant: `wants_input` is true");
         }
         let dz = self.stem.backward(entry, dstem, rows);
-        if self.stn.is_none() && self.edges.is_empty() && !wants_points {
-            return (loss, None);
+        if self.stn.is_none() && self.edges.is_empty() {
+            return loss;
         }
         let dentry = self.stem.base.linear.input_gradient(dz.view());
         let mut first = 3;
@@ -133,27 +103,12 @@ impl PointNet {
             first = own.end;
             edge.backward(dentry.slice(s![.., own]).to_owned());
         }
-        let dtransformed = dentry.slice(s![.., ..3]).to_owned();
-        let dpoints = match &mut self.stn {
-            Some(stn) => {
-                let (elements, through) = stn.transforms.backward(x, dtransformed.view(), rows);
-                // The T-Net of a selection takes all points, so that its gradient is not that of
-                // the selected points.
-                let wanted = wants_points && selection.is_none();
-                let predicted = stn.backward(whole.points(), &elements, whole.rows(), wanted);
-                predicted.map(|predicted| through + predicted)
-            }
-            None => Some(dtransformed),
-        };
-        (loss, dpoints.filter(|_| wants_points))
-    }
-
-    /// Predicts the transforms of the input T-Net from all points. Returns the points that it
-    /// selects, if it is the encoder of a Critical Points Layer.
-    fn select(&mut self, whole: &Batch, rates: Rates) -> Option<Selection> {
-        let stn = self.stn.as_mut()?;
-        stn.predict(whole.points(), whole.rows(), rates.momentum);
-        Some(self.selector?.select(&stn.points.pooled, whole, rates.step))
+        if let Some(stn) = &mut self.stn {
+            let dtransformed = dentry.slice(s![.., ..3]);
+            let (elements, _) = stn.transforms.backward(x, dtransformed, rows);
+            stn.backward(x, &elements, rows, false);
+        }
+        loss
     }
 
     /// The coordinates `[rows, 3]` followed by the EdgeConv features of each point. `None` if the

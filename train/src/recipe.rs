@@ -375,12 +375,6 @@ impl Recipe {
                 layers("cpl.front", cpl.front.len(), 2),
                 widths("cpl.front", cpl.front.iter().copied()),
                 ((1..=self.points).contains(&cpl.keep), "cpl.keep", "expected 1 to `points`"),
-                (
-                    !cpl.shared || network.input_transform,
-                    "cpl.shared",
-                    "expected `network.input_transform`, whose T-Net is shared",
-                ),
-                (!(cpl.gumbel && cpl.shared), "cpl.gumbel", "expected false with `cpl.shared`"),
                 non_negative("cpl.weight", cpl.weight),
             ]);
         }

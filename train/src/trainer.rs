@@ -16,7 +16,6 @@ use crate::model_file;
 use crate::network::{PointNet, Rates};
 use crate::point_encoder::PointEncoder;
 use crate::recipe::Recipe;
-use crate::selector::CriticalPointSelector;
 use crate::set_network::SetNetwork;
 
 /// The share of a batch in running statistics: PyTorch's default.
@@ -59,15 +58,8 @@ impl Trainer {
             let network = Network::Sets(Box::new(network));
             return Ok(Self::of(recipe, Model { encoder: None, network }));
         }
-        let mut network = PointNet::new(&recipe.network, n_classes, recipe.seed);
-        let encoder = match &recipe.cpl {
-            Some(cpl) if cpl.shared => {
-                network.select_by_t_net(CriticalPointSelector::new(cpl, recipe.seed));
-                None
-            }
-            Some(cpl) => Some(PointEncoder::new(cpl, n_classes, recipe.seed)),
-            None => None,
-        };
+        let network = PointNet::new(&recipe.network, n_classes, recipe.seed);
+        let encoder = recipe.cpl.as_ref().map(|cpl| PointEncoder::new(cpl, n_classes, recipe.seed));
         Ok(Self::of(recipe, Model { encoder, network: Network::PointNet(Box::new(network)) }))
     }
 
@@ -118,7 +110,7 @@ impl Trainer {
             let batches = batches::start(scope, clouds, &recipe, self.epoch);
             for (batch, step) in batches.iter().zip(1..) {
                 let orthogonality = recipe.orthogonality as f32;
-                let rates = Rates { momentum: MOMENTUM, orthogonality, step: self.step };
+                let rates = Rates { momentum: MOMENTUM, orthogonality };
                 let kept = self.dropout(recipe.batch);
                 let cost = self.model.learn(&batch, kept, rates);
                 if !cost.total.is_finite() {
