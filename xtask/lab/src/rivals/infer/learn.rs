@@ -93,7 +93,7 @@ struct Learning {
     step: u64,
 }
 
-const RATES: Rates = Rates { momentum: 0.1, orthogonality: 0.001, step: 0 };
+const RATES: Rates = Rates { momentum: 0.1, orthogonality: 0.001 };
 
 fn ours(material: &Material) -> Result<Candidate> {
     let mut file = WeightsFile::open(&material.model)?;
