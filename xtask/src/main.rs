@@ -36,7 +36,7 @@ enum Command {
     BuildPi(build_pi::Args),
     /// Measure speed and accuracy: `cargo xtask bench --help`
     Bench(Forwarded),
-    /// Reproduce the paper's accuracies by points, sampler, dataset and noise
+    /// Reproduce the accuracies of Meyer and Reitmann (2026) by points, sampler and dataset
     Reproduce(Forwarded),
     /// Change the code in one place at a time, and count the changes that the tests notice
     Mutants(Forwarded),

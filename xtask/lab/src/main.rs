@@ -25,7 +25,7 @@ enum Command {
     /// Measure speed and accuracy
     #[command(subcommand)]
     Bench(bench::Benchmark),
-    /// Reproduce the paper's accuracies by points, sampler, dataset and noise
+    /// Reproduce the accuracies of Meyer and Reitmann (2026) by points, sampler and dataset
     Reproduce(reproduction::ReproduceArgs),
     /// Change the code in one place at a time, and count the changes that the tests notice
     Mutants(mutants::MutantsArgs),
