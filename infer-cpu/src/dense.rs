@@ -54,11 +54,35 @@ impl Dense {
         }
     }
 
+    /// Sets subnormal weights and biases to 0, which changes no output by more than its rounding.
+    /// Training with an L2 term leaves such weights where a channel has died, and on x86-64 a
+    /// product with one takes some hundred cycles: a baseline in which they are a third of the
+    /// feature T-Net's takes five times as long.
+    pub fn flush(&mut self) {
+        let all = self.weight.iter_mut().chain(&mut self.bias);
+        all.filter(|value| value.is_subnormal()).for_each(|value| *value = 0.0);
+    }
+
     /// The largest sum of weight magnitudes of an output: with activations of at most 1, no partial
     /// sum exceeds it.
     #[must_use]
     pub fn gain(&self) -> f32 {
         let rows = self.weight.chunks_exact(self.inputs.max(1));
         rows.map(|row| row.iter().map(|w| w.abs()).sum()).fold(0.0, f32::max)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn subnormal_weights_and_biases_become_0_and_no_others() {
+        let weight = vec![1e-40, -1e-45, f32::MIN_POSITIVE, -0.5];
+        let (name, bias) = ("fc1".to_owned(), vec![2e-39, -f32::MIN_POSITIVE]);
+        let mut dense = Dense { name, inputs: 2, outputs: 2, weight, bias, relu: false };
+        dense.flush();
+        assert_eq!(dense.weight, [0.0, 0.0, f32::MIN_POSITIVE, -0.5]);
+        assert_eq!(dense.bias, [0.0, -f32::MIN_POSITIVE]);
     }
 }

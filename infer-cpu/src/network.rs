@@ -372,6 +372,7 @@ impl<C, F> Reader<'_, C, F> {
             let norm = self.batch_norm(&dotted(prefix, &format!("bn{norm}")), outputs)?;
             dense.fold(&norm);
         }
+        dense.flush();
         let values = dense.weight.iter().chain(&dense.bias);
         if !values.fold(true, |finite, value| finite & value.is_finite()) {
             return Err(self.error(

@@ -72,7 +72,7 @@ impl Adam {
 }
 
 /// `x`, or 0 if it is closer to 0 than `least`.
-fn or_zero(x: f32, least: f32) -> f32 {
+pub(crate) fn or_zero(x: f32, least: f32) -> f32 {
     if x.abs() < least { 0.0 } else { x }
 }
 

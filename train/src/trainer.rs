@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use formats::streams::Stream;
 use formats::weights::Tensor;
 
+use crate::adam::or_zero;
 use crate::batches;
 use crate::clouds::Clouds;
 use crate::error::Error;
@@ -90,7 +91,7 @@ impl Trainer {
                 continue;
             };
             for (average, value) in average.values.iter_mut().zip(&tensor.values) {
-                *average += share * (value - *average);
+                *average = or_zero(*average + share * (value - *average), f32::MIN_POSITIVE);
             }
         }
     }
