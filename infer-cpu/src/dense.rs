@@ -54,10 +54,10 @@ impl Dense {
         }
     }
 
-    /// Sets subnormal weights and biases to 0, which changes no output by more than its rounding.
-    /// Training with an L2 term leaves such weights where a channel has died, and on x86-64 a
-    /// product with one takes some hundred cycles: a baseline in which they are a third of the
-    /// feature T-Net's takes five times as long.
+    /// Sets subnormal weights and biases to 0, which changes a sum of K products by at most K times
+    /// 1.2e-38 times the largest activation. Training with an L2 term leaves such weights where a
+    /// channel has died, and on x86-64 a product with one takes some hundred cycles: if a third of
+    /// the weights of the feature T-Net are subnormal, the baseline takes five times as long.
     pub fn flush(&mut self) {
         let all = self.weight.iter_mut().chain(&mut self.bias);
         all.filter(|value| value.is_subnormal()).for_each(|value| *value = 0.0);

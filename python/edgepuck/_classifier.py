@@ -35,9 +35,10 @@ class Classifier(Remade):
     """A PointNet with a sampler, on one thread of the CPU.
 
     Args:
-        model: A bundled model, `edge-64` (the classes of ModelNet40, from all sides),
-            `shapes-rotational-64` (scans of the built-in shapes) or `street-128` (cars and persons
-            among other things), or the path of a model file.
+        model: A bundled model, `edge-64` or `set-64` (the classes of ModelNet40, from all sides;
+            `set-64` is slower and more accurate), `shapes-rotational-64` (scans of the built-in
+            shapes) or `street-128` (cars and persons among other things), or the path of a model
+            file.
         precision: The precision: f32, f32-fc16, f16 or i8.
         sampler: The sampler of points: all, random, fps, voxel or cpl. By default, as in training.
         points: The number of points that the sampler chooses.

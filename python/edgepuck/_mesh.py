@@ -29,7 +29,8 @@ class Mesh(Remade):
             longest side to 2 m. `none` leaves the mesh in its place.
         units: The unit of length of `source`: m (the default), mm, cm, in or ft. Unless this says m,
             a mesh that keeps its size and is larger than 100 m or smaller than 1 cm gives a warning.
-        up: The upward axis of `source`: y or z. By default, y for OBJ files and z for all others.
+        up: The upward axis of `source`: y or z. By default, y for OBJ and glTF files and z for
+            all others.
 
     Raises:
         Error: The file cannot be read, a number is not finite, an index is out of range, or there

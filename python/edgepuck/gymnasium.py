@@ -73,11 +73,13 @@ class LidarObservation(gymnasium.ObservationWrapper[Any, Any, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
+        """As Gymnasium's. `seed` is also the seed of the noise from now on."""
         if seed is not None:
             self._seed, self._n_casts = seed_of(seed), 0
         return super().reset(seed=seed, options=options)
 
     def observation(self, observation: Any) -> dict[str, Any]:
+        """The observation with the ranges of a scan of the environment as it stands."""
         unwrapped: Any = self.env.unwrapped
         if self._seed is None:
             self._seed = int(unwrapped.np_random.integers(2**32))

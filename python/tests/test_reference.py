@@ -66,14 +66,14 @@ def public(node: ast.Module | ast.ClassDef) -> list[Documented]:
 
 
 def section(node: Documented, name: str) -> Iterator[str]:
-    yield f"## {name}\n"
+    yield f"## `{name}`\n"
     if isinstance(node, ast.FunctionDef):
         yield f"`{signature(node, name)}`\n"
     else:
         made = [one for one in node.body if isinstance(one, ast.FunctionDef) and one.name == "__init__"]
         yield from (f"`{signature(one, name)}`\n" for one in made)
     # The docs of the compiled module are not in its stubs.
-    yield text(node) or f"{inspect.getdoc(getattr(edgepuck, node.name))}\n"
+    yield text(doc(node) or inspect.getdoc(getattr(edgepuck, node.name)))
     if isinstance(node, ast.ClassDef):
         yield from members(node, name)
 
@@ -81,12 +81,13 @@ def section(node: Documented, name: str) -> Iterator[str]:
 def members(node: ast.ClassDef, name: str) -> Iterator[str]:
     fields = [*annotated(node), *((one.name, doc(one)) for one in public(node) if is_property(one))]
     if fields:
+        yield "Attributes:\n"
         yield "".join(f"- `{field}`: {on_one_line(words)}\n" for field, words in fields)
     for one in node.body:
         is_public = isinstance(one, ast.FunctionDef) and (one.name[0] != "_" or one.name == "__call__")
         if is_public and not is_property(one) and not decorated(one, "overload"):
-            yield f"### {name}.{one.name}\n\n`{signature(one, one.name)}`\n"
-            yield text(one)
+            yield f"### `{name}.{one.name}`\n\n`{signature(one, one.name)}`\n"
+            yield text(doc(one))
 
 
 def annotated(node: ast.ClassDef) -> Iterator[tuple[str, str]]:
@@ -121,17 +122,20 @@ def on_one_line(words: str) -> str:
     return " ".join(inspect.cleandoc(words).split())
 
 
-def text(node: Documented) -> str:
-    """The docstring as Markdown: lists of arguments and errors, without examples."""
-    paragraphs = filter(None, re.split(r"\n\n+", doc(node)))
+def text(words: str | None) -> str:
+    """A docstring as Markdown: lists of arguments and errors, without examples."""
+    assert words, "expected a docstring, found none"
+    paragraphs = re.split(r"\n\n+", words)
     return "\n".join(map(paragraph, (one for one in paragraphs if not one.startswith(">>>"))))
 
 
 def paragraph(words: str) -> str:
     head, _, rest = words.partition("\n")
+    if head == "Returns:":
+        return f"Returns: {on_one_line(rest)}\n"
     if head not in ("Args:", "Raises:"):
         return f"{words}\n"
     items = re.split(r"\n(?=\S)", textwrap.dedent(rest))
     told = (item.partition(": ") for item in items)
-    which = "" if head == "Args:" else "raises "
-    return "".join(f"- {which}`{name}`: {on_one_line(what)}\n" for name, _, what in told)
+    listed = "".join(f"- `{name}`: {on_one_line(what)}\n" for name, _, what in told)
+    return f"{'Arguments' if head == 'Args:' else 'Errors'}:\n\n{listed}"

@@ -1,6 +1,6 @@
 """Trains `edgepuck.torch.SetNetwork` on a GPU, and writes a model file for infer-cpu.
 
-    pip install edgepuck torch cupy-cuda13x
+    pip install ./python torch cupy-cuda13x
     python set_network.py train.npz --out set-64.safetensors
 
 `train.npz` is a packed set of clouds, of up to 1,024 points each. The network and the recipe are those of

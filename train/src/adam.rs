@@ -12,9 +12,9 @@ const CHUNK: usize = 1 << 14;
 
 /// A weight closer to 0 than this becomes 0, and so do its moments below these. A weight that only
 /// the L2 term moves shrinks by a factor in each step until it is subnormal, and arithmetic of
-/// subnormal numbers takes a hundred times as long. The results are the same but for rounding: sums
-/// of products with other weights, which are some 1e-2, are rounded to 1e-9, and [`Adam::epsilon`]
-/// outweighs the root of such a square.
+/// subnormal numbers takes a hundred times as long. An output is a sum of some 1e-2 or more, rounded
+/// to 1e-9; such a weight adds 1e-12 times an activation of about 1. In the update,
+/// [`Adam::epsilon`], which is 1e-12 or more, outweighs the root of such a square, 1e-15.
 const LEAST_WEIGHT: f32 = 1e-12;
 const LEAST_MEAN: f32 = 1e-20;
 const LEAST_SQUARE: f32 = 1e-30;

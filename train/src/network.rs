@@ -137,7 +137,7 @@ impl PointNet {
 
 impl Module for PointNet {
     fn layers(&mut self) -> Vec<LayerMut<'_>> {
-        let Self { stn, edges, stem, fstn, trunk, head, .. } = self;
+        let Self { stn, edges, stem, fstn, trunk, head } = self;
         let stn = stn.iter_mut().flat_map(Module::layers);
         let edges = edges.iter_mut().map(|edge| edge.pooled.base.layer());
         let fstn = fstn.iter_mut().flat_map(Module::layers);

@@ -337,6 +337,7 @@ impl Recipe {
             share("balance", self.balance),
             non_negative("orthogonality", self.orthogonality),
             positive("adam.rate", self.adam.rate),
+            (self.adam.epsilon >= 1e-12, "adam.epsilon", "expected 1e-12 or more"),
             layers("network.trunk", network.trunk.len(), 2),
             layers("network.t_net", network.t_net.len(), 2),
             layers("network.t_net_head", network.t_net_head.len(), 1),

@@ -10,7 +10,7 @@ use crate::shape::Shape;
 
 #[derive(Clone, Debug)]
 pub struct TNet {
-    pub points: SharedMlp,
+    points: SharedMlp,
     head: DenseHead,
     /// The last predicted transforms.
     pub transforms: Transforms,

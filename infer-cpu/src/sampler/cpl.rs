@@ -12,11 +12,9 @@ use super::hash::{Map, reset};
 pub struct CriticalPoints {
     /// The critical rows, each once, the best first.
     pub rows: Vec<u32>,
-    /// For each row, the sum of the maxima that it won.
-    pub scores: Vec<f64>,
     /// The index of each row in `ranking`.
     ranks: Map<u32>,
-    /// Scores and rows.
+    /// The rows, each after its score: the sum of the maxima that it won.
     ranking: Vec<(f64, u32)>,
 }
 
@@ -51,14 +49,11 @@ impl CriticalPoints {
         self.ranking.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         self.rows.clear();
         self.rows.extend(self.ranking.iter().map(|&(_, row)| row));
-        self.scores.clear();
-        self.scores.extend(self.ranking.iter().map(|&(score, _)| score));
     }
 
     /// Allocates memory for poolings of `channels` channels over `n_rows` rows.
     pub fn reserve(&mut self, channels: usize, n_rows: usize) {
         self.rows.reserve(n_rows);
-        self.scores.reserve(n_rows);
         self.ranking.reserve(channels);
         reset(&mut self.ranks, channels);
     }
@@ -82,7 +77,7 @@ mod tests {
     fn points_are_ranked_by_the_sum_of_what_they_win() {
         let critical = ranked(&[1.0, 5.0, 2.0, 1.5, 3.0], &[4, 0, 4, 7, 4]);
         assert_eq!(critical.rows, [4, 0, 7]);
-        assert_eq!(critical.scores, [6.0, 5.0, 1.5]);
+        assert_eq!(critical.ranking, [(6.0, 4), (5.0, 0), (1.5, 7)]);
     }
 
     #[test]
@@ -95,13 +90,13 @@ mod tests {
         let nobody = u32::MAX;
         let maxima = [0.0, -1.0, 2.0, f32::NEG_INFINITY, f32::NAN];
         let critical = ranked(&maxima, &[0, 5, 3, nobody, nobody]);
-        assert_eq!((critical.rows, critical.scores), (vec![3], vec![2.0]));
+        assert_eq!(critical.ranking, [(2.0, 3)]);
     }
 
     #[test]
     fn without_a_positive_channel_the_first_row_is_left() {
         let critical = ranked(&[0.0, -1.0], &[4, 5]);
-        assert_eq!((critical.rows, critical.scores), (vec![0], vec![0.0]));
+        assert_eq!(critical.ranking, [(0.0, 0)]);
         assert_eq!(ranked(&[], &[]).rows, [0]);
     }
 
@@ -137,7 +132,8 @@ mod tests {
             let choose = |cloud: &[[f32; 3]]| {
                 let mut order = CanonicalOrder::default();
                 order.sort(cloud);
-                let CriticalPoints { rows, scores, .. } = pooled(&order.points);
+                let CriticalPoints { rows, ranking, .. } = pooled(&order.points);
+                let scores: Vec<f64> = ranking.iter().map(|ranked| ranked.0).collect();
                 prop_assert_eq!(rows.iter().collect::<BTreeSet<_>>().len(), rows.len());
                 Ok((gather(&order.points, &rows), scores))
             };

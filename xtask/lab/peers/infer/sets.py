@@ -1,6 +1,6 @@
 """Times PointNet++ and DGCNN in ONNX Runtime beside Edgepuck's networks, on one thread.
 
-    pip install -r requirements.txt edgepuck
+    pip install -r requirements.txt ../../../../python
     python sets.py CLOUDS.npz
 
 CLOUDS.npz is a packed set of clouds of 1,024 points, of which the first 32 are classified. The
@@ -30,7 +30,7 @@ try:
     import turns
 except ImportError as error:
     requirements = Path(__file__).with_name("requirements.txt")
-    sys.exit(f"{error}: pip install -r {requirements} edgepuck")
+    sys.exit(f"{error}: pip install -r {requirements} ./python")
 
 N_CLOUDS = 32
 I16_SCALE = 32767

@@ -54,8 +54,9 @@ const PAGES: [Page; 4] = [
         "train-recipe-reference.md",
         "# Keys of training recipes\n\nA recipe of `train` is a TOML file: [Train](train.md) has an \
          example, and the folder of a run has its recipe with all keys. The built-in recipes are \
-         `edge-64`, `set-64`, `lidar-64` and `street-128`. The training part must have clouds of every class, also of \
-         those that `unknown` lists. A set of only a few sweeps usually lacks some. Lengths of clouds in the unit sphere are in radii, those of clusters in metres.",
+         `edge-64`, `set-64`, `lidar-64` and `street-128`. The training part must have clouds of \
+         every class, also of those that `unknown` lists. A set of only a few sweeps usually lacks \
+         some. Lengths of clouds in the unit sphere are in radii, those of clusters in metres.",
         TRAIN,
         &[("", "train/src/recipe.rs", "Recipe")],
     ),

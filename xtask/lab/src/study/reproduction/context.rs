@@ -163,7 +163,6 @@ impl Plan {
                 "most_per_class: expected 1 or more",
             ),
             (self.mesh_steps > 0, "mesh_steps: expected 1 or more"),
-            (!self.fronts.is_empty(), "fronts: expected one encoder or more"),
             (
                 self.fronts.iter().all(|front| front.len() > 1),
                 "fronts: expected two layers or more",

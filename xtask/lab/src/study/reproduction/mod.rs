@@ -23,6 +23,7 @@ use formats::atomic;
 use sim_gpu::Caster;
 use sim_gpu::internals::mesh::tree::discover;
 use std::fs;
+use std::panic::resume_unwind;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::thread;
@@ -133,21 +134,26 @@ fn run_all(context: &ExperimentContext) -> Result<()> {
     publish(&tables.collect::<Result<Vec<_>>>()?, Some(&out.join("report.md")))
 }
 
-/// Trains the networks that are not there, as many at once as there are threads: small networks
-/// leave most of a second thread's time unused. The bytes do not depend on the threads.
+/// Trains the networks that are not there, as many at once as there are cores: one network alone
+/// does not keep two cores busy. The bytes do not depend on the threads. After an error, those that
+/// have begun are finished.
 fn train_all(context: &ExperimentContext) -> Result<()> {
-    let queue = Mutex::new(networks(context)?.into_iter());
-    let next = || queue.lock().unwrap_or_else(PoisonError::into_inner).next();
+    let networks = networks(context)?;
+    let cores = thread::available_parallelism().map_or(1, usize::from);
+    let at_once = cores.min(networks.len()).max(1);
+    let queue = Mutex::new(networks.into_iter());
+    let queue = || queue.lock().unwrap_or_else(PoisonError::into_inner);
     let work = || -> Result<()> {
-        let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-        while let Some(Network { name, recipe, clouds }) = next() {
-            alone.install(|| resume::network(&context.model(&name), &name, recipe, &clouds))?;
+        let own = rayon::ThreadPoolBuilder::new().num_threads(cores / at_once).build()?;
+        loop {
+            let Some(Network { name, recipe, clouds }) = queue().next() else { return Ok(()) };
+            own.install(|| resume::network(&context.model(&name), &name, recipe, &clouds))
+                .inspect_err(|_| queue().by_ref().for_each(drop))?;
         }
-        Ok(())
     };
     thread::scope(|scope| {
-        let threads = thread::available_parallelism().map_or(1, usize::from);
-        let workers: Vec<_> = (0..threads).map(|_| scope.spawn(work)).collect();
-        workers.into_iter().try_for_each(|worker| worker.join().expect("invariant: no panic"))
+        let workers: Vec<_> = (0..at_once).map(|_| scope.spawn(work)).collect();
+        let ends = workers.into_iter().map(|worker| worker.join().unwrap_or_else(|panic| resume_unwind(panic)));
+        ends.collect()
     })
 }
