@@ -60,12 +60,15 @@ impl Adam {
             .zip(gradient.par_chunks(CHUNK))
             .zip(mean.par_chunks_mut(CHUNK).zip(square.par_chunks_mut(CHUNK)))
             .for_each(|((value, gradient), (mean, square))| {
-                for i in 0..value.len() {
-                    let g = gradient[i] + l2 * value[i];
-                    mean[i] = or_zero(mean[i] + (1.0 - beta1) * (g - mean[i]), LEAST_MEAN);
-                    square[i] = or_zero(beta2 * square[i] + (1.0 - beta2) * g * g, LEAST_SQUARE);
-                    let moved = size * mean[i] / (square[i].sqrt() * root + epsilon);
-                    value[i] = or_zero(value[i] - moved, LEAST_WEIGHT);
+                let moments = mean.iter_mut().zip(square);
+                for ((value, gradient), (mean, square)) in
+                    value.iter_mut().zip(gradient).zip(moments)
+                {
+                    let g = gradient + l2 * *value;
+                    *mean = or_zero(*mean + (1.0 - beta1) * (g - *mean), LEAST_MEAN);
+                    *square = or_zero(beta2 * *square + (1.0 - beta2) * g * g, LEAST_SQUARE);
+                    let moved = size * *mean / (square.sqrt() * root + epsilon);
+                    *value = or_zero(*value - moved, LEAST_WEIGHT);
                 }
             });
     }

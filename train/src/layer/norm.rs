@@ -107,11 +107,9 @@ impl Norm {
         bias: &[f32],
         momentum: f32,
     ) -> (Matrix, Saved) {
-        let mean = column_sums(&z, weights, |z, _| z, total);
-        let variance = {
-            let centre = &mean;
-            column_sums(&z, weights, |z, c| (z - centre[c]) * (z - centre[c]), total)
-        };
+        let mean = means(&z, weights, total);
+        let off = |z: f32, mean: f32| (z - mean) * (z - mean);
+        let variance = column_sums(&z, weights, (&mean, off), total);
         self.update_statistics((&mean, &variance), bias, total, momentum);
         let inverse: Vec<f32> = variance.iter().map(|v| 1.0 / (v + EPSILON).sqrt()).collect();
         let (scale, shift) = (&self.scale.value, &self.shift.value);
@@ -121,12 +119,13 @@ impl Norm {
             .zip(out.axis_chunks_iter_mut(Axis(0), ROWS))
             .for_each(|(mut z, mut out)| {
                 for (mut z, mut out) in z.rows_mut().into_iter().zip(out.rows_mut()) {
-                    let (z, out) = (slice(&mut z), slice(&mut out));
-                    for c in 0..z.len() {
-                        z[c] = (z[c] - mean[c]) * inverse[c];
-                        let y = z[c] * scale[c] + shift[c];
+                    let normal = mean.iter().zip(&inverse).zip(scale.iter().zip(shift));
+                    let results = slice(&mut z).iter_mut().zip(slice(&mut out));
+                    for ((z, out), ((mean, inverse), (scale, shift))) in results.zip(normal) {
+                        *z = (*z - mean) * inverse;
+                        let y = *z * scale + shift;
                         // Keeps NaN, so that the loss shows it.
-                        out[c] = if y < 0.0 { 0.0 } else { y };
+                        *out = if y < 0.0 { 0.0 } else { y };
                     }
                 }
             });
@@ -152,10 +151,14 @@ impl Norm {
                 let rows = dy.rows_mut().into_iter().zip(normalised.rows());
                 for ((mut dy, normalised), weight) in rows.zip(weights) {
                     let share = weight / total;
-                    let dy = slice(&mut dy);
-                    for (c, normalised) in normalised.iter().enumerate() {
-                        let common = share * (sum[c] + normalised * with_normalised[c]);
-                        dy[c] = scale[c] * inverse[c] * (dy[c] - common);
+                    let normalised = normalised.to_slice().expect("invariant: rows are contiguous");
+                    let sums = sum.iter().zip(&with_normalised).zip(normalised);
+                    let factors = scale.iter().zip(inverse);
+                    for ((dy, ((sum, with_normalised), normalised)), (scale, inverse)) in
+                        slice(&mut dy).iter_mut().zip(sums).zip(factors)
+                    {
+                        let common = share * (sum + normalised * with_normalised);
+                        *dy = scale * inverse * (*dy - common);
                     }
                 }
             });
@@ -177,12 +180,17 @@ fn slice<'a>(row: &'a mut ndarray::ArrayViewMut1<'_, f32>) -> &'a mut [f32] {
     row.as_slice_mut().expect("invariant: rows are contiguous")
 }
 
-/// Sums `term(z, channel)` times the weight of the row over all rows, and divides by `total`. The
-/// sums of chunks are in f32, and the sum over chunks is in f64.
-pub fn column_sums(
+/// The mean of each channel of `z`, by the weights of the rows, whose sum is `total`.
+pub fn means(z: &Matrix, weights: &[f32], total: f32) -> Vec<f32> {
+    column_sums(z, weights, (&vec![0.0; z.ncols()], |z, _| z), total)
+}
+
+/// Sums `term(z, parameter of the channel)` times the weight of the row over all rows, and divides
+/// by `total`. The sums of chunks are in f32, and the sum over chunks is in f64.
+fn column_sums(
     z: &Matrix,
     weights: &[f32],
-    term: impl Fn(f32, usize) -> f32 + Sync,
+    (parameters, term): (&[f32], impl Fn(f32, f32) -> f32 + Sync),
     total: f32,
 ) -> Vec<f32> {
     let channels = z.ncols();
@@ -194,8 +202,8 @@ pub fn column_sums(
             let mut sums = vec![0.0f32; channels];
             for (z, &weight) in z.rows().into_iter().zip(weights) {
                 let z = z.to_slice().expect("invariant: rows are contiguous");
-                for c in 0..channels {
-                    sums[c] += weight * term(z[c], c);
+                for ((sum, z), parameter) in sums.iter_mut().zip(z).zip(parameters) {
+                    *sum += weight * term(*z, *parameter);
                 }
             }
             sums
@@ -226,10 +234,12 @@ fn gradient_sums(dy: &mut Matrix, y: &Matrix, normalised: &Matrix) -> [Vec<f32>;
                 let dy = slice(&mut dy);
                 let y = y.to_slice().expect("invariant: rows are contiguous");
                 let normalised = normalised.to_slice().expect("invariant: rows are contiguous");
-                for c in 0..channels {
-                    dy[c] = if y[c] <= 0.0 { 0.0 } else { dy[c] };
-                    sum[c] += dy[c];
-                    product[c] += dy[c] * normalised[c];
+                let sums = sum.iter_mut().zip(product.iter_mut());
+                let values = dy.iter_mut().zip(y).zip(normalised);
+                for ((sum, product), ((dy, y), normalised)) in sums.zip(values) {
+                    *dy = if *y <= 0.0 { 0.0 } else { *dy };
+                    *sum += *dy;
+                    *product += *dy * normalised;
                 }
             }
             sums

@@ -25,7 +25,7 @@ use ndarray::{ArrayView2, Axis};
 use rayon::slice::ParallelSliceMut;
 
 use super::Normed;
-use super::norm::{EPSILON, column_sums, relu_gradient};
+use super::norm::{EPSILON, means, relu_gradient};
 use crate::matrix::{self, Matrix};
 use crate::rows::{Rows, by_cloud};
 
@@ -71,7 +71,7 @@ impl PooledLayer {
     /// Applies the layer to `x` `[rows, inputs]`.
     pub fn forward(&mut self, x: ArrayView2<'_, f32>, rows: Rows<'_>, momentum: f32) {
         let x = x.to_owned();
-        let mean = column_sums(&x, rows.weights, |x, _| x, rows.total);
+        let mean = means(&x, rows.weights, rows.total);
         let centred = &x - &ndarray::aview1(&mean);
         let covariance = covariance(&centred, rows);
         let weights = self.base.linear.weight.matrix();
@@ -92,10 +92,13 @@ impl PooledLayer {
         self.base.output = Matrix::zeros(normalised.dim());
         let (scale, shift) = (&self.base.norm.scale.value, &self.base.norm.shift.value);
         for (mut z, mut out) in normalised.rows_mut().into_iter().zip(self.base.output.rows_mut()) {
-            for c in 0..z.len() {
-                z[c] = (z[c] - mean_product[c]) * inverse[c];
-                let y = z[c] * scale[c] + shift[c];
-                out[c] = if self.relu && y < 0.0 { 0.0 } else { y };
+            let normal = mean_product.iter().zip(&inverse).zip(scale.iter().zip(shift));
+            for ((z, out), ((mean, inverse), (scale, shift))) in
+                z.iter_mut().zip(&mut out).zip(normal)
+            {
+                *z = (*z - mean) * inverse;
+                let y = *z * scale + shift;
+                *out = if self.relu && y < 0.0 { 0.0 } else { y };
             }
         }
         self.saved = Saved { winners, normalised, mean, centred, covariant, inverse };
