@@ -7,6 +7,7 @@ use formats::interval::wilson;
 use formats::split::Split;
 use infer_cpu::Options;
 use infer_cpu::sampler::{SamplerKind, SamplerSpec};
+use std::cmp::Reverse;
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
@@ -35,7 +36,7 @@ pub struct Network {
     pub clouds: Arc<Clouds>,
 }
 
-/// All networks, in the order of the experiments.
+/// All networks. Those that take longest come first, so that none is trained alone at the end.
 pub fn networks(context: &ExperimentContext) -> Result<Vec<Network>> {
     let (plan, clouds) = (&context.plan, context.clouds(Split::Train)?);
     let behind_samplers = rivals(plan, clouds.set.smallest_cloud()).into_iter();
@@ -47,6 +48,9 @@ pub fn networks(context: &ExperimentContext) -> Result<Vec<Network>> {
     let mut networks = of_clouds.chain(of_scans).collect::<Result<Vec<_>>>()?;
     let mut names = BTreeSet::new();
     networks.retain(|network| names.insert(network.name.clone()));
+    networks.sort_by_key(|Network { recipe, clouds, .. }| {
+        Reverse(recipe.points * recipe.epochs as usize * clouds.len())
+    });
     Ok(networks)
 }
 
