@@ -42,7 +42,7 @@ pub(crate) fn made_meanwhile() -> io::Error {
     io::Error::new(io::ErrorKind::AlreadyExists, cause)
 }
 
-/// The file to which the symbolic links at `path` lead, or `path` if there are none. The file need not exist.
+/// Follows the symbolic links at `path` to a file, which need not exist. Without links, this is `path`.
 pub(crate) fn behind_links(path: &Path) -> PathBuf {
     // As many as Linux follows.
     const MOST_LINKS: usize = 40;

@@ -38,13 +38,11 @@ def test_the_page_has_every_public_name_with_its_docstring() -> None:
 
 
 def of_package() -> Iterator[str]:
-    init = ast.parse((PACKAGE / "__init__.py").read_text())
-    names = next(value for target, value in assignments(init) if target == "__all__")
     defined = {}
     for file in [*PACKAGE.glob("_*.py"), PACKAGE / "_edgepuck.pyi"]:
         for node in public(ast.parse(file.read_text())):
             defined.setdefault(node.name, node)
-    for name in ast.literal_eval(names):
+    for name in edgepuck.__all__:
         yield from section(defined[name], f"ep.{name}")
 
 
@@ -52,12 +50,6 @@ def of_optional_modules() -> Iterator[str]:
     for module in OPTIONAL:
         for node in public(ast.parse((PACKAGE / f"{module}.py").read_text())):
             yield from section(node, f"edgepuck.{module}.{node.name}")
-
-
-def assignments(tree: ast.Module) -> Iterator[tuple[str, ast.expr]]:
-    for node in tree.body:
-        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
-            yield node.targets[0].id, node.value
 
 
 def public(node: ast.Module | ast.ClassDef) -> list[Documented]:

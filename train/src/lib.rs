@@ -20,7 +20,7 @@ pub mod clouds;
 mod cluster;
 pub mod cluster_variation;
 pub mod cpl;
-pub mod critical_points;
+mod critical_points;
 mod draws;
 pub mod error;
 pub mod evaluate;

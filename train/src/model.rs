@@ -49,7 +49,7 @@ impl Model {
         let Some(encoder) = &mut self.encoder else {
             return network.learn(batch, kept, rates);
         };
-        let selected = encoder.forward(batch, rates);
+        let selected = encoder.forward(batch, rates.momentum);
         let mut loss = network.learn(&selected, kept, rates);
         loss.total += encoder.backward(batch);
         loss

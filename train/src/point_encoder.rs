@@ -13,7 +13,6 @@ use crate::critical_points::critical_points;
 use crate::layer::{LayerMut, Linear, Module};
 use crate::loss;
 use crate::mlp::SharedMlp;
-use crate::network::Rates;
 
 /// The prefix of the parameters that only training needs. Model files leave them out.
 pub const TRAINING_ONLY: &str = "cpl.classes";
@@ -42,8 +41,8 @@ impl PointEncoder {
     }
 
     /// Selects the critical points of `batch`.
-    pub fn forward(&mut self, batch: &Batch, rates: Rates) -> Batch {
-        self.mlp.forward(batch.points(), batch.rows(), rates.momentum);
+    pub fn forward(&mut self, batch: &Batch, momentum: f32) -> Batch {
+        self.mlp.forward(batch.points(), batch.rows(), momentum);
         critical_points(&self.mlp.pooled, batch, self.keep)
     }
 

@@ -133,8 +133,9 @@ fn a_panic_of_flushed_work_comes_through_and_restores_the_mode() {
     assert!(black_box(black_box(f32::MIN_POSITIVE) * black_box(0.5)) > 0.0);
 }
 
-/// With weights of up to 1e-37, many of whose products are subnormal, flushing changes a sum of K = 64 products by at most 64 * 1.2e-38. Later
-/// layers have gains below 10^2, so that logits change by less than 1e-33.
+/// With weights of up to 1e-37, many of whose products are subnormal, flushing changes a sum of
+/// K = 64 products by at most 64 * 1.2e-38. Later layers have gains below 10^2, so that logits
+/// change by less than 1e-33.
 #[test]
 fn subnormal_products_move_no_logit_whether_flushed_or_not() {
     let folder = tempfile::tempdir().unwrap();

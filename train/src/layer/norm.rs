@@ -1,7 +1,7 @@
 //! Batch norm in training.
 
-use ndarray::Axis;
 use ndarray::parallel::prelude::*;
+use ndarray::{ArrayViewMut1, Axis};
 use rayon::slice::ParallelSlice;
 
 use super::{Folded, Linear};
@@ -118,15 +118,8 @@ impl Norm {
             .into_par_iter()
             .zip(out.axis_chunks_iter_mut(Axis(0), ROWS))
             .for_each(|(mut z, mut out)| {
-                for (mut z, mut out) in z.rows_mut().into_iter().zip(out.rows_mut()) {
-                    let normal = mean.iter().zip(&inverse).zip(scale.iter().zip(shift));
-                    let results = slice(&mut z).iter_mut().zip(slice(&mut out));
-                    for ((z, out), ((mean, inverse), (scale, shift))) in results.zip(normal) {
-                        *z = (*z - mean) * inverse;
-                        let y = *z * scale + shift;
-                        // Keeps NaN, so that the loss shows it.
-                        *out = if y < 0.0 { 0.0 } else { y };
-                    }
+                for (z, out) in z.rows_mut().into_iter().zip(out.rows_mut()) {
+                    normalise((z, out), [&mean, &inverse, scale, shift], true);
                 }
             });
         (out, Saved { normalised: z, inverse })
@@ -168,6 +161,23 @@ impl Norm {
     }
 }
 
+/// Normalises a row `z` with the mean and the inverse deviation of each channel, and writes it to
+/// `out` scaled and shifted; with `relu`, negative results become 0.
+pub fn normalise(
+    (mut z, mut out): (ArrayViewMut1<'_, f32>, ArrayViewMut1<'_, f32>),
+    [mean, inverse, scale, shift]: [&[f32]; 4],
+    relu: bool,
+) {
+    let channels = mean.iter().zip(inverse).zip(scale.iter().zip(shift));
+    let results = slice(&mut z).iter_mut().zip(slice(&mut out));
+    for ((z, out), ((mean, inverse), (scale, shift))) in results.zip(channels) {
+        *z = (*z - mean) * inverse;
+        let y = *z * scale + shift;
+        // Keeps NaN, so that the loss shows it.
+        *out = if relu && y < 0.0 { 0.0 } else { y };
+    }
+}
+
 pub fn relu_gradient(dy: &mut Matrix, y: &Matrix) {
     dy.zip_mut_with(y, |dy, &y| {
         if y <= 0.0 {
@@ -176,7 +186,7 @@ pub fn relu_gradient(dy: &mut Matrix, y: &Matrix) {
     });
 }
 
-fn slice<'a>(row: &'a mut ndarray::ArrayViewMut1<'_, f32>) -> &'a mut [f32] {
+fn slice<'a>(row: &'a mut ArrayViewMut1<'_, f32>) -> &'a mut [f32] {
     row.as_slice_mut().expect("invariant: rows are contiguous")
 }
 

@@ -25,7 +25,7 @@ use ndarray::{ArrayView2, Axis};
 use rayon::slice::ParallelSliceMut;
 
 use super::Normed;
-use super::norm::{EPSILON, means, relu_gradient};
+use super::norm::{EPSILON, means, normalise, relu_gradient};
 use crate::matrix::{self, Matrix};
 use crate::rows::{Rows, by_cloud};
 
@@ -91,15 +91,8 @@ impl PooledLayer {
         let (mut normalised, winners) = self.largest(&x, rows);
         self.base.output = Matrix::zeros(normalised.dim());
         let (scale, shift) = (&self.base.norm.scale.value, &self.base.norm.shift.value);
-        for (mut z, mut out) in normalised.rows_mut().into_iter().zip(self.base.output.rows_mut()) {
-            let normal = mean_product.iter().zip(&inverse).zip(scale.iter().zip(shift));
-            for ((z, out), ((mean, inverse), (scale, shift))) in
-                z.iter_mut().zip(&mut out).zip(normal)
-            {
-                *z = (*z - mean) * inverse;
-                let y = *z * scale + shift;
-                *out = if self.relu && y < 0.0 { 0.0 } else { y };
-            }
+        for (z, out) in normalised.rows_mut().into_iter().zip(self.base.output.rows_mut()) {
+            normalise((z, out), [&mean_product, &inverse, scale, shift], self.relu);
         }
         self.saved = Saved { winners, normalised, mean, centred, covariant, inverse };
     }

@@ -3,9 +3,10 @@
 use anyhow::{Context, Result, ensure};
 use formats::split::Split;
 use serde::{Deserialize, Serialize};
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use train::clouds::Clouds;
 use train::recipe::Recipe;
 
@@ -16,7 +17,7 @@ pub struct ExperimentContext {
     /// The folder of the scans and surfaces of meshes.
     pub scans: PathBuf,
     pub out: PathBuf,
-    pub read: Mutex<BTreeMap<String, Arc<Clouds>>>,
+    pub read: RefCell<BTreeMap<String, Arc<Clouds>>>,
 }
 
 impl ExperimentContext {
@@ -79,12 +80,11 @@ impl ExperimentContext {
     }
 
     fn remember(&self, key: &str, read: impl FnOnce() -> Result<Clouds>) -> Result<Arc<Clouds>> {
-        let mut known = self.read.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(clouds) = known.get(key) {
+        if let Some(clouds) = self.read.borrow().get(key) {
             return Ok(Arc::clone(clouds));
         }
         let clouds = Arc::new(read()?);
-        known.insert(key.to_owned(), Arc::clone(&clouds));
+        self.read.borrow_mut().insert(key.to_owned(), Arc::clone(&clouds));
         Ok(clouds)
     }
 

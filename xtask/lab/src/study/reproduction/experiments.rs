@@ -9,7 +9,7 @@ use infer_cpu::Options;
 use infer_cpu::sampler::{SamplerKind, SamplerSpec};
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use train::clouds::Clouds;
 use train::cpl::Cpl;
@@ -32,8 +32,15 @@ fn accuracy(model: &Path, clouds: &Clouds, sampler: Option<SamplerSpec>) -> Resu
 /// A network that experiments test.
 pub struct Network {
     pub name: String,
+    pub out: PathBuf,
     pub recipe: Recipe,
     pub clouds: Arc<Clouds>,
+}
+
+impl Network {
+    fn new(context: &ExperimentContext, name: String, recipe: Recipe, clouds: Arc<Clouds>) -> Self {
+        Self { out: context.model(&name), name, recipe, clouds }
+    }
 }
 
 /// All networks. Those that take longest come first, so that none is trained alone at the end.
@@ -42,8 +49,8 @@ pub fn networks(context: &ExperimentContext) -> Result<Vec<Network>> {
     let behind_samplers = rivals(plan, clouds.set.smallest_cloud()).into_iter();
     let of_clouds = plan.points.iter().map(|&n| random(plan, n));
     let of_clouds = of_clouds.chain(behind_samplers.flat_map(|(_, networks)| networks));
-    let of_clouds =
-        of_clouds.map(|(name, recipe)| Ok(Network { name, recipe, clouds: Arc::clone(&clouds) }));
+    let network = |(name, recipe)| Network::new(context, name, recipe, Arc::clone(&clouds));
+    let of_clouds = of_clouds.map(|named| Ok(network(named)));
     let of_scans = SETS.iter().map(|(_, place)| of_set(context, place));
     let mut networks = of_clouds.chain(of_scans).collect::<Result<Vec<_>>>()?;
     let mut names = BTreeSet::new();
@@ -172,7 +179,7 @@ fn of_set(context: &ExperimentContext, place: &str) -> Result<Network> {
     let recipe = Recipe { sampling: Sampling::Random, ..plan.at(plan.mesh_points) };
     let steps_an_epoch = (clouds.len() / recipe.batch).max(1) as u32;
     let epochs = plan.mesh_steps.div_ceil(steps_an_epoch).max(1);
-    Ok(Network { name: name_of(place), recipe: Recipe { epochs, ..recipe }, clouds })
+    Ok(Network::new(context, name_of(place), Recipe { epochs, ..recipe }, clouds))
 }
 
 /// The name of the network of the set at `place`.

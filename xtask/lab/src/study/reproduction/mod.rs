@@ -22,6 +22,7 @@ use experiments::{EXPERIMENTS, Network, networks};
 use formats::atomic;
 use sim_gpu::Caster;
 use sim_gpu::internals::mesh::tree::discover;
+use std::cell::RefCell;
 use std::fs;
 use std::panic::resume_unwind;
 use std::path::{Path, PathBuf};
@@ -39,7 +40,7 @@ pub struct ReproduceArgs {
     #[arg(long, value_name = "DIR")]
     meshes: Option<PathBuf>,
 
-    /// Run a subset of the experiments; this takes ten minutes on two cores
+    /// Run a subset of the experiments; this takes two minutes on two cores
     #[arg(long, conflicts_with = "plan")]
     quick: bool,
 
@@ -74,7 +75,7 @@ pub fn run(args: &ReproduceArgs) -> Result<Outcome> {
     };
     make_datasets(&meshes, &scans)?;
     let clouds = args.clouds.clone().unwrap_or_else(|| scans.join("surfaces/surface"));
-    let (out, read) = (args.out.clone(), Mutex::default());
+    let (out, read) = (args.out.clone(), RefCell::default());
     run_all(&ExperimentContext { plan, clouds, scans, out, read })?;
     Ok(Outcome::Success)
 }
@@ -129,26 +130,25 @@ fn run_all(context: &ExperimentContext) -> Result<()> {
     resume::keep_terms(&context.terms()?, &out.join("terms.toml"))?;
     fs::create_dir_all(out.join("models"))?;
     println!("{}", context.plan.about);
-    train_all(context)?;
+    train_all(networks(context)?)?;
     let tables = EXPERIMENTS.iter().map(|experiment| experiment(context));
     publish(&tables.collect::<Result<Vec<_>>>()?, Some(&out.join("report.md")))
 }
 
-/// Trains the networks that are not there, as many at once as there are cores: one network alone
+/// Trains those of `networks` that are not there, as many at once as there are cores: one network alone
 /// does not keep two cores busy. The bytes do not depend on the threads. After an error, those that
 /// have begun are finished.
-fn train_all(context: &ExperimentContext) -> Result<()> {
-    let networks = networks(context)?;
+fn train_all(networks: Vec<Network>) -> Result<()> {
     let cores = thread::available_parallelism().map_or(1, usize::from);
     let at_once = cores.min(networks.len()).max(1);
-    let queue = Mutex::new(networks.into_iter());
-    let queue = || queue.lock().unwrap_or_else(PoisonError::into_inner);
+    let rest = Mutex::new(networks.into_iter());
+    let rest = || rest.lock().unwrap_or_else(PoisonError::into_inner);
     let work = || -> Result<()> {
         let own = rayon::ThreadPoolBuilder::new().num_threads(cores / at_once).build()?;
         loop {
-            let Some(Network { name, recipe, clouds }) = queue().next() else { return Ok(()) };
-            own.install(|| resume::network(&context.model(&name), &name, recipe, &clouds))
-                .inspect_err(|_| queue().by_ref().for_each(drop))?;
+            let Some(Network { name, out, recipe, clouds }) = rest().next() else { return Ok(()) };
+            own.install(|| resume::network(&out, &name, recipe, &clouds))
+                .inspect_err(|_| rest().by_ref().for_each(drop))?;
         }
     };
     thread::scope(|scope| {

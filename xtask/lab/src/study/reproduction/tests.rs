@@ -5,8 +5,8 @@ use super::run_all;
 use formats::hash::Hashing;
 use formats::packed::PackedWriter;
 use formats::rng::StreamKey;
+use std::cell::RefCell;
 use std::path::Path;
-use std::sync::Mutex;
 
 const PLAN: &str = r#"
 about = "a test"
@@ -54,7 +54,7 @@ fn reproduce(folder: &Path, plan: Plan) -> anyhow::Result<String> {
         clouds: folder.join("surfaces/surface"),
         scans: folder.to_owned(),
         out: folder.join("out"),
-        read: Mutex::default(),
+        read: RefCell::default(),
     };
     run_all(&context)?;
     Ok(std::fs::read_to_string(folder.join("out/report.md")).unwrap())
