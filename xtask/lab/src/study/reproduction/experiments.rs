@@ -14,11 +14,11 @@ use std::sync::Arc;
 use train::clouds::Clouds;
 use train::cpl::Cpl;
 use train::evaluate::confusion;
-use train::recipe::{Recipe, Sampling};
+use train::recipe::{Recipe, Sampling, Schedule};
 
 type Experiment = fn(&ExperimentContext) -> Result<Table>;
 
-pub const EXPERIMENTS: [Experiment; 4] = [trained_at, tested_at, samplers, matrix];
+pub const EXPERIMENTS: [Experiment; 5] = [trained_at, tested_at, samplers, matrix, origins];
 
 /// The accuracy of `model` on `clouds`, behind `sampler` or as trained.
 fn accuracy(model: &Path, clouds: &Clouds, sampler: Option<SamplerSpec>) -> Result<String> {
@@ -173,13 +173,36 @@ fn matrix(context: &ExperimentContext) -> Result<Table> {
     Ok(table)
 }
 
-/// The network of the set at `place`, trained for the fewest epochs that have the plan's steps.
+/// The program that trained each network.
+fn origins(context: &ExperimentContext) -> Result<Table> {
+    let mut table = Table::new("Who trained each network", &["network", "program"]);
+    for Network { name, out, .. } in networks(context)? {
+        let (_, card) = infer_cpu::model_file::open(&out)?;
+        table.push(vec![name, card.provenance.unwrap_or_default()]);
+    }
+    Ok(table)
+}
+
+/// The network of the set at `place`, trained for the fewest epochs that have the plan's steps. The
+/// learning rate falls after about as many steps, however many clouds an epoch has.
 fn of_set(context: &ExperimentContext, place: &str) -> Result<Network> {
     let (plan, clouds) = (&context.plan, context.scans(place, Split::Train)?);
     let recipe = Recipe { sampling: Sampling::Random, ..plan.at(plan.mesh_points) };
     let steps_an_epoch = (clouds.len() / recipe.batch).max(1) as u32;
     let epochs = plan.mesh_steps.div_ceil(steps_an_epoch).max(1);
-    Ok(Network::new(context, name_of(place), Recipe { epochs, ..recipe }, clouds))
+    let schedule = stretched(recipe.schedule, f64::from(epochs) / f64::from(recipe.epochs));
+    Ok(Network::new(context, name_of(place), Recipe { epochs, schedule, ..recipe }, clouds))
+}
+
+/// `schedule` for a run that is `ratio` times as long.
+pub fn stretched(schedule: Schedule, ratio: f64) -> Schedule {
+    match schedule {
+        Schedule::Step { every, factor } => {
+            let every = (f64::from(every) * ratio).round().max(1.0) as u32;
+            Schedule::Step { every, factor }
+        }
+        Schedule::Cosine { warm_up, last } => Schedule::Cosine { warm_up: warm_up * ratio, last },
+    }
 }
 
 /// The name of the network of the set at `place`.

@@ -68,7 +68,7 @@ fn every_experiment_is_in_the_report_and_an_interrupted_run_ends_with_the_same_n
     let tables: Vec<&str> = found.split("## ").skip(1).collect();
     // Each has two lines of heading; clouds of 32 points are not tested at 64.
     let rows = tables.iter().map(|table| table.matches("\n|").count() - 2);
-    assert_eq!(rows.collect::<Vec<_>>(), [2, 1, 3, 7], "{found}");
+    assert_eq!(rows.collect::<Vec<_>>(), [2, 1, 3, 7, 11], "{found}");
     // These shapes are told apart in training and in tests, of one set.
     let line = tables[3].lines().find(|line| line.starts_with("| static clean")).unwrap();
     let cell = line.split('|').nth(3).unwrap().trim();
@@ -76,8 +76,27 @@ fn every_experiment_is_in_the_report_and_an_interrupted_run_ends_with_the_same_n
     assert!(accuracy > 60.0, "{line}");
 
     // As if it had been killed while it trained.
-    std::fs::remove_file(folder.join("out/models/cpl-3-8-16-8.safetensors")).unwrap();
+    let models = folder.join("out/models");
+    std::fs::remove_file(models.join("cpl-3-8-16-8.safetensors")).unwrap();
+    // As if it had been trained elsewhere.
+    std::fs::remove_dir_all(models.join("random-8.run")).unwrap();
     assert_eq!(reproduce(folder, Plan::parse(PLAN).unwrap()).unwrap(), found);
+
+    std::fs::copy(models.join("random-16.safetensors"), models.join("random-8.safetensors"))
+        .unwrap();
+    let error = reproduce(folder, Plan::parse(PLAN).unwrap()).unwrap_err().to_string();
+    assert!(error.contains("expected the network random-8 of 8 points, found another"), "{error}");
+}
+
+#[test]
+fn the_rate_falls_after_as_many_steps_whatever_the_epochs() {
+    use super::experiments::stretched;
+    use train::recipe::Schedule;
+    let step = |every| Schedule::Step { every, factor: 0.7 };
+    assert_eq!(stretched(step(20), 819.0 / 200.0), step(82));
+    assert_eq!(stretched(step(20), 0.03), step(1));
+    let cosine = |warm_up| Schedule::Cosine { warm_up, last: 0.01 };
+    assert_eq!(stretched(cosine(2.0), 1.5), cosine(3.0));
 }
 
 #[test]
