@@ -10,9 +10,8 @@ pub fn need_simplification(wanted: bool) -> Result<(), Usage> {
         return Ok(());
     }
     Err(Usage(
-        "--simplify: this program was built without mesh simplification, which the programs of \
-         the releases page have; in a checkout, `cargo install --path edgepuck --features \
-         simplify` builds it, with a C++ compiler"
+        "--simplify: this program was built without mesh simplification: in a checkout, `cargo \
+         install --path edgepuck --features simplify` builds it, with a C++ compiler"
             .to_owned(),
     ))
 }

@@ -149,7 +149,10 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
         n_points / numbers.len(),
         numbers.len() as f64 / seconds
     );
-    let has_clusters = report(&stage, &counts, &stand, args.shard.is_none())?;
+    if args.shard.is_none() {
+        report_missing(&stage, &stand, numbers.len());
+    }
+    let has_clusters = report(&stage, &counts, args.shard.is_none())?;
     formats::say!("Clusters: {}. Picture: {}.", packed.display(), preview.display());
     if n_points == 0 {
         formats::say!("warning: no beam returned a point");
@@ -165,25 +168,29 @@ fn draw(stage: &Stage, done: &LabelledScene, out: &Path) -> anyhow::Result<()> {
     preview::draw(&shown, None, "scene 0", out)
 }
 
+/// Warns of objects of the recipe that stand in none of `n_scenes` scenes, unless that may be chance:
+/// a count that may be 0 is 0 in half of the scenes at most.
+fn report_missing(stage: &Stage, stand: &[bool], n_scenes: usize) {
+    const ENOUGH: usize = 20;
+    let objects = stage.recipe().object.iter().zip(stand).enumerate();
+    for (i, (object, _)) in objects.filter(|(_, (_, stands))| !**stands) {
+        let [least, most] = object.count;
+        if least > 0 || most == 0 || n_scenes >= ENOUGH {
+            formats::say!(
+                "warning: object[{i}], a {}: no scene has it: does it fit there, and is its count above 0?",
+                object.class
+            );
+        }
+    }
+}
+
 /// Prints the clusters of each class, and what a whole set, of which a part need not have all, lacks.
 /// Returns whether there is a cluster where there must be one.
-fn report(
-    stage: &Stage,
-    counts: &ClusterCounts,
-    stand: &[bool],
-    is_whole: bool,
-) -> std::io::Result<bool> {
+fn report(stage: &Stage, counts: &ClusterCounts, is_whole: bool) -> std::io::Result<bool> {
     let mut out = std::io::stdout().lock();
     writeln!(out, "{:<16} {:>9} {:>9}", "class", "train", "test")?;
     for ((class, train), test) in stage.classes().iter().zip(&counts.train).zip(&counts.test) {
         writeln!(out, "{class:<16} {train:>9} {test:>9}")?;
-    }
-    let missing = stage.recipe().object.iter().enumerate();
-    for (i, object) in missing.filter(|(i, _)| is_whole && !stand[*i]) {
-        formats::say!(
-            "warning: object[{i}]: no scene has a {}: does it fit there, and is its count above 0?",
-            object.class
-        );
     }
     let [has_train, has_test] =
         [&counts.train, &counts.test].map(|part| part.iter().any(|n| *n > 0));

@@ -157,7 +157,8 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     }
     if scans.iter().all(|scan| scan.is_empty()) {
         formats::say!(
-            "warning: no beam returned a point: expected an object in the sensor's range"
+            "warning: no beam returned a point: expected an object in the sensor's range and view, \
+             larger than the gaps between beams, and not seen edge-on"
         );
         return Ok(Outcome::SomeRefused);
     }

@@ -40,7 +40,7 @@ fn scenes_are_scanned_cut_labelled_and_packed_alike_every_time() {
                 distance_m = [5, 9]\n";
     folder.write("yard.toml", yard + none);
     let said = folder.succeeds("gen-scenes yard.toml --adapter cpu --sweeps 9 --save 0 --out few");
-    assert!(said.contains(": no scene has a car: does it fit there, and is its count"), "{said}");
+    assert!(said.contains("a car: no scene has it: does it fit there, and is its count"), "{said}");
     folder.write("metric.toml", "points = 16\nnormalization = \"metric\"\n");
     let said = folder.exits(1, "train --data few/packed --recipe metric.toml --out m.safetensors");
     assert!(said.contains("its test part is empty") && !said.contains("epoch 1"), "{said}");
@@ -52,6 +52,8 @@ fn a_sweep_is_cut_and_its_clusters_are_named() {
     let folder = Folder::new();
     let said = folder.succeeds("gen-scenes --adapter cpu --sweeps 1 --save 1 --out scenes");
     assert!(said.contains("warning: no cluster is in the test part"), "{said}");
+    // One scene lacks some objects by chance.
+    assert!(!said.contains("no scene has it"), "{said}");
     // Files of others stay, whatever is replaced.
     std::fs::write(folder.at("scenes/sweeps/mine.bin"), "mine").unwrap();
     for flag in ["", "--overwrite"] {

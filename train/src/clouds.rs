@@ -124,8 +124,8 @@ impl Clouds {
         } else if (0..clouds.len()).all(|i| is_in_unit_sphere(clouds.set.cloud(i))) {
             let cause = format!(
                 "expected clouds in metres, as a network with normalization = \"{normalization}\" \
-                 takes them, found clouds in the unit sphere, as gen-dataset packs them: set \
-                 normalization = \"unit-sphere\", or give clusters of gen-scenes"
+                 takes them, found clouds in the unit sphere, as gen-dataset packs them: choose a \
+                 recipe or a model with normalization = \"unit-sphere\", or give clusters of gen-scenes"
             );
             return Err(Error::Data { path: path.to_path_buf(), cause });
         }

@@ -178,10 +178,12 @@ fn check(clouds: &Clouds, recipe: &Recipe, data: &str) -> Result<(), Error> {
     let missing = (0..clouds.classes.len()).find(|class| !clouds.set.labels.contains(class));
     if let Some(class) = missing {
         let name = &clouds.classes[class];
-        return refuse(format!(
-            "expected clouds of every class, found none of {name}: make the data with a mesh of it \
-             in the train split, or with a smaller --min-points"
-        ));
+        let way = if recipe.normalization.is_metric() {
+            "make the data with more --sweeps"
+        } else {
+            "make the data with a mesh of it in the train split, or with a smaller --min-points"
+        };
+        return refuse(format!("expected clouds of every class, found none of {name}: {way}"));
     }
     if recipe.negatives > 0.0 && clouds.classes.iter().any(|name| name == UNKNOWN) {
         return refuse(format!("expected no class `{UNKNOWN}` beside the recipe's negatives"));

@@ -58,7 +58,8 @@ Outputs:
 
 The card (classes, normalization, sampler, ...) is in the file's metadata_props.")]
 pub struct ExportOnnxArgs {
-    /// Model file, or the name of a bundled model: edge-64, street-128 or shapes-rotational-64
+    /// Model file, or the name of a bundled model: edge-64, set-64, street-128 or
+    /// shapes-rotational-64
     #[arg(value_name = "MODEL")]
     model: PathBuf,
 

@@ -174,6 +174,7 @@ fn make_files(
         summary::print(plan.out, &manifest, progress, started.elapsed(), verbose);
     } else {
         formats::say!("{}: the dataset is already complete.", plan.out.display());
+        summary::tell_failures(plan.out, &manifest);
     }
     end(plan.out, &manifest)
 }

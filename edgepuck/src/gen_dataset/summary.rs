@@ -32,10 +32,16 @@ pub fn print(out: &Path, manifest: &Manifest, progress: &Progress, total: Durati
         };
         formats::say!("{}: {} clouds, {left_out}", packed.file, packed.clouds);
     }
-    if !manifest.failures.is_empty() {
-        formats::say!("Meshes that failed are listed in {}", layout::failures(out).display());
-    }
+    tell_failures(out, manifest);
     formats::say!("Dataset: {}", out.display());
+}
+
+/// Prints how many meshes failed, and the file that lists them.
+pub fn tell_failures(out: &Path, manifest: &Manifest) {
+    let n = manifest.failures.len();
+    if n > 0 {
+        formats::say!("Meshes that failed: {n}, listed in {}", layout::failures(out).display());
+    }
 }
 
 /// Prints the first notes, and how many more there are.

@@ -154,7 +154,8 @@ pub enum Unlike {
     /// The side of an object that faces a sensor.
     #[error(
         "is a scan of one side, and edge-64 learnt whole objects: its answer is often wrong; name a \
-         model that learnt such scans: street-128, or one of `edgepuck train`"
+         model that learnt such scans: shapes-rotational-64 for ten kinds of shapes, street-128 for \
+         clusters of streets, or one of `edgepuck train`"
     )]
     OneSide,
     /// A sweep of a sensor.

@@ -31,8 +31,8 @@ pub fn check_layouts(config: &DatasetConfig, classes: &[String]) -> Result<(), D
                 refuse_if(config.packed_points < 2, layout, "a cloud needs two points or more")?;
             }
             Layout::ModelnetH5 => {
-                let without = "this build has no HDF5: the programs of the releases page do, and `cargo install \
-                               --path edgepuck --features hdf5` builds one";
+                let without = "this build has no HDF5: in a checkout, `cargo install --path edgepuck \
+                               --features hdf5` builds one that has";
                 refuse_if(cfg!(not(feature = "hdf5")), layout, without)?;
                 refuse_if(classes.len() > 256, layout, "it has room for 256 classes")?;
             }

@@ -144,6 +144,10 @@ fn what_cannot_be_learnt_from_is_an_error_that_names_it() {
             "--data missing.npz",
             "missing.npz: expected clouds of every class, found none of disc: make",
         ),
+        (
+            "--data missing.npz --recipe metric.toml",
+            "found none of disc: make the data with more --sweeps",
+        ),
         ("--data one.npz", "one.npz: expected two classes or more, found one"),
         (
             "--data few.npz",
@@ -189,6 +193,9 @@ fn what_cannot_be_learnt_from_is_an_error_that_names_it() {
     }
     let ran = train(folder.path(), "eval --model edge-64 --data place.npz");
     assert!(!ran.status.success() && stderr(&ran).contains(in_one_place), "{}", stderr(&ran));
+    let ran = train(folder.path(), "eval --model edge-64 --data sphere.npz");
+    let strange = "sphere.npz: expected classes of edge-64, found ball: --known counts it as unknown";
+    assert!(!ran.status.success() && stderr(&ran).contains(strange), "{}", stderr(&ran));
 }
 
 #[test]

@@ -2,7 +2,7 @@ use std::collections::BTreeMap;
 use std::iter::repeat_n;
 use std::path::{Path, PathBuf};
 
-use anyhow::ensure;
+use anyhow::{bail, ensure};
 
 use crate::accuracy_report;
 use crate::clouds::Clouds;
@@ -129,8 +129,16 @@ fn report_clouds(
             *label = numbers[*label];
         }
         clouds.classes = names.to_vec();
+    } else if n_classes != names.len() {
+        let strange = clouds.classes.iter().find(|class| !names.contains(class));
+        let strange = strange.expect("invariant: not all classes are the model's");
+        bail!(
+            "{}: expected classes of {}, found {strange}: --known counts it as unknown, and --map \
+             renames it or leaves it out",
+            data.display(),
+            args.model.display()
+        );
     }
-    // `confusion` checks that the model and the data have the same number of classes.
     let found = confusion(&args.model, &clouds, &options(args))?;
     let mut pairs = names.iter().zip(&clouds.classes).enumerate();
     if let Some((class, (model, data))) = pairs.find(|(_, (model, data))| model != data) {

@@ -80,7 +80,8 @@ pub fn run(args: &ExplainArgs) -> anyhow::Result<()> {
         Lime { clusters: args.clusters, samples: args.samples, seed: args.seed, ..Lime::default() };
     let mut classifier = load(whole)?;
     let class = classifier.classify(&points)?;
-    print(&format!("{}: {:.1} %", class.label, 100.0 * class.confidence()))?;
+    let like = if class.is_unknown { "unknown, most like " } else { "" };
+    print(&format!("{like}{}: {:.1} %", class.label, 100.0 * class.confidence()))?;
     let found = explain(&mut classifier, &points, &lime)?;
     let strongest = found.strongest(critical.len());
     print(&report(&points, &found, &critical, &strongest, args.seed))?;
