@@ -21,6 +21,11 @@ pub struct Clouds {
     pub classes: Vec<String>,
 }
 
+/// The name of a class of data without names.
+fn unnamed(label: usize) -> String {
+    format!("class {label}")
+}
+
 /// The packed NPZ file of `split` at `path`, if there is one.
 fn packed(path: &Path, split: Split) -> Option<PathBuf> {
     let mut beginning = path.as_os_str().to_owned();
@@ -170,7 +175,7 @@ impl Clouds {
         let most = set.labels.iter().max().map_or(0, |label| label + 1);
         let classes = match set.classes.take() {
             Some(classes) => classes,
-            None => (0..most).map(|class| format!("class {class}")).collect(),
+            None => (0..most).map(unnamed).collect(),
         };
         let is_again = |&i: &usize| classes[..i].contains(&classes[i]);
         if let Some(i) = (0..classes.len()).find(is_again) {
@@ -224,6 +229,12 @@ impl Clouds {
             seen[self.set.labels[*i]] <= most
         };
         self.select(&(0..self.len()).filter(is_wanted).collect::<Vec<_>>())
+    }
+
+    /// Whether the data have no names of classes.
+    #[must_use]
+    pub fn is_unnamed(&self) -> bool {
+        self.classes.iter().enumerate().all(|(label, name)| *name == unnamed(label))
     }
 
     /// Splits the set into training clouds and a `share` of validation clouds, and returns the

@@ -179,7 +179,7 @@ fn check(clouds: &Clouds, recipe: &Recipe, data: &str) -> Result<(), Error> {
     if let Some(class) = missing {
         let name = &clouds.classes[class];
         let way = if recipe.normalization.is_metric() {
-            "make the data with more --sweeps"
+            "more --sweeps of gen-scenes, or a recipe that places it, give some"
         } else {
             "make the data with a mesh of it in the train split, or with a smaller --min-points"
         };

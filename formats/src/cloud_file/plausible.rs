@@ -154,7 +154,7 @@ pub enum Unlike {
     /// The side of an object that faces a sensor.
     #[error(
         "is a scan of one side, and edge-64 learnt whole objects: its answer is often wrong; name a \
-         model that learnt such scans: shapes-rotational-64 for ten kinds of shapes, street-128 for \
+         model that learnt such scans: shapes-rotational-64 if it knows the class, street-128 for \
          clusters of streets, or one of `edgepuck train`"
     )]
     OneSide,

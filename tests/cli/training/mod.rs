@@ -106,6 +106,13 @@ fn a_run_leaves_a_model_and_a_folder() {
         String::from_utf8_lossy(&ran.stdout).replace(name, "") + &csv
     });
     assert_eq!(of_turned, of_same);
+    // Data without names may lack the last classes.
+    let mut without_last = clouds(30);
+    without_last.retain(|(_, label)| *label < 2);
+    write(&folder.path().join("unnamed.npz"), &without_last, &["class 0", "class 1"]);
+    let ran = train(folder.path(), "eval --model m.safetensors --data unnamed.npz");
+    let found = String::from_utf8_lossy(&ran.stdout);
+    assert!(found.contains(" of 20 ("), "{found}{}", stderr(&ran));
 }
 
 #[test]
@@ -146,7 +153,7 @@ fn what_cannot_be_learnt_from_is_an_error_that_names_it() {
         ),
         (
             "--data missing.npz --recipe metric.toml",
-            "found none of disc: make the data with more --sweeps",
+            "found none of disc: more --sweeps of gen-scenes",
         ),
         ("--data one.npz", "one.npz: expected two classes or more, found one"),
         (
@@ -194,7 +201,8 @@ fn what_cannot_be_learnt_from_is_an_error_that_names_it() {
     let ran = train(folder.path(), "eval --model edge-64 --data place.npz");
     assert!(!ran.status.success() && stderr(&ran).contains(in_one_place), "{}", stderr(&ran));
     let ran = train(folder.path(), "eval --model edge-64 --data sphere.npz");
-    let strange = "sphere.npz: expected classes of edge-64, found ball: --known counts it as unknown";
+    let strange =
+        "sphere.npz: expected classes of edge-64, found ball: in a file for --map, `ball =";
     assert!(!ran.status.success() && stderr(&ran).contains(strange), "{}", stderr(&ran));
 }
 

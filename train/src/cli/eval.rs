@@ -123,21 +123,29 @@ fn report_clouds(
     let n_classes = clouds.classes.len();
     // The model may have the classes in another order.
     let by_name = |class: &String| names.iter().position(|name| name == class);
-    let numbers: Option<Vec<usize>> = clouds.classes.iter().map(by_name).collect();
-    if let Some(numbers) = numbers {
-        for label in &mut clouds.set.labels {
-            *label = numbers[*label];
+    let numbers: Vec<Option<usize>> = clouds.classes.iter().map(by_name).collect();
+    match clouds.set.labels.iter().find(|label| numbers[**label].is_none()) {
+        None => {
+            for label in &mut clouds.set.labels {
+                *label = numbers[*label].expect("invariant: the model has every label");
+            }
+            clouds.classes = names.to_vec();
         }
-        clouds.classes = names.to_vec();
-    } else if n_classes != names.len() {
-        let strange = clouds.classes.iter().find(|class| !names.contains(class));
-        let strange = strange.expect("invariant: not all classes are the model's");
-        bail!(
-            "{}: expected classes of {}, found {strange}: --known counts it as unknown, and --map \
-             renames it or leaves it out",
-            data.display(),
-            args.model.display()
-        );
+        // The last classes may have no cloud.
+        Some(_) if clouds.is_unnamed() && n_classes <= names.len() => {
+            clouds.classes = names.to_vec();
+        }
+        Some(&strange) if n_classes != names.len() => {
+            let class = &clouds.classes[strange];
+            bail!(
+                "{}: expected classes of {}, found {class}: in a file for --map, `{class} = \
+                 \"unknown\"` counts it as unknown, and a class of the model in place of `unknown` \
+                 renames it",
+                data.display(),
+                args.model.display()
+            );
+        }
+        Some(_) => {}
     }
     let found = confusion(&args.model, &clouds, &options(args))?;
     let mut pairs = names.iter().zip(&clouds.classes).enumerate();

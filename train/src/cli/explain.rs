@@ -80,7 +80,10 @@ pub fn run(args: &ExplainArgs) -> anyhow::Result<()> {
         Lime { clusters: args.clusters, samples: args.samples, seed: args.seed, ..Lime::default() };
     let mut classifier = load(whole)?;
     let class = classifier.classify(&points)?;
-    let like = if class.is_unknown { "unknown, most like " } else { "" };
+    let like = match class.answer() {
+        answer if answer != &*class.label => format!("{answer}, most like "),
+        _ => String::new(),
+    };
     print(&format!("{like}{}: {:.1} %", class.label, 100.0 * class.confidence()))?;
     let found = explain(&mut classifier, &points, &lime)?;
     let strongest = found.strongest(critical.len());

@@ -25,8 +25,8 @@ impl Sampler {
         match self {
             Self::All => "all",
             Self::Fps => "fps",
-            Self::Cpl => "cpl:own:truncate",
-            Self::CplStn => "cpl:stn:truncate",
+            Self::Cpl => "cpl:own",
+            Self::CplStn => "cpl:stn",
         }
     }
 }
@@ -225,6 +225,15 @@ mod tests {
     use super::super::network::Abstraction;
     use super::super::network::tests::baseline;
     use super::*;
+    use infer_cpu::sampler::FrontChoice;
+
+    #[test]
+    fn samplers_are_called_as_infer_cpu_calls_them() {
+        for sampler in [Sampler::Cpl, Sampler::CplStn] {
+            let (kind, front) = sampler.word().split_once(':').unwrap();
+            assert!(kind == "cpl" && front.parse::<FrontChoice>().is_ok(), "{kind}:{front}");
+        }
+    }
 
     fn macs(sampler: Sampler, from: usize, points: usize) -> usize {
         let stages = stages(&baseline(), sampler, (from, points), Precision::F32).unwrap();

@@ -10,23 +10,10 @@ use train::clouds::Clouds;
 use train::recipe::Recipe;
 use train::run::{Job, Progress};
 
-/// Trains the network `name` by `recipe` on `clouds` and writes it to `out`, unless it exists. A
-/// network without the recipe of a run was trained elsewhere, and is used if its card has the name
-/// and the number of points.
+/// Trains the network `name` by `recipe` on `clouds` and writes it to `out`, unless it exists.
 pub fn network(out: &Path, name: &str, recipe: Recipe, clouds: &Clouds) -> anyhow::Result<()> {
     if out.is_file() {
-        let trained = out.with_extension("run").join("recipe.toml");
-        if !trained.is_file() {
-            let (_, card) = infer_cpu::model_file::open(out)?;
-            ensure!(
-                card.training_set.as_deref() == Some(name) && card.points == Some(recipe.points),
-                "{}: expected the network {name} of {} points, found another",
-                out.display(),
-                recipe.points
-            );
-            return Ok(());
-        }
-        let trained = Recipe::read(&trained)?;
+        let trained = Recipe::read(&out.with_extension("run").join("recipe.toml"))?;
         ensure!(
             trained == recipe,
             "{}: expected a network of this recipe, found one of another",

@@ -1,8 +1,9 @@
 //! The experiments: a table each, of instance accuracies with their 95 % intervals.
 
+use super::super::resume;
 use super::context::{ExperimentContext, Plan};
 use crate::table::{Table, percent};
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use formats::interval::wilson;
 use formats::split::Split;
 use infer_cpu::Options;
@@ -40,6 +41,29 @@ pub struct Network {
 impl Network {
     fn new(context: &ExperimentContext, name: String, recipe: Recipe, clouds: Arc<Clouds>) -> Self {
         Self { out: context.model(&name), name, recipe, clouds }
+    }
+
+    /// Trains the network, unless it is there: trained by an earlier run, or elsewhere.
+    pub fn train(self) -> Result<()> {
+        let is_ours = self.out.with_extension("run").join("recipe.toml").is_file();
+        if self.out.is_file() && !is_ours {
+            return self.check_card();
+        }
+        resume::network(&self.out, &self.name, self.recipe, &self.clouds)
+    }
+
+    /// Checks that a network that was trained elsewhere is the one that is wanted.
+    fn check_card(&self) -> Result<()> {
+        let (_, card) = infer_cpu::model_file::open(&self.out)?;
+        let points = self.recipe.cpl.as_ref().map_or(self.recipe.points, |cpl| cpl.keep);
+        let found = (card.training_set.as_deref(), card.points, &card.classes);
+        let wanted = (Some(self.name.as_str()), Some(points), &self.clouds.classes);
+        ensure!(
+            found == wanted,
+            "{}: expected a training set, points and classes {wanted:?}, found {found:?}",
+            self.out.display()
+        );
+        Ok(())
     }
 }
 
@@ -173,18 +197,19 @@ fn matrix(context: &ExperimentContext) -> Result<Table> {
     Ok(table)
 }
 
-/// The program that trained each network.
+/// What the cards of the networks say about who trained them.
 fn origins(context: &ExperimentContext) -> Result<Table> {
-    let mut table = Table::new("Who trained each network", &["network", "program"]);
+    let mut table = Table::new("Who trained each network", &["network", "origin"]);
     for Network { name, out, .. } in networks(context)? {
         let (_, card) = infer_cpu::model_file::open(&out)?;
-        table.push(vec![name, card.provenance.unwrap_or_default()]);
+        table.push(vec![name, card.provenance.unwrap_or_else(|| "not stated".to_owned())]);
     }
     Ok(table)
 }
 
 /// The network of the set at `place`, trained for the fewest epochs that have the plan's steps. The
-/// learning rate falls after about as many steps, however many clouds an epoch has.
+/// steps of the schedule are longer by as much as the run, so that the rate falls at the same shares of
+/// it.
 fn of_set(context: &ExperimentContext, place: &str) -> Result<Network> {
     let (plan, clouds) = (&context.plan, context.scans(place, Split::Train)?);
     let recipe = Recipe { sampling: Sampling::Random, ..plan.at(plan.mesh_points) };

@@ -146,9 +146,8 @@ fn train_all(networks: Vec<Network>) -> Result<()> {
     let work = || -> Result<()> {
         let own = rayon::ThreadPoolBuilder::new().num_threads(cores / at_once).build()?;
         loop {
-            let Some(Network { name, out, recipe, clouds }) = rest().next() else { return Ok(()) };
-            own.install(|| resume::network(&out, &name, recipe, &clouds))
-                .inspect_err(|_| rest().by_ref().for_each(drop))?;
+            let Some(network) = rest().next() else { return Ok(()) };
+            own.install(|| network.train()).inspect_err(|_| rest().by_ref().for_each(drop))?;
         }
     };
     thread::scope(|scope| {

@@ -78,14 +78,19 @@ fn every_experiment_is_in_the_report_and_an_interrupted_run_ends_with_the_same_n
     // As if it had been killed while it trained.
     let models = folder.join("out/models");
     std::fs::remove_file(models.join("cpl-3-8-16-8.safetensors")).unwrap();
-    // As if it had been trained elsewhere.
-    std::fs::remove_dir_all(models.join("random-8.run")).unwrap();
+    assert_eq!(reproduce(folder, Plan::parse(PLAN).unwrap()).unwrap(), found);
+    // As if they had been trained elsewhere.
+    assert!(found.contains("| random-8 | edgepuck train, seed 0 |"), "{found}");
+    for elsewhere in ["random-8", "cpl-3-8-16-8"] {
+        std::fs::remove_dir_all(models.join(format!("{elsewhere}.run"))).unwrap();
+    }
     assert_eq!(reproduce(folder, Plan::parse(PLAN).unwrap()).unwrap(), found);
 
-    std::fs::copy(models.join("random-16.safetensors"), models.join("random-8.safetensors"))
-        .unwrap();
+    let [one, other] = ["random-16", "random-8"].map(|n| models.join(format!("{n}.safetensors")));
+    std::fs::copy(one, other).unwrap();
     let error = reproduce(folder, Plan::parse(PLAN).unwrap()).unwrap_err().to_string();
-    assert!(error.contains("expected the network random-8 of 8 points, found another"), "{error}");
+    let expected = "expected a training set, points and classes (Some(\"random-8\"), Some(8), ";
+    assert!(error.contains(expected), "{error}");
 }
 
 #[test]
