@@ -149,10 +149,11 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
         n_points / numbers.len(),
         numbers.len() as f64 / seconds
     );
-    if args.shard.is_none() {
+    let is_whole = args.shard.is_none();
+    if is_whole {
         report_missing(&stage, &stand, numbers.len());
     }
-    let has_clusters = report(&stage, &counts, args.shard.is_none())?;
+    let has_clusters = report(&stage, &counts, is_whole)?;
     formats::say!("Clusters: {}. Picture: {}.", packed.display(), preview.display());
     if n_points == 0 {
         formats::say!("warning: no beam returned a point");

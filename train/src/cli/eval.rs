@@ -118,35 +118,8 @@ fn report_clouds(
     clouds: &Clouds,
     names: &[String],
 ) -> anyhow::Result<()> {
-    // The data have no clouds of the model's further classes, such as `unknown`.
-    let mut clouds = clouds.clone();
     let n_classes = clouds.classes.len();
-    // The model may have the classes in another order.
-    let by_name = |class: &String| names.iter().position(|name| name == class);
-    let numbers: Vec<Option<usize>> = clouds.classes.iter().map(by_name).collect();
-    match clouds.set.labels.iter().find(|label| numbers[**label].is_none()) {
-        None => {
-            for label in &mut clouds.set.labels {
-                *label = numbers[*label].expect("invariant: the model has every label");
-            }
-            clouds.classes = names.to_vec();
-        }
-        // The last classes may have no cloud.
-        Some(_) if clouds.is_unnamed() && n_classes <= names.len() => {
-            clouds.classes = names.to_vec();
-        }
-        Some(&strange) if n_classes != names.len() => {
-            let class = &clouds.classes[strange];
-            bail!(
-                "{}: expected classes of {}, found {class}: in a file for --map, `{class} = \
-                 \"unknown\"` counts it as unknown, and a class of the model in place of `unknown` \
-                 renames it",
-                data.display(),
-                args.model.display()
-            );
-        }
-        Some(_) => {}
-    }
+    let clouds = numbered_as_in_model(args, data, clouds.clone(), names)?;
     let found = confusion(&args.model, &clouds, &options(args))?;
     let mut pairs = names.iter().zip(&clouds.classes).enumerate();
     if let Some((class, (model, data))) = pairs.find(|(_, (model, data))| model != data) {
@@ -162,6 +135,41 @@ fn report_clouds(
         atomic::write_bytes(path, accuracy_report::drawing(&found, names))?;
     }
     Ok(())
+}
+
+/// `clouds` with the model's classes, `names`, in the model's order. The data may have fewer classes, for
+/// instance no `unknown`, and another order. As many other classes stay as they are.
+fn numbered_as_in_model(
+    args: &EvalArgs,
+    data: &Path,
+    mut clouds: Clouds,
+    names: &[String],
+) -> anyhow::Result<Clouds> {
+    let n_classes = clouds.classes.len();
+    let by_name = |class: &String| names.iter().position(|name| name == class);
+    let numbers: Vec<Option<usize>> = clouds.classes.iter().map(by_name).collect();
+    match clouds.set.labels.iter().find(|label| numbers[**label].is_none()) {
+        None => {
+            for label in &mut clouds.set.labels {
+                *label = numbers[*label].expect("invariant: the model has every label");
+            }
+        }
+        // The last classes may have no cloud.
+        Some(_) if clouds.is_unnamed() && n_classes <= names.len() => {}
+        Some(_) if n_classes == names.len() => return Ok(clouds),
+        Some(&strange) => {
+            let class = &clouds.classes[strange];
+            bail!(
+                "{}: expected classes of {}, found {class}: in a file for --map, `{class} = \
+                 \"unknown\"` counts it as unknown, and a class of the model in place of `unknown` \
+                 renames it",
+                data.display(),
+                args.model.display()
+            );
+        }
+    }
+    clouds.classes = names.to_vec();
+    Ok(clouds)
 }
 
 /// Reports on objects that were cut out of scans.

@@ -5,10 +5,10 @@ paper.py CLOUDS SCANS OUT NAME...
 
 CLOUDS is a folder with ModelNet40's train.npz, SCANS is `reproduce`'s folder
 `data`, and OUT its folder `models`, in which `reproduce` uses the networks that it
-finds. A NAME is that of a network behind random or farthest points, such as random-64,
-farthest-48 or on-static-packed-static-clean. The networks of a call are trained side by side, each
-on its own clouds, all of ModelNet40 or all of scans; the largest count of points
-must be a multiple of each other one.
+finds. A NAME is that of a network behind random or farthest points, such as
+random-64, farthest-48 or on-static-packed-static-clean. The networks of a call are
+trained side by side, each on its own clouds, all of ModelNet40 or all of scans; the
+largest count of points must be a multiple of each other one.
 
 Unlike Edgepuck's training: matrix products use TF32, layers before a norm have no
 bias, and the epoch is chosen among 200 looks at the held tenth for scans, too, where

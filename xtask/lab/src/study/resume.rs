@@ -2,7 +2,7 @@
 //! of the study.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 use formats::atomic;
@@ -13,7 +13,7 @@ use train::run::{Job, Progress};
 /// Trains the network `name` by `recipe` on `clouds` and writes it to `out`, unless it exists.
 pub fn network(out: &Path, name: &str, recipe: Recipe, clouds: &Clouds) -> anyhow::Result<()> {
     if out.is_file() {
-        let trained = Recipe::read(&out.with_extension("run").join("recipe.toml"))?;
+        let trained = Recipe::read(&recipe_file(out))?;
         ensure!(
             trained == recipe,
             "{}: expected a network of this recipe, found one of another",
@@ -29,6 +29,11 @@ pub fn network(out: &Path, name: &str, recipe: Recipe, clouds: &Clouds) -> anyho
         }
     };
     job.run(None, &mut report).map(|_| ()).with_context(|| format!("cannot train {name}"))
+}
+
+/// The file with the recipe of the run that trained `out`, if this program trained it.
+pub fn recipe_file(out: &Path) -> PathBuf {
+    out.with_extension("run").join("recipe.toml")
 }
 
 /// Writes `terms`, all that the results depend on, to `path`, unless an earlier run

@@ -45,8 +45,7 @@ impl Network {
 
     /// Trains the network, unless it is there: trained by an earlier run, or elsewhere.
     pub fn train(self) -> Result<()> {
-        let is_ours = self.out.with_extension("run").join("recipe.toml").is_file();
-        if self.out.is_file() && !is_ours {
+        if self.out.is_file() && !resume::recipe_file(&self.out).is_file() {
             return self.check_card();
         }
         resume::network(&self.out, &self.name, self.recipe, &self.clouds)
