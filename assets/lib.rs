@@ -1,14 +1,13 @@
 //! The files of Edgepuck that its programs embed.
 
 /// The built-in sensor profiles: a sensor's name and its TOML.
-pub const SENSORS: [(&str, &str); 21] = [
+pub const SENSORS: [(&str, &str); 20] = [
     ("vlp32c", include_str!("sensors/vlp32c.toml")),
     ("blainder-ultrapuck", include_str!("sensors/blainder-ultrapuck.toml")),
     ("generic-static", include_str!("sensors/generic-static.toml")),
     ("kinect-v2", include_str!("sensors/kinect-v2.toml")),
     ("vlp16", include_str!("sensors/vlp16.toml")),
     ("hdl64e", include_str!("sensors/hdl64e.toml")),
-    ("modelnet40c-lidar", include_str!("sensors/modelnet40c-lidar.toml")),
     ("hdl32e", include_str!("sensors/hdl32e.toml")),
     ("vls128", include_str!("sensors/vls128.toml")),
     ("os0-128", include_str!("sensors/os0-128.toml")),
@@ -41,16 +40,9 @@ pub const SCENE_RECIPES: [(&str, &str); 3] = [
 /// The recipes of bundled models, for `edgepuck train`: a recipe's name and its TOML.
 pub const TRAINING_RECIPES: [(&str, &str); 4] = [
     ("edge-64", include_str!("recipes/edge-64.toml")),
-    ("set-64", include_str!("recipes/set-64.toml")),
+    ("cpl-64", include_str!("recipes/cpl-64.toml")),
     ("street-128", include_str!("recipes/street-128.toml")),
     ("lidar-64", include_str!("recipes/lidar-64.toml")),
-];
-
-/// The tables of layer names that `edgepuck import-weights` knows: a table's
-/// path in the repository and its TOML.
-pub const IMPORTERS: [(&str, &str); 2] = [
-    ("assets/importers/yanx27.toml", include_str!("importers/yanx27.toml")),
-    ("assets/importers/3dcertify.toml", include_str!("importers/3dcertify.toml")),
 ];
 
 /// The scene that `edgepuck scan` takes by default, and the mesh in it: a file's
@@ -59,15 +51,6 @@ pub const DEFAULT_SCENE: [(&str, &str); 2] = [
     ("scenes/two_chairs.toml", include_str!("scenes/two_chairs.toml")),
     ("meshes/chair/chair_0046.obj", include_str!("meshes/chair/chair_0046.obj")),
 ];
-
-/// The job file of Slurm that `edgepuck cluster` prints, with keys in braces.
-pub const SLURM_JOB: &str = include_str!("jobs/slurm.txt");
-/// The job file of Kubernetes that `edgepuck cluster` prints, with keys in braces.
-pub const KUBERNETES_JOB: &str = include_str!("jobs/kubernetes.txt");
-/// The job file of HyperQueue that `edgepuck cluster` prints, with keys in braces.
-pub const HYPERQUEUE_JOB: &str = include_str!("jobs/hyperqueue.txt");
-/// The script of a task of Kubernetes or HyperQueue, with the key `{command}`.
-pub const TASK_SCRIPT: &str = include_str!("jobs/task.txt");
 
 /// Settings of `infer-cpu` with their times and accuracies, as CSV: what `edgepuck advise`
 /// recommends from.

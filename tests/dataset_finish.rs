@@ -1,9 +1,9 @@
 //! Finishing a dataset gives the same bytes after any interruption, and verifying it finds every
 //! change.
 
-use edgepuck_dataset::internals::{Journal, Terms, finish, layout};
+use edgepuck_dataset::internals::{Terms, finish};
 use edgepuck_dataset::{
-    DatasetConfig, DatasetError, Entry, Layout, Manifest, MeshFailure, Poses, check_layouts, verify,
+    DatasetConfig, DatasetError, DatasetFolder, Entry, Layout, Manifest, MeshFailure, Poses, verify,
 };
 use formats::Split::{Test, Train};
 use formats::hash::Hashing;
@@ -37,7 +37,7 @@ fn make(out: &Path) -> Manifest {
 fn make_hashed(out: &Path, hash: Hashing) -> Manifest {
     let terms = terms(DatasetConfig { hash, ..config() }, None);
     let records = write(out, &terms, &entries());
-    finish(out, &terms, records, failures()).expect("a dataset")
+    finish(DatasetFolder(out), &terms, records, failures()).expect("a dataset")
 }
 
 #[test]
@@ -45,12 +45,12 @@ fn a_finished_dataset_is_what_its_manifest_says() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path();
     let manifest = make(out);
-    assert_eq!(Manifest::read(&layout::manifest(out)).unwrap(), manifest);
+    assert_eq!(DatasetFolder(out).manifest().unwrap(), manifest);
     assert!(manifest.meshes.is_sorted_by_key(|record| &record.entry));
     assert_eq!(manifest.classes(), ["bowl", "chair", "cup"]);
     let meshes = manifest.terms().meshes;
     assert_eq!(manifest.terms(), Terms { meshes, ..terms(config(), None) });
-    assert!(!layout::journal(out).exists());
+    assert!(!out.join("journal").exists());
 
     let report = verify(out).unwrap();
     assert!(report.is_sound(), "{report:?}");
@@ -64,7 +64,7 @@ fn a_finished_dataset_is_what_its_manifest_says() {
     fs::write(out.join("notes.txt"), "mine").unwrap();
     assert!(verify(out).unwrap().is_sound(), "beside the manifest files are the user's");
 
-    let lines = fs::read_to_string(layout::failures(out)).unwrap();
+    let lines = fs::read_to_string(DatasetFolder(out).failures_file()).unwrap();
     let first =
         r#"{"class":"bowl","split":"train","name":"bowl_2","source":"bowl/train/bowl_2.off","#;
     assert!(lines.starts_with(first) && lines.lines().count() == 2, "{lines}");
@@ -117,41 +117,40 @@ fn finishing_again_gives_the_same_bytes_wherever_it_was_stopped() {
     let terms = terms(config(), None);
     let mut records = write(out, &terms, &entries());
     records.reverse();
-    let again = || finish(out, &terms, records.clone(), failures());
+    let again = || finish(DatasetFolder(out), &terms, records.clone(), failures());
     again().unwrap();
     let whole = files(out);
 
-    // Stopped while it packed: no manifest yet, parts of files, a stale file.
-    Journal::at(out).begin(&terms).unwrap();
-    fs::remove_file(layout::manifest(out)).unwrap();
+    // Stopped while it packed: no manifest yet, parts of files, a changed file.
+    DatasetFolder(out).write_terms(&terms).unwrap();
+    fs::remove_file(DatasetFolder(out).manifest_file()).unwrap();
     fs::write(out.join("packed/.edgepuck-abc.tmp"), "part").unwrap();
     fs::write(out.join("rotational/clean/cup/.edgepuck-abc.tmp"), "part").unwrap();
     fs::write(out.join("packed/rotational-clean-train.npz"), "other").unwrap();
-    fs::write(out.join("layouts/stale.txt"), "other").unwrap();
     again().unwrap();
     assert!(files(out) == whole);
 
     // Stopped before the journal was removed.
-    Journal::at(out).begin(&terms).unwrap();
+    DatasetFolder(out).write_terms(&terms).unwrap();
     assert!(matches!(verify(out), Err(DatasetError::Unfinished { .. })));
     again().unwrap();
     assert!(files(out) == whole);
 
     // A scan is lost: an error, and no manifest of what is not there.
-    Journal::at(out).begin(&terms).unwrap();
+    DatasetFolder(out).write_terms(&terms).unwrap();
     let lost = out.join("static/clean/chair/train/chair_0_v0.npz");
     let bytes = fs::read(&lost).unwrap();
     fs::remove_file(&lost).unwrap();
     let message = again().map(|_| ()).unwrap_err().to_string();
     assert!(message.contains("chair_0_v0.npz"), "{message}");
-    assert!(!layout::manifest(out).exists() && Journal::at(out).exists());
+    assert!(!DatasetFolder(out).manifest_file().exists() && DatasetFolder(out).is_begun());
     fs::write(&lost, bytes).unwrap();
     again().unwrap();
     assert!(files(out) == whole);
 
     // The second time no mesh failed.
-    finish(out, &terms, records.clone(), Vec::new()).unwrap();
-    assert!(!layout::failures(out).exists());
+    finish(DatasetFolder(out), &terms, records.clone(), Vec::new()).unwrap();
+    assert!(!DatasetFolder(out).failures_file().exists());
     assert!(verify(out).unwrap().is_sound());
 }
 
@@ -188,7 +187,6 @@ fn every_change_of_a_file_is_found() {
         (&format!("{scan}.csv"), &remove, "is missing"),
         ("packed/static-noisy-test.npz", &remove, "is missing"),
         ("packed/static-noisy-train.npz", &flip, "was changed"),
-        ("layouts/yanx27/static-clean/modelnet40_train.txt", &flip, "was changed"),
         ("failures.jsonl", &flip, "does not list the manifest's failures"),
         ("failures.jsonl", &remove, "does not list the manifest's failures"),
         ("rotational/clean/chair/train/chair_9_v0.npz", &add, "is not in the manifest"),
@@ -204,14 +202,13 @@ fn every_change_of_a_file_is_found() {
 fn files_have_the_hash_of_the_settings() {
     for (hash, keys, said) in [
         (Hashing::Sha256, ["sha256"].as_slice(), Some("was changed: its SHA-256 is ")),
-        (Hashing::Blake3, &["hash", "blake3"], Some("was changed: its BLAKE3 is ")),
         (Hashing::None, &["hash"], None),
     ] {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path();
         make_hashed(out, hash);
-        let manifest = fs::read_to_string(layout::manifest(out)).unwrap();
-        for key in ["sha256", "blake3", "hash"] {
+        let manifest = fs::read_to_string(DatasetFolder(out).manifest_file()).unwrap();
+        for key in ["sha256", "hash"] {
             assert_eq!(manifest.contains(&format!("\"{key}\": ")), keys.contains(&key), "{key}");
         }
         // The text keeps its lines: only a hash finds the change.
@@ -235,7 +232,7 @@ fn manifests_that_are_missing_or_invalid_are_refused() {
     let points = &mut miscounting.meshes[0].scans[0].variants[0].tally.points;
     *points += 1;
     let expected = format!("holds {} points, not {} as recorded", *points - 1, points);
-    miscounting.write(&layout::manifest(out)).unwrap();
+    DatasetFolder(out).close(&miscounting).unwrap();
     let problems = verify(out).unwrap().problems;
     assert!(problems.iter().all(|problem| problem.what == expected), "{problems:?}");
     assert_eq!(problems.len(), 4, "one for each format");
@@ -243,7 +240,7 @@ fn manifests_that_are_missing_or_invalid_are_refused() {
     let refused = |change: &dyn Fn(&mut Manifest)| {
         let mut changed = manifest.clone();
         change(&mut changed);
-        changed.write(&layout::manifest(out)).unwrap();
+        DatasetFolder(out).close(&changed).unwrap();
         verify(out).unwrap_err().to_string()
     };
     let message = refused(&|manifest| manifest.tool = "other".to_owned());
@@ -270,8 +267,9 @@ fn every_builtin_sensor_comes_back_from_a_manifest() {
         let mut config = config();
         config.sets[0].sensor = Sensor::named(name).unwrap();
         let terms = terms(config, None);
-        let manifest = finish(folder.path(), &terms, Vec::new(), Vec::new()).unwrap();
-        let read = Manifest::read(&layout::manifest(folder.path())).unwrap();
+        let manifest =
+            finish(DatasetFolder(folder.path()), &terms, Vec::new(), Vec::new()).unwrap();
+        let read = DatasetFolder(folder.path()).manifest().unwrap();
         assert_eq!(read, manifest, "{name}");
     }
     // Without meshes, the packed sets exist but are empty.
@@ -281,65 +279,9 @@ fn every_builtin_sensor_comes_back_from_a_manifest() {
 }
 
 #[test]
-fn yanx27s_layout_tells_equal_names_apart_and_keeps_normals() {
-    let folder = tempfile::tempdir().unwrap();
-    make(folder.path());
-    let root = folder.path().join("layouts/yanx27/rotational-clean");
-    let names = fs::read_to_string(root.join("modelnet40_shape_names.txt")).unwrap();
-    assert_eq!(names, "bowl\nchair\ncup\n");
-    let list = |split: &str| {
-        let list = fs::read_to_string(root.join(format!("modelnet40_{split}.txt"))).unwrap();
-        list.lines().map(str::to_owned).collect::<Vec<_>>()
-    };
-    let (train, test) = (list("train"), list("test"));
-    let hashed = |id: &str, stem: &str| {
-        id.strip_prefix(stem).is_some_and(|rest| rest.starts_with('-') && rest.len() == 1 + 12 + 2)
-    };
-    assert!(test.iter().all(|id| hashed(id, "cup_1")), "cup_1 is in train too: {test:?}");
-    assert!(train.iter().any(|id| hashed(id, "cup_1")), "{train:?}");
-    assert!(train.iter().any(|id| hashed(id, "cup_X")), "where case does not count: {train:?}");
-    assert!(train.iter().any(|id| hashed(id, "cup_x")), "{train:?}");
-    assert!(train.iter().any(|id| id == "cup_3v0"), "a name of its own stays: {train:?}");
-    for id in train.iter().chain(&test) {
-        let class = id.split('_').next().unwrap();
-        let text = fs::read_to_string(root.join(class).join(format!("{id}.txt"))).unwrap();
-        let number = |word: &str| word.parse::<f32>().unwrap();
-        let mut points: Vec<(f32, f32)> = text
-            .lines()
-            .map(|line| line.split(',').collect::<Vec<_>>())
-            .map(|words| (number(words[3]), number(words[0])))
-            .collect();
-        assert_eq!(points.len(), PACKED_POINTS as usize);
-        points.sort_by(|p, q| p.0.total_cmp(&q.0));
-        assert!(points.is_sorted_by_key(|point| point.1), "{id}: {points:?}");
-    }
-}
-
-#[test]
 fn a_layout_that_cannot_hold_the_dataset_is_refused_before_the_run() {
     let mut config = config();
-    config.packed_points = 1;
-    let message = check_layouts(&config, &[]).unwrap_err().to_string();
-    assert_eq!(message, "layout yanx27: a cloud needs two points or more");
-    config.layouts = vec![Layout::ModelnetH5];
-    config.packed_points = PACKED_POINTS;
-    let folder = tempfile::tempdir().unwrap();
-    let terms = terms(config.clone(), None);
-    let records = write(folder.path(), &terms, &entries());
-    let finished = finish(folder.path(), &terms, records, failures());
-    match check_layouts(&config, &[]) {
-        Ok(()) => {
-            let files: Vec<_> =
-                finished.unwrap().layout_files.into_iter().map(|file| file.file).collect();
-            let expected = "layouts/modelnet-h5/static-noisy/ply_data_train0.h5";
-            assert!(files.iter().any(|file| file == expected), "{files:?}");
-            assert!(verify(folder.path()).unwrap().is_sound());
-            let classes: Vec<_> = (0..257).map(|i| format!("class {i}")).collect();
-            assert!(check_layouts(&config, &classes).is_err());
-        }
-        Err(error) => {
-            assert!(error.to_string().ends_with("build with `--features hdf5`"), "{error}");
-            assert!(finished.is_err());
-        }
-    }
+    config.layouts = vec![Layout::Webdataset];
+    let message = config.check().unwrap_err().to_string();
+    assert!(message.starts_with("layout webdataset: it "), "{message}");
 }

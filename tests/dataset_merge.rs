@@ -1,7 +1,7 @@
 //! Merged shards have the bytes of one run.
 
-use edgepuck_dataset::internals::{Journal, Terms, finish, layout};
-use edgepuck_dataset::{DatasetError, Entry, MeshFailure, merge, verify};
+use edgepuck_dataset::internals::{Terms, finish};
+use edgepuck_dataset::{DatasetError, DatasetFolder, Entry, MeshFailure, merge, verify};
 use formats::Split::{Test, Train};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -21,7 +21,7 @@ fn failures() -> Vec<MeshFailure> {
 
 fn make(out: &Path, terms: &Terms, entries: &[Entry], failures: &[MeshFailure]) {
     let records = write(out, terms, entries);
-    finish(out, terms, records, failures.to_vec()).expect("a dataset");
+    finish(DatasetFolder(out), terms, records, failures.to_vec()).expect("a dataset");
 }
 
 /// Three shards; the last has a class less, and the others a failure each.
@@ -108,7 +108,7 @@ fn shards_that_do_not_make_a_dataset_are_refused() {
     let all = &shards[..];
     let occupied = merge(all, first).unwrap_err().to_string();
     assert!(occupied.ends_with("holds files already; merge into an empty folder"), "{occupied}");
-    Journal::at(second).begin(&terms(config(), Some((1, 3)))).unwrap();
+    DatasetFolder(second).write_terms(&terms(config(), Some((1, 3)))).unwrap();
     assert!(matches!(merge(all, &out), Err(DatasetError::Unfinished { .. })));
 }
 
@@ -117,11 +117,17 @@ fn a_failed_merge_leaves_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let shards = make_shards(folder.path());
     let out = folder.path().join("merged");
-    let lost = shards[2].join("static/noisy/cup/train/cup_2_v0.npz");
-    fs::remove_file(&lost).unwrap();
-    let message = merge(&shards, &out).unwrap_err().to_string();
-    assert!(message.contains("cup_2_v0.npz"), "{message}");
-    assert!(!out.exists(), "it is found before anything is begun");
-    fs::remove_file(layout::manifest(&shards[0])).unwrap();
+    let scan = shards[2].join("static/noisy/cup/train/cup_2_v0.npz");
+    fs::write(&scan, "x").unwrap();
+    let refused = || {
+        let message = merge(&shards, &out).unwrap_err().to_string();
+        assert!(message.contains("cup_2_v0.npz"), "{message}");
+        assert!(!out.exists(), "it is found before anything is begun");
+        message
+    };
+    assert!(refused().contains("was changed"));
+    fs::remove_file(&scan).unwrap();
+    refused();
+    fs::remove_file(DatasetFolder(&shards[0]).manifest_file()).unwrap();
     assert!(matches!(merge(&shards, &out), Err(DatasetError::NoManifest { .. })));
 }

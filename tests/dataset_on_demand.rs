@@ -1,9 +1,8 @@
 //! Clouds cast on demand equal the packed clouds of a dataset with the same settings.
 
-use edgepuck_dataset::internals::Journal;
 use edgepuck_dataset::{
-    Begin, Clouds, DatasetConfig, DatasetError, MeshEntry, Normalize, Plan, Poses, Progress,
-    SetConfig, Variant, Viewpoints, Views, discover, make, seed_of_epoch, verify,
+    Begin, Clouds, DatasetConfig, DatasetError, DatasetFolder, MeshEntry, Normalize, Plan, Poses,
+    Progress, SetConfig, Variant, Viewpoints, Views, discover, make, seed_of_epoch, verify,
 };
 use formats::Split;
 use formats::labelled::read_labelled;
@@ -103,9 +102,9 @@ fn a_mesh_that_changes_before_a_run_goes_on_is_scanned_again() {
         make(&plan, &Caster::cpu(), &Progress::default()).unwrap()
     };
     let before = run(&at("out"), Begin::Fresh);
-    let journal = Journal::at(&at("out"));
-    journal.begin(&before.terms()).unwrap();
-    before.meshes.iter().for_each(|record| journal.note(record).unwrap());
+    let out = at("out");
+    DatasetFolder(&out).write_terms(&before.terms()).unwrap();
+    before.meshes.iter().for_each(|record| DatasetFolder(&out).note(record).unwrap());
     std::fs::copy(&meshes[9].path, &meshes[0].path).unwrap();
     run(&at("out"), Begin::Resume);
     run(&at("anew"), Begin::Fresh);

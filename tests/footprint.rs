@@ -1,14 +1,13 @@
 //! Wide beams, against closed forms and against very many rays: what a sensor measures at
-//! edges, on slopes and of two surfaces at once; which returns it tells, in points and packets.
+//! edges, on slopes and of two surfaces at once. `sim_gpu::sensor` has the power at an edge, and
+//! `combined_effects` which returns it tells.
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
-
+use edgepuck_mesh::TriangleMesh;
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, Scan};
 use glam::DVec3;
 use sim_gpu::effects::{Dropout, Effects, Footprint, Noise, NoiseModel, ReturnMode};
 use sim_gpu::internals::caster::OpenCaster;
-use sim_gpu::internals::mesh::TriangleMesh;
 use sim_gpu::internals::pose::Pose;
 use sim_gpu::internals::scan::{PlacedTarget, ScanRequest, Tally, scan_objects};
 use sim_gpu::internals::sensor::{BeamPattern, SensorProfile};
@@ -107,45 +106,6 @@ fn the_clean_scan_of_wide_beams_is_that_of_their_centres() {
 }
 
 #[test]
-fn all_casters_agree() {
-    let pattern =
-        SensorProfile::builtin("vlp32c").unwrap().decimated(7.try_into().unwrap()).pattern();
-    let mesh = meshes::together(&[plate(10.0, 0.0), plate(12.0, -9.0)]);
-    let effects = dual(19);
-    let scans = adapter::casters(&effects).into_iter().map(|caster| scan(caster, &pattern, &mesh));
-    let scans: Vec<_> = scans.collect();
-    assert!(scans[0].1.points > 1000);
-    assert!(scans.iter().all(|scan| *scan == scans[0]));
-}
-
-/// The error function: Abramowitz and Stegun 7.1.26, within 1.5e-7.
-fn erf(x: f64) -> f64 {
-    let t = (1.0 + 0.327_591_1 * x.abs()).recip();
-    let terms = [1.061_405_429, -1.453_152_027, 1.421_413_741, -0.284_496_736, 0.254_829_592];
-    let sum = terms.into_iter().fold(0.0, |sum, term| (sum + term) * t);
-    x.signum() * (1.0 - sum * (-x * x).exp())
-}
-
-#[test]
-fn an_edge_takes_what_it_takes_of_a_gaussian_beam() {
-    const PLATE_M: f64 = 20.0;
-    // Half the angle of the beam's 1/e^2 edge. The bounds are those of the points, which
-    // sensor/footprint.rs measures.
-    let radius_m = (DIVERGENCE_DEG[0].to_radians() / 2.0).tan() * PLATE_M;
-    for (samples, bound) in [(7, 0.215), (19, 0.107), (37, 0.06)] {
-        let scan = on_cpu(&wide(samples), &plate(PLATE_M, 0.0));
-        assert!(scan.len() > 300);
-        for (&beam, &power) in beams(&scan).iter().zip(scan.power.as_ref().unwrap()) {
-            let angle_rad = ((f64::from(beam) - 300.0) * 0.001).to_radians();
-            let u = angle_rad.tan() * PLATE_M / radius_m;
-            let expected = 0.5 * (1.0 + erf(2f64.sqrt() * u));
-            let found = f64::from(power) * PLATE_M.powi(2);
-            assert!((found - expected).abs() < bound, "{samples}, {u}: {found}, not {expected}");
-        }
-    }
-}
-
-#[test]
 fn a_slope_is_one_return_at_the_range_of_its_middle() {
     // y = (x - 10 m) / tan(60 degrees): 19 rays span 0.14 m of range.
     let tilt = 60f64.to_radians().tan();
@@ -183,33 +143,6 @@ fn surfaces_nearer_than_the_separation_are_one_return_between_them() {
 }
 
 #[test]
-fn each_mode_tells_the_returns_that_it_names() {
-    let mesh = meshes::together(&[plate(10.0, 0.0), plate(12.0, -9.0)]);
-    let in_mode = |mode| on_cpu(&Effects { returns: Some(mode), ..wide(19) }, &mesh);
-    let (first, last) = (in_mode(ReturnMode::First), in_mode(ReturnMode::Last));
-    let strongest = in_mode(ReturnMode::Strongest);
-    let second = in_mode(ReturnMode::SecondStrongest);
-    let dual = in_mode(ReturnMode::Dual);
-    let mut n_both = 0;
-    for beam in 0..601 {
-        let of = |scan: &Scan| -> Vec<f32> {
-            let at = |i: &usize| beams(scan)[*i] == beam;
-            (0..scan.len()).filter(at).map(|i| scan.range_m.as_ref().unwrap()[i]).collect()
-        };
-        let [first, last, strongest, second, dual] =
-            [&first, &last, &strongest, &second, &dual].map(of);
-        if first == last {
-            assert!(strongest == first && second == first && dual == first);
-            continue;
-        }
-        n_both += 1;
-        assert_eq!([first, last].concat(), dual);
-        assert!(strongest != second && dual.contains(&strongest[0]) && dual.contains(&second[0]));
-    }
-    assert!(n_both > 50);
-}
-
-#[test]
 fn thirty_seven_rays_measure_what_a_hundred_thousand_do() {
     // Columns that a beam is as wide as, before a wall too near to be told from them.
     let columns = (-20..20).map(|i| f64::from(i) * 0.07).fold(plate(10.6, -9.0), |mesh, y_m| {
@@ -235,7 +168,7 @@ fn thirty_seven_rays_measure_what_a_hundred_thousand_do() {
 
     let one = scan(&OpenCaster::Cpu(wide(37)), &casting::beams([beam]), &columns).0;
     assert_eq!(one.len(), 1);
-    // Each edge may move 0.06 of the power (see above) from one surface to the other, which
+    // Each edge may move 0.06 of the power (sensor/footprint.rs) from one surface to the other, which
     // lies 6 % farther away; two edges lie within the beam's radius of 17 mm.
     let found = f64::from(one.power.as_ref().unwrap()[0]);
     assert!((found / power - 1.0).abs() < 2.0 * 0.06 * 0.12, "{found}, not {power}");

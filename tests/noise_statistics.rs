@@ -152,6 +152,10 @@ fn deviates_of_different_things_do_not_correlate() {
             .map(|beam| normal_deviate(random_bits(key, beam, Purpose::Noise)[i]))
             .collect()
     };
+    let lost = |beam| {
+        normal_deviate(random_bits(StreamKey::new(1, "chair_0001", 2), beam, Purpose::Dropout)[0])
+    };
+    let losses: Vec<f64> = (0..n).into_par_iter().map(lost).collect();
     let others = [
         ("next beam", base[1..=n as usize].to_vec()),
         ("beam 16 further", base[16..n as usize + 16].to_vec()),
@@ -161,6 +165,7 @@ fn deviates_of_different_things_do_not_correlate() {
         ("next seed", deviates(StreamKey::new(2, "chair_0001", 2), n)),
         ("second coordinate", word(1)),
         ("third coordinate", word(2)),
+        ("losses", losses),
     ];
     for (name, other) in &others {
         let correlate = |f: fn(f64) -> f64| {

@@ -1,7 +1,7 @@
 //! The hand-written OFF parser reads what any program writes.
 
+use edgepuck_mesh::{MeshFormat, parse};
 use proptest::prelude::*;
-use sim_gpu::internals::mesh::{MeshFormat, parse};
 
 /// What ModelNet's and others' files do besides the plain form.
 #[derive(Clone, Debug)]

@@ -7,8 +7,6 @@
 //! than its own a thing may change stands here, in [`Asked::own`], and is not
 //! rewritten.
 
-#![expect(clippy::unwrap_used, reason = "tests")]
-
 #[path = "only_what_is_asked/files.rs"]
 mod files;
 #[path = "only_what_is_asked/shader.rs"]

@@ -1,9 +1,8 @@
 //! A scan's packets decode to its points. On every caster.
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
-
 use std::num::NonZeroU32;
 
+use edgepuck_mesh::TriangleMesh;
 use formats::Scan;
 use formats::hash::Hashing;
 use formats::rng::StreamKey;
@@ -12,8 +11,6 @@ use formats::vlp32c::{BEAM_CROSSING_M, Returns, Revolution, write};
 use glam::{DQuat, DVec3};
 use sim_gpu::effects::{Effects, Noise, NoiseModel, ReturnMode};
 use sim_gpu::internals::caster::OpenCaster;
-use sim_gpu::internals::job::Culling;
-use sim_gpu::internals::mesh::TriangleMesh;
 use sim_gpu::internals::packets::{returns, revolution, with_packet_geometry};
 use sim_gpu::internals::pose::Pose;
 use sim_gpu::internals::scan::ScanRequest;
@@ -45,18 +42,12 @@ fn pose(distance_m: f64) -> Pose {
     Pose { rotation: looking.rotation * tilted, ..looking }
 }
 
-fn scan(
-    caster: &OpenCaster,
-    sensor: &SensorProfile,
-    mesh: &TriangleMesh,
-    pose: &Pose,
-    culling: Culling,
-) -> Scan {
+fn scan(caster: &OpenCaster, sensor: &SensorProfile, mesh: &TriangleMesh, pose: &Pose) -> Scan {
     let pattern = sensor.pattern();
     let target = casting::target(mesh);
     let mut request = ScanRequest::new(sensor, &pattern, *pose);
     request.attributes = [Attribute::Range, Attribute::Beam].into();
-    (request.stream, request.culling) = (STREAM, culling);
+    request.stream = STREAM;
     sim_gpu::internals::scan::scan(caster, &target, &request).unwrap()
 }
 
@@ -129,7 +120,7 @@ fn packets_decode_to_the_points_of_the_scan() {
             [(300.0, Returns::Dual), (600.0, Returns::Strongest), (1200.0, Returns::Last)]
         {
             let (sensor, pose) = (turning(rpm), pose(3.0));
-            let scan = scan(caster, &sensor, &mesh, &pose, Culling::On);
+            let scan = scan(caster, &sensor, &mesh, &pose);
             let decoded = packets_of(&sensor, returns, &scan);
             assert!(scan.len() > 1000, "{}", scan.len());
             assert_eq!(decoded.len(), scan.len());
@@ -153,37 +144,6 @@ fn packets_decode_to_the_points_of_the_scan() {
 }
 
 #[test]
-fn around_a_sensor_inside_a_box_every_beam_comes_back() {
-    let mesh = meshes::cuboid(DVec3::splat(-6.0), DVec3::splat(6.0));
-    let (sensor, pose) = (turning(600.0), pose(1.5));
-    let scan = scan(&OpenCaster::Cpu(Effects::default()), &sensor, &mesh, &pose, Culling::On);
-    assert_eq!(scan.len(), 57_870);
-    let decoded = packets_of(&sensor, Returns::Strongest, &scan);
-    assert_eq!(decoded.len(), 57_870);
-    for (point, decoded) in in_sensor(&scan, &pose).zip(&decoded) {
-        // 2 mm along the beam, 0.0057 degree across it at 16 m or less.
-        assert!(decoded.point.distance(point) < 0.003);
-    }
-}
-
-/// Beams that start beside the sensor hit what those from it would miss.
-#[test]
-fn culling_loses_no_beam_that_starts_beside_the_sensor() {
-    let sensor = turning(600.0);
-    let steepest_m = BEAM_CROSSING_M * 25f64.to_radians().tan();
-    assert!((sensor.pattern().farthest_start_m() - steepest_m).abs() < 1e-15);
-    for distance_m in [1.05, 2.0, 20.0] {
-        // Near, 12 mm are a tenth of it.
-        let mesh = meshes::mapped(&meshes::icosphere(2), |v| v * 0.1 * distance_m);
-        let [culled, all] = [Culling::On, Culling::Off].map(|culling| {
-            scan(&OpenCaster::Cpu(Effects::default()), &sensor, &mesh, &pose(distance_m), culling)
-        });
-        assert!(culled.len() > 20, "{}", culled.len());
-        assert_eq!(culled, all, "{distance_m} m");
-    }
-}
-
-#[test]
 fn the_oracle_agrees_on_beams_that_start_beside_the_sensor() {
     let (sensor, pose) = (turning(600.0), pose(3.0));
     let pattern = sensor.pattern();
@@ -197,20 +157,14 @@ fn the_oracle_agrees_on_beams_that_start_beside_the_sensor() {
 
 #[test]
 fn a_sensor_that_packets_cannot_tell_is_refused() {
-    for name in ["kinect-v2", "generic-static", "blainder-ultrapuck", "vlp16", "hdl64e"] {
-        let error =
-            with_packet_geometry(&SensorProfile::builtin(name).unwrap()).unwrap_err().to_string();
-        assert!(error.contains("VLP-32C only"), "{name}: {error}");
-    }
     type Change = fn(&mut SensorProfile);
-    let changes: [(Change, &str); 11] = [
+    let changes: [(Change, &str); 10] = [
         (|s| head_of(s).beam[7].elevation_deg += 0.001, "rotating.beam[7]: expected laser 7"),
         (|s| head_of(s).beam[7].azimuth_offset_deg = 0.0, "rotating.beam[7]: expected laser 7"),
         (|s| head_of(s).beam.swap(0, 1), "rotating.beam[0]: expected laser 0"),
         (|s| head_of(s).beam.truncate(31), "rotating.beam: expected 32 beams, found 31"),
         (|s| head_of(s).sequence_us = 60.0, "rotating.sequence_us: expected 55.296, found 60"),
         (|s| head_of(s).rpm = 299.0, "rotating.rpm: expected a number within 300..=1200"),
-        (|s| head_of(s).azimuth_quantum_deg = Some(0.01), "rotating.azimuth_quantum_deg"),
         (|s| head_of(s).beam_crossing_m = Some(0.0), "beam_crossing_m: expected 0.0424, found 0"),
         (|s| head_of(s).sequence_quantum_deg = Some(0.1), "sequence_quantum_deg: expected 0.01"),
         (|s| s.decimation = NonZeroU32::new(2).unwrap(), "decimation"),

@@ -1,15 +1,13 @@
-//! What a sensor receives of a surface, against closed forms: power, calibrated
-//! reflectivity, the detection limit. On every caster.
+//! What a sensor receives of a surface, against closed forms: calibrated reflectivity, the detection
+//! limit. `combined_effects` has power and intensity at every incidence.
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
-
+use edgepuck_mesh::TriangleMesh;
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, Scan};
 use glam::{DAffine3, DVec3};
 use sim_gpu::Scene;
-use sim_gpu::effects::{Detection, Effects};
+use sim_gpu::effects::{Detection, Effects, Intensity};
 use sim_gpu::internals::caster::OpenCaster;
-use sim_gpu::internals::mesh::TriangleMesh;
 use sim_gpu::internals::pose::Pose;
 use sim_gpu::internals::scan::{PlacedTarget, ScanRequest, Tally, scan_objects};
 use sim_gpu::internals::sensor::{DetectionLimit, SensorProfile};
@@ -60,6 +58,7 @@ impl Seen {
             Attribute::Reflectivity,
         ]
         .into();
+        request.attributes.extend(caster.effects().intensity.map(|_| Attribute::Intensity));
         request.stream = StreamKey([3, 5]);
         let scanned = scan_objects(caster, &[placed], &request).unwrap();
         (scanned.scan, scanned.tally)
@@ -80,22 +79,6 @@ fn ranges(scan: &Scan) -> Vec<f64> {
 }
 
 #[test]
-fn power_falls_with_incidence_and_the_square_of_the_range() {
-    for caster in adapter::casters(&Effects::default()) {
-        let (scan, _) = Seen::wall(0.6).scan(caster);
-        let (powers, bytes) = (scan.power.as_ref().unwrap(), scan.reflectivity.as_ref().unwrap());
-        assert!(scan.len() > 10_000);
-        for ((range_m, power), byte) in ranges(&scan).into_iter().zip(powers).zip(bytes) {
-            let brightness = f64::from(0.6f32) * WALL_M / range_m;
-            let expected = brightness / range_m.powi(2);
-            // The range is there in f32, half of 2^-23 from its own; its cube three times that.
-            assert!((f64::from(*power) / expected - 1.0).abs() < 4e-7, "{range_m} m: {power}");
-            assert!((f64::from(*byte) - 100.0 * brightness).abs() <= 0.5 + 1e-5, "{byte}");
-        }
-    }
-}
-
-#[test]
 fn incidence_is_that_in_the_world_however_an_object_is_scaled() {
     // A plane through the x axis' point WALL_M, tilted by 45 degrees before it is stretched.
     let corners = [[1.0, -1.0], [1.0, 1.0], [-1.0, -1.0], [-1.0, 1.0]];
@@ -103,12 +86,21 @@ fn incidence_is_that_in_the_world_however_an_object_is_scaled() {
     let mesh = TriangleMesh { vertices, triangles: vec![[0, 1, 2], [1, 3, 2]] };
     let placed = DAffine3::from_translation(DVec3::X * WALL_M);
     let stretched = placed * DAffine3::from_scale(DVec3::new(1.0, 1.0, 4.0));
-    let (scan, _) = Seen { world_from_object: stretched, ..Seen::new(mesh) }.on_cpu(None);
-    assert!(scan.len() > 1000);
+    let effects = Effects { intensity: Some(Intensity), ..Effects::default() };
+    let seen = Seen { world_from_object: stretched, reflectivity: 0.5, ..Seen::new(mesh) };
     let normal = DVec3::new(4.0, 0.0, -1.0).normalize();
-    for (position, byte) in scan.positions.iter().zip(scan.reflectivity.as_ref().unwrap()) {
-        let beam = DVec3::from_array(position.map(f64::from)).normalize();
-        assert!((f64::from(*byte) - 100.0 * normal.dot(beam).abs()).abs() <= 0.5 + 1e-4);
+    for caster in adapter::casters(&effects) {
+        let (scan, _) = seen.scan(caster);
+        assert!(scan.len() > 1000);
+        let light =
+            scan.reflectivity.as_ref().unwrap().iter().zip(scan.intensity.as_ref().unwrap());
+        for (position, (byte, intensity)) in scan.positions.iter().zip(light) {
+            let beam = DVec3::from_array(position.map(f64::from)).normalize();
+            let expected = 0.5 * normal.dot(beam).abs();
+            assert!((f64::from(*byte) - 100.0 * expected).abs() <= 0.5 + 1e-4, "{byte}");
+            // Position, normal and intensity are rounded to f32.
+            assert!((f64::from(*intensity) - expected).abs() < 1e-6, "{intensity}");
+        }
     }
 }
 
@@ -190,43 +182,27 @@ fn a_weak_return_is_measured_worse() {
 }
 
 #[test]
-fn numbers_hold_at_the_extremes() {
-    let n = Seen::ball().on_cpu(None).0.len();
-    let kept = |detection| Seen::ball().on_cpu(Some(detection)).0.len();
-    assert_eq!(kept(detection(f64::MIN_POSITIVE, 1e9)), n, "nothing is too weak");
-    assert_eq!(kept(detection(1.0, 1e-150)), 0, "everything is");
-    let black = Seen { reflectivity: 0.0, ..Seen::ball() };
-    let (scan, tally) = black.on_cpu(Some(detection(1e-300, 1e9)));
-    assert_eq!((scan.len(), tally.undetected), (0, n as u64), "black returns nothing");
-    let far = Detection { threshold_to_noise: Some(1e-9), ..of_the_balls_power(1.0) };
-    let half = kept(far) as f64 / n as f64;
-    assert!((half - 0.5).abs() < 4.0 * 0.5 / (n as f64).sqrt(), "noise alone: {half}");
-}
-
-#[test]
 fn faces_return_light_as_their_materials_do() {
     let folder = tempfile::tempdir().unwrap();
     let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
     // A wall 5 m away, white on the left, grey in the middle, a road sign on the right.
     write(
         "wall.obj",
-        "mtllib wall.mtl\nv 5 9 -1\nv 5 9 1\nv 5 3 -1\nv 5 3 1\nv 5 -3 -1\nv 5 -3 1\nv 5 -9 -1\n\
+        "v 5 9 -1\nv 5 9 1\nv 5 3 -1\nv 5 3 1\nv 5 -3 -1\nv 5 -3 1\nv 5 -9 -1\n\
          v 5 -9 1\nf 1 2 4 3\nusemtl grey\nf 3 4 6 5\nusemtl sign\nf 5 6 8 7\n",
     );
-    write("wall.mtl", "newmtl grey\nKd 0.5 0.5 0.5\nnewmtl sign\nKd 0 1 0\n");
     write(
         "scene.toml",
         "attributes = [\"intensity\", \"reflectivity\"]\n[effects]\nintensity = true\n\
-         [[object]]\nmesh = \"wall.obj\"\nup = \"z\"\nreflectivity = 0.8\ncolours = \"mtl\"\n\
-         materials = { sign = { retroreflection = 1 } }\n\
+         [[object]]\nmesh = \"wall.obj\"\nup = \"z\"\nreflectivity = 0.8\n\
+         materials = { grey = { reflectivity = 0.25 }, sign = { retroreflection = 1 } }\n\
          [[sensor]]\nprofile = \"vlp16\"\nposition_m = [0, 0, 0]\nyaw_deg = 0\n",
     );
     let scene = Scene::read(folder.path().join("scene.toml")).unwrap();
     let scan = scene.scan_mounted(0).run().unwrap();
     let (intensities, bytes) =
         (scan.intensity.as_ref().unwrap(), scan.reflectivity.as_ref().unwrap());
-    // Half of sRGB's range in linear light: ((0.5 + 0.055) / 1.055)^2.4.
-    let grey = 0.214_041_14;
+    let grey = 0.25;
     let mut seen = [0; 3];
     for ((position, intensity), byte) in scan.positions.iter().zip(intensities).zip(bytes) {
         let beam = DVec3::from_array(position.map(f64::from));
@@ -242,4 +218,18 @@ fn faces_return_light_as_their_materials_do() {
         seen[part] += 1;
     }
     assert!(seen.iter().all(|&n| n > 100), "{seen:?}");
+}
+
+#[test]
+fn numbers_hold_at_the_extremes() {
+    let n = Seen::ball().on_cpu(None).0.len();
+    let kept = |detection| Seen::ball().on_cpu(Some(detection)).0.len();
+    assert_eq!(kept(detection(f64::MIN_POSITIVE, 1e9)), n, "nothing is too weak");
+    assert_eq!(kept(detection(1.0, 1e-150)), 0, "everything is");
+    let black = Seen { reflectivity: 0.0, ..Seen::ball() };
+    let (scan, tally) = black.on_cpu(Some(detection(1e-300, 1e9)));
+    assert_eq!((scan.len(), tally.undetected), (0, n as u64), "black returns nothing");
+    let far = Detection { threshold_to_noise: Some(1e-9), ..of_the_balls_power(1.0) };
+    let half = kept(far) as f64 / n as f64;
+    assert!((half - 0.5).abs() < 4.0 * 0.5 / (n as f64).sqrt(), "noise alone: {half}");
 }

@@ -2,8 +2,6 @@
 //! mesh, the view, the sensor, the object or the time have noise that does not correlate, and scans
 //! that are equal in all of them have the same.
 
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
-
 use edgepuck_dataset::{
     DatasetConfig, Plan, Progress, SetConfig, Variant, Viewpoints, discover, make,
 };
@@ -11,12 +9,11 @@ use formats::labelled::read_labelled;
 use formats::scan::Attribute;
 use formats::scan_file::read_scan;
 use glam::DVec3;
-use sim_gpu::effects::{Dropout, Effects, Noise};
+use sim_gpu::effects::{Effects, Noise};
 use sim_gpu::internals::sensor::SensorProfile;
 use sim_gpu::{Caster, Mesh, Pose, Scan, Scene, Sensor};
-use std::collections::BTreeSet;
 use std::num::NonZeroU32;
-use test_support::{assert_uncorrelated, correlation};
+use test_support::assert_uncorrelated;
 use tests::meshes::{icosphere, mapped};
 
 /// The noise of each beam, by beam.
@@ -110,56 +107,6 @@ fn scans_of_other_seeds_sensors_objects_and_times_have_other_noise() {
     // The same again, after others.
     assert_eq!(scan().run().unwrap().points, all[0].1.points);
     assert_eq!(named("b").points, all[9].1.points);
-}
-
-/// A sensor whose points are all drawn once before the rings, which keep all of them, and all once
-/// again after.
-#[test]
-fn the_draws_of_points_before_and_after_the_rings_are_independent() {
-    let order = |before_rings: &str| -> Vec<usize> {
-        let text = format!(
-            "name = \"drawn\"\nrange = {{ max_m = 100 }}\n\
-             uniform = {{ azimuth_from_deg = -40, azimuth_to_deg = 40, azimuth_steps = 40, \
-             elevation_from_deg = -20, elevation_to_deg = 20, elevation_steps = 25 }}\n\
-             rings = {{ step_deg = 0.1, keep_from = 0, keep_to = 1 }}\n\
-             sample = {{ points = 1000, with_replacement = false{before_rings} }}"
-        );
-        let sensor: Sensor = toml::from_str(&text).unwrap();
-        let scene = world(&[None]);
-        let scan = scene.scan(&sensor, Pose::IDENTITY).effects(Effects::default());
-        let scan = scan.attributes([Attribute::Beam]).run().unwrap();
-        scan.beam.as_ref().unwrap().iter().map(|&beam| beam as usize).collect()
-    };
-    let (after, both) = (order(""), order(", before_rings = 1000"));
-    let mut before = vec![0.0; 1000];
-    // Number i of both draws is what the first of them drew as number after[i].
-    after.iter().zip(&both).for_each(|(&after, &both)| before[after] = both as f64);
-    let draws = before.iter().zip(&after).map(|(a, b)| [a - 499.5, *b as f64 - 499.5]);
-    assert_uncorrelated("the two draws", &draws.collect::<Vec<_>>());
-}
-
-#[test]
-fn losses_noise_and_directions_of_noise_are_independent() {
-    let (sensor, scene) = (sensor(), world(&[None]));
-    let scan = |effects: Effects| scene.scan(&sensor, Pose::IDENTITY).effects(effects).run();
-    let clean = scan(Effects::default()).unwrap();
-    let noisy = residuals(&scan(noise()).unwrap(), &clean);
-    let dropout = Some(Dropout { probability: 0.5 });
-    let kept = scan(Effects { dropout, ..Effects::default() }).unwrap();
-    let kept: BTreeSet<u32> = kept.beam.iter().flatten().copied().collect();
-    let is_kept = |beam: &u32| if kept.contains(beam) { 1.0 } else { -1.0 };
-    let kept: Vec<f64> = clean.beam.as_ref().unwrap().iter().map(is_kept).collect();
-    let xyz = Noise { model: sim_gpu::effects::NoiseModel::Xyz, ..noise().noise.unwrap() };
-    let moved = scan(Effects { noise: Some(xyz), ..Effects::default() }).unwrap();
-    let along = |axis: usize| -> Vec<f64> {
-        let pairs = moved.positions.iter().zip(&clean.positions);
-        pairs.map(|(moved, clean)| f64::from(moved[axis]) - f64::from(clean[axis])).collect()
-    };
-    let mut all = vec![("losses".to_owned(), kept), ("range".to_owned(), noisy)];
-    // Noise of the range and of x are the same number of one model or the other.
-    all.extend([("y".to_owned(), along(1)), ("z".to_owned(), along(2))]);
-    assert_independent(&all);
-    assert!(correlation(&pairs(&all[1].1, &along(0))) > 0.99);
 }
 
 /// Two sets of the same sensor and poses, of two meshes of the same shape, in two views of the same

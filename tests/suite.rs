@@ -1,5 +1,7 @@
 //! Tests across crates, a module for each question.
 
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
+
 mod analytic;
 mod bvh_properties;
 mod combined_effects;
@@ -18,8 +20,6 @@ mod real_meshes;
 mod received_power;
 mod scan_effects;
 mod shaders_valid;
-#[cfg(feature = "simplify")]
-mod simplified;
 mod streams;
 mod watertight;
 mod weather;

@@ -1,11 +1,11 @@
 //! Rays aimed exactly at the vertices and edge midpoints of a closed surface:
 //! none may slip through, on any caster.
 
+use edgepuck_mesh::TriangleMesh;
 use glam::DVec3;
 use rayon::prelude::*;
 use sim_gpu::effects::Effects;
 use sim_gpu::internals::cpu::oracle;
-use sim_gpu::internals::mesh::TriangleMesh;
 use tests::adapter::casters;
 use tests::adversarial::{
     SENSORS, aimed, corners_and_midpoints, from_inside, missed, moved_sphere,

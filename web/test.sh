@@ -1,5 +1,6 @@
 #!/bin/sh
 # Tests the page in Chromium: sh web/test.sh
+# EDGEPUCK_TRACED is the example `traced` if it is built already.
 # It prints SKIPPED with the reason and exits with 77 where a browser, node or its packages are missing.
 set -eu
 
@@ -16,6 +17,10 @@ command -v node >/dev/null || skip "there is no node"
 
 out="${CARGO_TARGET_DIR:-../target}/page-test"
 rm -rf "$out"
-sh build.sh "$out/page"
-cargo run --profile test --package edgepuck-web --example traced -- "$out/traced"
+EDGEPUCK_PROFILE=test sh build.sh "$out/page"
+if [ -n "${EDGEPUCK_TRACED:-}" ]; then
+    "$EDGEPUCK_TRACED" "$out/traced"
+else
+    cargo run --profile test --package edgepuck-web --example traced -- "$out/traced"
+fi
 CHROMIUM="$chromium" node test/browser.mjs "$out/page" "$out/traced"

@@ -1,16 +1,19 @@
 #!/bin/sh
-# Installs what tests need beyond Rust: software Vulkan, a C++ compiler for the fuzz targets,
-# what Open3D links to, PCL, a browser, what judges Debian packages, Slurm, GNU parallel,
-# PyTorch for the documentation's examples, for the Raspberry Pi an emulator and a model of its
-# core, and the standard libraries of the targets that code is checked for: the Raspberry Pi,
-# systems of Metal and of Direct3D 12, and WebAssembly. Both the README and CI run this, through `cargo xtask
-# test`.
+# Installs what tests need beyond Rust: software Vulkan, what Open3D links to, PCL, a browser, PyTorch for
+# the documentation's examples, for the Raspberry Pi an emulator and a model of its core, and the standard
+# libraries of the targets that code is checked for: the Raspberry Pi and WebAssembly.
+# `packages.sh all` adds those of all checks: a C++ compiler for the fuzz targets, what judges Debian packages,
+# Slurm, GNU parallel, and systems of Metal and of Direct3D 12. The README runs this through `cargo xtask test`,
+# and CI through `cargo xtask test --all`.
 set -eu
 
 backported="mesa-vulkan-drivers libvulkan1"
-plain="chromium g++ lintian munge parallel pcl-tools qemu-user slurm-wlm libusb-1.0-0"
-targets="aarch64-unknown-linux-musl aarch64-apple-darwin x86_64-pc-windows-msvc \
-    wasm32-unknown-unknown wasm32-wasip1"
+plain="chromium g++ pcl-tools qemu-user libusb-1.0-0"
+targets="aarch64-unknown-linux-musl wasm32-unknown-unknown wasm32-wasip1"
+if [ "${1:-}" = all ]; then
+    plain="$plain lintian munge parallel slurm-wlm"
+    targets="$targets aarch64-apple-darwin x86_64-pc-windows-msvc"
+fi
 # The releases of LLVM whose llvm-mca knows Neoverse N1, the newest first.
 llvms="22 21 20 19"
 

@@ -1,20 +1,21 @@
 //! `edgepuck advise`: recommends a configuration for a device, from measurements that are built in.
 
-use crate::flags::positive;
-use crate::significant_digits::digits;
-use crate::{Outcome, Usage};
+use crate::Outcome;
+use crate::flags::{positive, probability};
 use anyhow::{Result, bail};
 use formats::interval::wilson;
+use program::significant_digits::digits;
 use serde::Deserialize;
 use std::cmp::Ordering;
 use std::fmt;
-use std::fmt::Write as _;
-use std::io::Write as _;
+use std::io::Write;
 
 /// The clouds that every setting of the record classified.
 const TEST_SET: &str = "ModelNet40's test clouds, the half at hand";
-/// The machine that is `here` in the record.
-const MACHINE: &str = "Intel(R) Xeon(R) Processor, 2 threads, linux x86_64";
+/// What is said of the machine that is `here` in the record.
+const MEASURED: &str = "\
+    The times were measured on Intel(R) Xeon(R) Processor, 2 threads, linux x86_64.\n\
+    `cargo build --release --package infer-cpu` builds infer-cpu as target/release/infer-cpu.\n";
 
 formats::named! {
     /// A device that was measured or modelled.
@@ -28,6 +29,7 @@ formats::named! {
 }
 
 #[derive(clap::Args)]
+#[command(group(clap::ArgGroup::new("limit").args(["max_ms", "min_accuracy"]).required(true).multiple(true)))]
 pub struct AdviseArgs {
     /// Device that runs the classifier
     #[arg(long, value_enum)]
@@ -38,7 +40,7 @@ pub struct AdviseArgs {
     max_ms: Option<f64>,
 
     /// Lowest acceptable accuracy, from 0 to 1
-    #[arg(long, value_name = "SHARE", value_parser = share)]
+    #[arg(long, value_name = "SHARE", value_parser = probability)]
     min_accuracy: Option<f64>,
 }
 
@@ -72,11 +74,6 @@ impl Measurement {
     fn accuracy(&self) -> f64 {
         self.right as f64 / self.clouds as f64
     }
-
-    /// The 95 % interval of the accuracy.
-    fn interval(&self) -> (f64, f64) {
-        wilson(self.right, self.clouds)
-    }
 }
 
 /// The setting in words.
@@ -88,13 +85,11 @@ impl fmt::Display for Measurement {
     }
 }
 
-/// The time on the device, and the row.
+/// The time on the device, milliseconds, and the row.
 type Timed<'a> = (f64, &'a Measurement);
 
 pub fn run(args: &AdviseArgs) -> Result<Outcome> {
-    args.check()?;
-    let advice = advise(args, &record())?;
-    std::io::stdout().write_all(advice.as_bytes())?;
+    std::io::stdout().write_all(advise(args, &record())?.as_bytes())?;
     Ok(Outcome::Success)
 }
 
@@ -104,137 +99,100 @@ fn record() -> Vec<Measurement> {
     rows.expect("invariant: the record is built in")
 }
 
+/// The most accurate setting within the time or, with a limit on accuracy alone, the fastest one; of equal
+/// ones, the one with fewer threads.
 fn advise(args: &AdviseArgs, rows: &[Measurement]) -> Result<String> {
     let timed: Vec<Timed> =
         rows.iter().filter_map(|row| Some((row.ms(args.device)?, row))).collect();
-    let fitting: Vec<Timed> = timed.iter().copied().filter(|timed| args.allow(timed)).collect();
-    let Some(&chosen) = fitting.iter().max_by(|a, b| args.compare(a, b)) else {
-        bail!("{}", none_fits(&timed));
+    let is_allowed = |(ms, row): &&Timed| {
+        args.max_ms.is_none_or(|most| *ms <= most)
+            && args.min_accuracy.is_none_or(|least| row.accuracy() >= least)
     };
-    Ok(args.text(chosen, &fitting, &timed))
-}
-
-impl AdviseArgs {
-    fn check(&self) -> Result<()> {
-        if self.max_ms.is_none() && self.min_accuracy.is_none() {
-            let cause = "expected at least one limit: --max-ms or --min-accuracy";
-            return Err(Usage(cause.to_owned()).into());
-        }
-        Ok(())
-    }
-
-    /// Whether accuracy counts before time. With a limit on accuracy alone, time counts first.
-    fn accuracy_first(&self) -> bool {
-        self.max_ms.is_some()
-    }
-
-    fn allow(&self, &(ms, row): &Timed) -> bool {
-        self.max_ms.is_none_or(|most| ms <= most)
-            && self.min_accuracy.is_none_or(|least| row.accuracy() >= least)
-    }
-
-    /// Orders settings so that the better one is greater; of equal ones, the one with fewer
-    /// threads.
-    fn compare(&self, a: &Timed, b: &Timed) -> Ordering {
+    let fitting: Vec<Timed> = timed.iter().filter(is_allowed).copied().collect();
+    let better = |a: &&Timed, b: &&Timed| {
         let accuracy = a.1.accuracy().total_cmp(&b.1.accuracy());
         let speed = b.0.total_cmp(&a.0);
-        let first = if self.accuracy_first() { accuracy.then(speed) } else { speed.then(accuracy) };
-        first.then(b.1.threads.cmp(&a.1.threads))
-    }
-
-    fn text(&self, chosen: Timed, fitting: &[Timed], timed: &[Timed]) -> String {
-        let (ms, row) = chosen;
-        let mut text = format!("{}\n\n  {}\n", one_line(chosen), command(row));
-        let _ = write!(
-            text,
-            "\nWhy: of {} settings measured on {TEST_SET} ({} clouds), {} meet the limits; ",
-            timed.len(),
-            row.clouds,
-            fitting.len()
-        );
-        text += match self.accuracy_first() {
-            true => {
-                "this is the most accurate of them, and the fastest of equally accurate ones.\n"
-            }
-            false => "this is the fastest of them.\n",
-        };
-        text += &match self.device {
-            Device::Pi5 => "The times are modelled (`cargo xtask bench pi-model`); `infer-cpu \
-                            bench` measures a board.\n`cargo xtask build-pi` builds infer-cpu \
-                            for the Raspberry Pi.\n"
-                .to_owned(),
-            Device::Here => format!(
-                "The times were measured on {MACHINE}.\n`cargo build --release --package infer-cpu` \
-                 builds infer-cpu as target/release/infer-cpu.\n"
-            ),
-        };
-        let (low, high) = row.interval();
-        // If the difference is not significant, a user may prefer the cheaper setting.
-        let as_good =
-            |&&(other_ms, other): &&Timed| other_ms < 0.75 * ms && other.accuracy() >= low;
-        if let Some(&cheaper) = fitting.iter().filter(as_good).min_by(|a, b| a.0.total_cmp(&b.0)) {
-            let lost = 100.0 * (row.accuracy() - cheaper.1.accuracy());
-            let saved = 100.0 * (1.0 - cheaper.0 / ms);
-            let _ = writeln!(
-                text,
-                "A cheaper setting within the 95 % interval loses {lost:.1} points and saves {saved:.0} % of the time:\n  {}",
-                one_line(cheaper)
-            );
-        }
-        let better = |&&(_, other): &&Timed| other.accuracy() > high;
-        if let Some(&better) = timed.iter().filter(better).min_by(|a, b| a.0.total_cmp(&b.0)) {
-            let _ = writeln!(
-                text,
-                "A setting that is significantly more accurate, beyond the limits:\n  {}",
-                one_line(better)
-            );
-        }
-        text
+        let first = if args.max_ms.is_some() { accuracy.then(speed) } else { speed };
+        first.then(accuracy).then(b.1.threads.cmp(&a.1.threads))
+    };
+    match fitting.iter().max_by(better) {
+        Some(chosen) => Ok(report(args, chosen, &fitting, &timed)),
+        None => bail!(nearest_of(&timed)),
     }
 }
 
-/// The message if no setting meets the limits: it names the nearest ones.
-fn none_fits(timed: &[Timed]) -> String {
+fn by_time(a: &&Timed, b: &&Timed) -> Ordering {
+    a.0.total_cmp(&b.0)
+}
+
+/// What is said if no setting fits: the settings that come nearest.
+fn nearest_of(timed: &[Timed]) -> String {
     let mut text = "no measured setting meets these limits".to_owned();
-    let fastest = timed.iter().min_by(|a, b| a.0.total_cmp(&b.0));
     let best = timed.iter().max_by(|a, b| a.1.accuracy().total_cmp(&b.1.accuracy()));
-    for (what, timed) in [("fastest", fastest), ("most accurate", best)] {
-        if let Some(timed) = timed {
-            let _ = write!(text, "\n  the {what}: {}", one_line(*timed));
-        }
+    for (what, nearest) in [("fastest", timed.iter().min_by(by_time)), ("most accurate", best)] {
+        text += &nearest.map_or_else(String::new, |it| format!("\n  the {what}: {}", one_line(it)));
     }
     text
 }
 
-fn one_line((ms, row): Timed) -> String {
-    let (low, high) = row.interval();
-    format!(
-        "{row}: {} ms, {:.2} % ({:.2} to {:.2}), {} MB of weights",
-        digits(ms),
-        100.0 * row.accuracy(),
-        100.0 * low,
-        100.0 * high,
-        digits(row.megabytes),
-    )
+/// What is said of the `chosen` one of the `fitting` settings, which are some of the `timed` ones.
+fn report(args: &AdviseArgs, chosen: &Timed, fitting: &[Timed], timed: &[Timed]) -> String {
+    let why = match args.max_ms {
+        Some(_) => "this is the most accurate of them, and the fastest of equally accurate ones.",
+        None => "this is the fastest of them.",
+    };
+    let times = match args.device {
+        Device::Pi5 => {
+            "The times are modelled (`cargo xtask bench pi-model`); `infer-cpu bench` measures a board.\n\
+             `cargo xtask build-pi` builds infer-cpu for the Raspberry Pi.\n"
+        }
+        Device::Here => MEASURED,
+    };
+    let (ms, row) = *chosen;
+    let mut text = format!(
+        "{}\n\n  {}\n\nWhy: of {} settings measured on {TEST_SET} ({} clouds), {} meet the limits; {why}\n{times}",
+        one_line(chosen),
+        command(row),
+        timed.len(),
+        row.clouds,
+        fitting.len()
+    );
+    let (low, high) = wilson(row.right, row.clouds);
+    // If the difference is not significant, a user may prefer the cheaper setting.
+    let as_good = |it: &&Timed| it.0 < 0.75 * ms && it.1.accuracy() >= low;
+    if let Some(cheaper) = fitting.iter().filter(as_good).min_by(by_time) {
+        let lost = 100.0 * (row.accuracy() - cheaper.1.accuracy());
+        let saved = 100.0 * (1.0 - cheaper.0 / ms);
+        text += &format!(
+            "A cheaper setting within the 95 % interval loses {lost:.1} points and saves {saved:.0} % of \
+             the time:\n  {}\n",
+            one_line(cheaper)
+        );
+    }
+    let is_beyond = |it: &&Timed| it.1.accuracy() > high;
+    if let Some(beyond) = timed.iter().filter(is_beyond).min_by(by_time) {
+        let line = one_line(beyond);
+        text += &format!(
+            "A setting that is significantly more accurate, beyond the limits:\n  {line}\n"
+        );
+    }
+    text
+}
+
+fn one_line((ms, row): &Timed) -> String {
+    let (low, high) = wilson(row.right, row.clouds);
+    let [share, low, high] = [row.accuracy(), low, high].map(|share| 100.0 * share);
+    let (ms, megabytes) = (digits(*ms), digits(row.megabytes));
+    format!("{row}: {ms} ms, {share:.2} % ({low:.2} to {high:.2}), {megabytes} MB of weights")
 }
 
 fn command(row: &Measurement) -> String {
     let Measurement { model, precision, points, threads, .. } = row;
-    let mut words = format!("infer-cpu classify --model {model}");
-    let mut sampler = row.sampler.split(':');
-    let _ = write!(words, " --sampler {}", sampler.next().unwrap_or_default());
-    if let Some(front) = sampler.next() {
-        let _ = write!(words, " --front {front}");
-    }
-    let _ = write!(words, " --points {points} --precision {precision} --threads {threads} CLOUD");
-    words
-}
-
-fn share(word: &str) -> Result<f64, String> {
-    match word.parse::<f64>() {
-        Ok(x) if (0.0..=1.0).contains(&x) => Ok(x),
-        _ => Err("expected a share from 0 to 1, such as 0.85".to_owned()),
-    }
+    let sampler = row.sampler.replace(':', " --front ");
+    format!(
+        "infer-cpu classify --model {model} --sampler {sampler} --points {points} --precision \
+         {precision} --threads {threads} CLOUD"
+    )
 }
 
 #[cfg(test)]
@@ -298,10 +256,9 @@ mod tests {
     }
 
     #[test]
-    fn what_was_not_measured_is_not_advised() {
+    fn only_measured_settings_are_advised() {
         let error = advise(&asked(Some(0.1), None), &rows()).unwrap_err().to_string();
         assert!(error.contains("the fastest: small") && error.contains("most accurate: huge"));
-        assert!(asked(None, None).check().unwrap_err().is::<Usage>());
     }
 
     #[test]

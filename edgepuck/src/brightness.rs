@@ -15,12 +15,6 @@ pub struct BrightnessArgs {
 }
 
 impl BrightnessArgs {
-    /// A flag that was given.
-    pub fn given(&self) -> Option<&'static str> {
-        let [white, reflectivity] = [self.white, self.reflectivity].map(|given| given.is_some());
-        flags::first_given(&[(white, "--white"), (reflectivity, "--reflectivity")])
-    }
-
     /// The brightness of each point of `scan`: the share of the light that it returns in clear air.
     pub fn brightness_of(&self, scan: &Scan, sweep: &Path) -> anyhow::Result<Vec<f32>> {
         if let Some(reflectivity) = self.reflectivity {

@@ -1,12 +1,11 @@
 //! The command line of `edgepuck`, for the program and for the Python package.
 
 use crate::{
-    Outcome, adapters, calibrate, card, cluster, corrupt, gen_dataset, gen_drive, gen_scenes,
-    gen_shapes, merge_dataset, outcome, preview_scan, profile, sample_surfaces, scan, segment,
-    signals, view, weather,
+    Outcome, adapters, calibrate, corrupt, gen_dataset, gen_scenes, merge_dataset, outcome,
+    profile, scan, signals, view,
 };
 #[cfg(feature = "models")]
-use crate::{advise, detect, export_onnx, import_weights};
+use crate::{advise, detect};
 use clap::{CommandFactory, Parser, Subcommand};
 use std::ffi::OsString;
 
@@ -23,48 +22,23 @@ enum Command {
     /// Scan a folder of meshes into a LiDAR dataset (default: built-in procedural shapes)
     #[command(alias = "gen")]
     GenDataset(Box<gen_dataset::Args>),
-    /// Scan street scenes and segment them into labelled clusters (default: built-in objects)
-    GenScenes(gen_scenes::Args),
-    /// Simulate a drive through a street: a capture of VLP-32C packets with ground truth, or labelled
-    /// sweeps of any sensor whose head turns
-    GenDrive(gen_drive::Args),
-    /// Write the procedural shapes that gen-dataset uses by default as OFF files
-    GenShapes(gen_shapes::Args),
-    /// Sample points uniformly from the surfaces of meshes, as in ModelNet40's point clouds
-    SampleSurfaces(sample_surfaces::SampleSurfacesArgs),
+    /// Scan street scenes into labelled clusters, or drive through a street
+    GenScenes(Box<gen_scenes::Args>),
     /// Scan one scene
     Scan(scan::Args),
-    /// Segment a sensor's sweep into ground and clusters
-    Segment(segment::SegmentArgs),
-    /// Add rain, snow, fog or haze to a recorded scan, and label each point
-    Weather(weather::WeatherArgs),
-    /// Apply sensor corruptions to a sweep or to mesh scans, to make robustness test sets
+    /// Add weather or faults of sensors to a recorded sweep
     Corrupt(Box<corrupt::CorruptArgs>),
     /// Find and classify the objects in a sweep
     #[cfg(feature = "models")]
     Detect(detect::DetectArgs),
-    /// Draw a picture of points: a sweep from above, others from the side, from above and the front
-    Preview(preview_scan::Args),
-    /// Show points, meshes, boxes and scenes in three dimensions, in a page for the browser
+    /// Show points, meshes, boxes and scenes: a page for the browser, or a picture
     View(view::Args),
     /// List the built-in sensors, or check and describe a sensor profile
     Profile(profile::ProfileArgs),
     /// Measure a sensor from captures or sweeps at rest, and write its profile
     Calibrate(calibrate::CalibrateArgs),
-    /// List the adapters (GPUs and CPU) that can cast rays
-    Adapters,
     /// Merge the shards of a dataset, or of a set of scenes, into one
     MergeDataset(merge_dataset::Args),
-    /// Write a card (README.md) and Croissant metadata for publishing a finished dataset
-    Card(card::CardArgs),
-    /// Print a job file for making a dataset on many machines: Slurm, Kubernetes or HyperQueue
-    Cluster(cluster::ClusterArgs),
-    /// Convert a PyTorch checkpoint into a model file for infer-cpu
-    #[cfg(feature = "models")]
-    ImportWeights(import_weights::ImportWeightsArgs),
-    /// Convert a model file to ONNX, for other inference engines
-    #[cfg(feature = "models")]
-    ExportOnnx(export_onnx::ExportOnnxArgs),
     #[cfg(feature = "models")]
     #[command(flatten)]
     Train(train::cli::Command),
@@ -80,11 +54,38 @@ enum Command {
     Other(Vec<OsString>),
 }
 
+/// The commands by task, as `--help` lists them.
+const TASKS: [(&str, &[&str]); 5] = [
+    ("Scan", &["scan", "view", "profile", "calibrate", "corrupt"]),
+    ("Data sets", &["gen-dataset", "gen-scenes", "merge-dataset"]),
+    ("Networks", &["train", "eval", "explain", "classify", "sample", "inspect", "advise"]),
+    ("Sweeps", &["detect", "live"]),
+    ("Tools", &["bench"]),
+];
+
+/// The help of `command`, which lists the commands by task.
+fn by_task(command: clap::Command) -> clap::Command {
+    let mut list = String::new();
+    for (task, names) in TASKS {
+        list += &format!("{task}:\n");
+        let present = names.iter().filter_map(|name| command.find_subcommand(name));
+        for one in present {
+            let about = one.get_about().map(ToString::to_string).unwrap_or_default();
+            list += &format!("  {:<15}{about}\n", one.get_name());
+        }
+        list.push('\n');
+    }
+    let template =
+        "{about-with-newline}\n{usage-heading} {usage}{after-help}\n\nOptions:\n{options}";
+    command.help_template(template).after_help(list)
+}
+
 /// Runs the command line `words`, which begins with the name of the program. Prints errors and
 /// help, and returns the exit code.
 pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
     match parsed(words) {
         Ok(cli) => outcome::exit_code(run_as_program(&cli.command)),
+        Err(error) if adapters::are_asked_for(&error) => outcome::exit_code(adapters::list()),
         Err(error) => {
             // A closed standard error does not change the exit code.
             let _ = error.print();
@@ -108,7 +109,7 @@ fn parsed(words: impl IntoIterator<Item = OsString>) -> Result<Cli, clap::Error>
         }
         None => command,
     });
-    outcome::parsed(command, words)
+    outcome::parsed(by_task(command), words)
 }
 
 /// Runs `command`, which signals may end.
@@ -123,31 +124,17 @@ fn run_as_program(command: &Command) -> anyhow::Result<Outcome> {
 }
 
 fn run(command: &Command) -> anyhow::Result<Outcome> {
-    formats::new_outputs::forget();
     match command {
         Command::GenDataset(args) => gen_dataset::run(args),
         Command::GenScenes(args) => gen_scenes::run(args),
-        Command::GenDrive(args) => gen_drive::run(args),
-        Command::GenShapes(args) => gen_shapes::run(args),
-        Command::SampleSurfaces(args) => sample_surfaces::run(args),
         Command::Scan(args) => scan::run(args),
-        Command::Segment(args) => segment::run(args),
-        Command::Weather(args) => weather::run(args),
         Command::Corrupt(args) => corrupt::run(args),
         #[cfg(feature = "models")]
         Command::Detect(args) => detect::run(args),
-        Command::Preview(args) => preview_scan::run(args),
         Command::View(args) => view::run(args),
         Command::Profile(args) => profile::run(args),
         Command::Calibrate(args) => calibrate::run(args),
-        Command::Adapters => adapters::run(),
         Command::MergeDataset(args) => merge_dataset::run(args),
-        Command::Card(args) => card::run(args),
-        Command::Cluster(args) => cluster::run(args),
-        #[cfg(feature = "models")]
-        Command::ImportWeights(args) => import_weights::run(args),
-        #[cfg(feature = "models")]
-        Command::ExportOnnx(args) => export_onnx::run(args),
         #[cfg(feature = "models")]
         Command::Train(command) => train::cli::run(command),
         #[cfg(feature = "models")]
@@ -181,30 +168,65 @@ mod tests {
     }
 
     #[test]
-    fn the_commands_in_the_readmes_are_understood() {
+    fn help_lists_each_command_once_under_its_task() {
+        let help = parsed(["edgepuck", "--help"].map(OsString::from)).err().unwrap().to_string();
+        let command = Cli::command();
+        let names: Vec<&str> = command.get_subcommands().map(clap::Command::get_name).collect();
+        assert!(names.len() <= 18, "{names:?}");
+        for name in names {
+            assert_eq!(help.matches(&format!("\n  {name:<15}")).count(), 1, "{name}: {help}");
+        }
+    }
+
+    /// The commands of a page: lines that are indented in a README, or of blocks of the documentation.
+    fn commands(page: &std::path::Path) -> Vec<String> {
+        let text = std::fs::read_to_string(page).expect("the page is a file").replace("\\\n", " ");
+        let is_in_docs = page.parent().is_some_and(|folder| folder.ends_with("docs/src"));
+        let mut is_shell = false;
+        let lines = text.lines().filter_map(|line| match is_in_docs {
+            true => {
+                is_shell = line.starts_with("```sh") || (is_shell && !line.starts_with("```"));
+                is_shell.then_some(line)
+            }
+            false => line.strip_prefix("    "),
+        });
+        // `edgepuck` has the commands of `infer-cpu`, too.
+        let lines = lines
+            .filter(|line| line.starts_with("edgepuck ") || line.starts_with("infer-cpu "))
+            .map(|line| {
+                let ends = [" #", " | ", " > ", " &"].iter().filter_map(|end| line.find(end));
+                // The number of `auto` is in the environment of a job.
+                line[..ends.min().unwrap_or(line.len())]
+                    .replace(" auto/", " 1/")
+                    .replace("$part", "1")
+            });
+        lines.collect()
+    }
+
+    #[test]
+    fn the_commands_of_the_pages_are_understood() {
+        let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let docs = std::fs::read_dir(root.join("docs/src")).unwrap();
+        let docs = docs.map(|entry| entry.unwrap().path());
+        let docs = docs.filter(|path| path.extension().is_some_and(|found| found == "md"));
+        let readmes =
+            ["README.md", "edgepuck/README.md", "infer-cpu/README.md", "sim-gpu/EFFECTS.md"];
+        let pages: Vec<_> = readmes.iter().map(|page| root.join(page)).chain(docs).collect();
         let mut n_commands = 0;
-        for page in ["README.md", "edgepuck/README.md", "infer-cpu/README.md", "sim-gpu/EFFECTS.md"]
-        {
-            let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(page);
-            let text = std::fs::read_to_string(file).unwrap().replace("\\\n", " ");
-            for line in text.lines().filter_map(|line| line.strip_prefix("    ")) {
-                let command = line.split(" #").next().unwrap_or(line);
-                let command = command.split(" | ").next().unwrap_or(command);
-                // `edgepuck` has the commands of `infer-cpu`, too.
-                if command.starts_with("edgepuck ") || command.starts_with("infer-cpu ") {
-                    // The number of `auto` is in the environment of a job.
-                    let command = command.replace(" auto/", " 1/");
-                    let quoted = command.split('\'').enumerate();
-                    let words = quoted.flat_map(|(i, part)| match i % 2 {
-                        0 => part.split_whitespace().collect(),
-                        _ => vec![part],
-                    });
-                    let parsed = parsed(words.map(OsString::from));
-                    assert!(parsed.is_ok(), "{page}: {command}: {}", parsed.err().unwrap());
-                    n_commands += 1;
+        for page in pages {
+            for command in commands(&page) {
+                let quoted = command.split(['\'', '"']).enumerate();
+                let words = quoted.flat_map(|(i, part)| match i % 2 {
+                    0 => part.split_whitespace().collect(),
+                    _ => vec![part],
+                });
+                let parsed = parsed(words.map(OsString::from));
+                if let Some(error) = parsed.err().filter(|it| !adapters::are_asked_for(it)) {
+                    panic!("{}: {command}: {error}", page.display());
                 }
+                n_commands += 1;
             }
         }
-        assert!(n_commands > 30, "{n_commands}");
+        assert!(n_commands > 60, "{n_commands}");
     }
 }

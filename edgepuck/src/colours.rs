@@ -1,9 +1,11 @@
 //! The colours of all pictures and pages, from one table that the viewer's JavaScript reads as well.
 
-use plotters::style::RGBColor;
 use serde::Deserialize;
 use std::collections::HashMap;
 use std::sync::LazyLock;
+
+/// Red, green and blue, 0 to 255.
+pub type Rgb = [u8; 3];
 
 /// The table: colours as `#rrggbb`.
 #[derive(Deserialize)]
@@ -23,25 +25,25 @@ static TABLE: LazyLock<Table> = LazyLock::new(|| {
 });
 
 /// The colour at this share of the ramp, 0 to 1; grey for NaN.
-pub fn on_ramp(share: f64) -> RGBColor {
+pub fn on_ramp(share: f64) -> Rgb {
     if share.is_nan() {
-        return RGBColor(150, 150, 150);
+        return [150; 3];
     }
     let place = share.clamp(0.0, 1.0) * (TABLE.ramp.len() - 1) as f64;
     let [left, right] = [place.floor(), place.ceil()].map(|at| rgb(&TABLE.ramp[at as usize]));
     let mixed = |left: u8, right: u8| {
         (f64::from(left) + (f64::from(right) - f64::from(left)) * place.fract()).round() as u8
     };
-    RGBColor(mixed(left.0, right.0), mixed(left.1, right.1), mixed(left.2, right.2))
+    [0, 1, 2].map(|channel| mixed(left[channel], right[channel]))
 }
 
 /// The colour of the object, cluster or track with this number.
-pub fn of_number(number: u32) -> RGBColor {
+pub fn of_number(number: u32) -> Rgb {
     rgb(&TABLE.palette[number as usize % TABLE.palette.len()])
 }
 
 /// The colour of a class; of one that the table lacks, by a hash of its name.
-pub fn of_class(name: &str) -> RGBColor {
+pub fn of_class(name: &str) -> Rgb {
     // FNV-1a, as in assets/view/src/colour.js.
     let hash = |hash: u32, byte: u8| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193);
     match TABLE.classes.get(name) {
@@ -55,8 +57,8 @@ pub fn semantic_kitti(label: u16) -> &'static str {
     TABLE.semantic_kitti.get(&label).map_or("other", String::as_str)
 }
 
-fn rgb(colour: &str) -> RGBColor {
+fn rgb(colour: &str) -> Rgb {
     let number = u32::from_str_radix(colour.trim_start_matches('#'), 16);
     let [_, red, green, blue] = number.expect("invariant: #rrggbb").to_be_bytes();
-    RGBColor(red, green, blue)
+    [red, green, blue]
 }

@@ -1,20 +1,8 @@
 //! Checks and parsers for flags of several commands.
 
 use crate::Usage;
-use sim_gpu::internals::config::InvalidValue;
+use sim_gpu::errors::InvalidValue;
 use std::path::Path;
-
-/// Checks that this program can simplify meshes, if that is `wanted`.
-pub fn need_simplification(wanted: bool) -> Result<(), Usage> {
-    if !wanted || cfg!(feature = "simplify") {
-        return Ok(());
-    }
-    Err(Usage(
-        "--simplify: this program was built without mesh simplification: in a checkout, `cargo \
-         install --path edgepuck --features simplify` builds it, with a C++ compiler"
-            .to_owned(),
-    ))
-}
 
 /// The first of these flags that was given.
 pub fn first_given(flags: &[(bool, &'static str)]) -> Option<&'static str> {
@@ -23,11 +11,11 @@ pub fn first_given(flags: &[(bool, &'static str)]) -> Option<&'static str> {
 
 /// The beginnings of keys in files, and the flags for the same values.
 const FLAGS: [(&str, &str); 11] = [
+    ("units", "--units"),
     ("views.distance", "--distance"),
     ("views.elevation", "--elevation"),
     ("views.azimuth_jitter", "--azimuth-jitter"),
     ("effects.noise.sigma", "--noise"),
-    ("effects.noise.mean", "--noise-mean"),
     ("effects.dropout", "--dropout"),
     ("effects.quantise", "--quantise"),
     ("effects.weather.rain", "--rain"),

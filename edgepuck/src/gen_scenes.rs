@@ -1,32 +1,34 @@
-//! `edgepuck gen-scenes`: scans street scenes and packs their clusters as a training set.
+//! `edgepuck gen-scenes`: scans street scenes and packs their clusters as a training set, or drives
+//! through a street.
 
+mod drive;
+pub mod labels;
 mod layout;
 pub mod parts;
 pub mod sequence;
-pub mod sweep_file;
 
 use std::ffi::OsStr;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::{Context, bail, ensure};
-use edgepuck_assets::SCENE_RECIPES;
+use anyhow::Context;
 use edgepuck_scenes::{ClusterCounts, LabelledScene, Recipe, Stage, generate};
 use edgepuck_segment::Settings;
 use formats::FormatError;
 use formats::atomic::{self, UnfinishedFolder};
-use formats::hash::{of_bytes, of_file};
+use formats::hash::{Hashing, of_bytes, of_file};
+use formats::scan_file::{ScanFormat, write_scan};
 use indicatif::{ProgressBar, ProgressStyle};
 use layout::{Layout, Writer};
 use serde_json::{Value, json};
-use sweep_file::SweepFormat;
 
 use crate::caster::CasterArgs;
 use crate::shard::Shard;
 use crate::view::frame::{Frame, Labels};
-use crate::{Outcome, Usage, preview};
-use formats::outputs::Overwrite;
+use crate::view::preview;
+use crate::{Outcome, Usage};
+use program::outputs::Overwrite;
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
@@ -35,15 +37,17 @@ pub(crate) struct Args {
     recipe: PathBuf,
 
     /// Folder for packed/train.npz and packed/test.npz (labelled clusters), sweeps/ and preview.png
-    #[arg(long, default_value = "data/scenes", value_name = "DIR")]
-    out: PathBuf,
+    /// [default: data/scenes]
+    #[arg(long, value_name = "PATH")]
+    out: Option<PathBuf>,
 
     /// Number of scenes; each is scanned once
     #[arg(long, default_value_t = 40, value_name = "N")]
     #[arg(value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     sweeps: u32,
 
-    /// Sensors to use in place of the recipe's: built-in names or TOML files, separated by commas
+    /// Sensors to use in place of the recipe's: built-in names or TOML files, separated by commas. A drive
+    /// has one [default: vlp32c], whose head turns, with the recipe's noise and effects if the recipe has it
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     sensor: Vec<String>,
 
@@ -51,14 +55,9 @@ pub(crate) struct Args {
     #[arg(long, value_name = "DIR")]
     meshes: Option<PathBuf>,
 
-    /// Number of sweeps to write as scans, each with a JSON file that lists its objects
+    /// Number of sweeps to write as scans (.npz), each with a JSON file that lists its objects
     #[arg(long, default_value_t = 10, value_name = "N")]
     save: u32,
-
-    /// Format of these sweeps: npz; or with the class and the object of each point semantickitti
-    /// (velodyne/N.bin and labels/N.label), pcd (fields label and instance) or las
-    #[arg(long, default_value = "npz")]
-    format: SweepFormat,
 
     /// Also write all sweeps as a data set for trainers, into a folder of this name in --out:
     /// semantickitti, with the class and the object of each point; kitti, with the boxes before a
@@ -70,9 +69,9 @@ pub(crate) struct Args {
     #[arg(long, default_value_t = 0)]
     seed: u64,
 
-    /// Make only part I of N of the scenes; `merge-dataset` joins the parts. `auto/N` and `auto` take
-    /// the part from a job array, as in gen-dataset
-    #[arg(long, value_name = "I/N|auto/N|auto")]
+    /// Make only part I of N of the scenes; `merge-dataset` joins the parts. `auto/N` takes the part from
+    /// a job array, as in gen-dataset
+    #[arg(long, value_name = "I/N|auto/N")]
     shard: Option<Shard>,
 
     #[command(flatten)]
@@ -80,34 +79,50 @@ pub(crate) struct Args {
 
     #[command(flatten)]
     caster: CasterArgs,
+
+    #[command(flatten)]
+    drive: drive::DriveArgs,
 }
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
-    let cause = "--format: this build does not include las".to_owned();
-    ensure!(args.format != SweepFormat::Las || cfg!(feature = "las"), Usage(cause));
+    match args.drive.drive {
+        Some(seconds) => drive::run(args, seconds),
+        None => scan_scenes(args),
+    }
+}
+
+impl Args {
+    /// The folder of the scenes.
+    fn folder(&self) -> &Path {
+        self.out.as_deref().unwrap_or(Path::new("data/scenes"))
+    }
+}
+
+fn scan_scenes(args: &Args) -> anyhow::Result<Outcome> {
+    let out = args.folder();
     let numbers = args.shard.map_or(0..args.sweeps, |shard| shard.part_of(args.sweeps));
     if let Some(Shard { of, .. }) = args.shard.filter(|shard| shard.of > args.sweeps) {
         let cause =
             format!("--shard: expected at most {} parts, one a sweep, found {of}", args.sweeps);
         return Err(Usage(cause).into());
     }
-    let mut recipe = read_recipe(&args.recipe)?;
-    let [preview, record] = [args.out.join("preview.png"), parts::record(&args.out)];
-    let mut folders = ["packed", "sweeps"].map(|folder| args.out.join(folder)).to_vec();
-    let set = args.layout.map(|layout| args.out.join(layout.name()));
+    let mut recipe = Recipe::resolve(&args.recipe)?;
+    let [preview, record] = [out.join("preview.png"), parts::record(out)];
+    let mut folders = ["packed", "sweeps"].map(|folder| out.join(folder)).to_vec();
+    let set = args.layout.map(|layout| out.join(layout.name()));
     folders.extend(set.clone());
     let outputs = || folders.iter().map(PathBuf::as_path);
     args.overwrite.check_cleared(outputs(), is_written)?;
     args.overwrite.check([&*preview, &*record])?;
-    let layouts = Layout::ALL.iter().map(|layout| args.out.join(layout.name()));
+    let layouts = Layout::ALL.iter().map(|layout| out.join(layout.name()));
     for other in layouts.filter(|other| set.as_ref() != Some(other) && other.exists()) {
-        formats::say!("warning: {}: it is of another run, and stays", other.display());
+        program::say!("warning: {}: it is of another run, and stays", other.display());
     }
     recipe.use_sensors(&args.sensor);
     let meshes = args.meshes.as_deref();
     let caster = args.caster.caster()?;
     let stage = Stage::with_caster(recipe, &args.recipe, meshes, args.seed, &caster)?;
-    stage.warnings().iter().for_each(|warning| formats::say!("warning: {warning}"));
+    stage.warnings().iter().for_each(|warning| program::say!("warning: {warning}"));
     args.overwrite.clear(outputs(), is_written)?;
     for file in [&preview, &record].into_iter().filter(|file| file.exists()) {
         std::fs::remove_file(file).with_context(|| file.display().to_string())?;
@@ -117,10 +132,10 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let bar = ProgressBar::new(numbers.len() as u64).with_style(style);
     let mut n_points = 0;
     let mut stand = vec![false; stage.recipe().object.len()];
-    let packed = args.out.join("packed");
+    let packed = out.join("packed");
     // Saved sweeps are complete, one by one; of packed clusters, only all are.
-    let begun = UnfinishedFolder::begin(&packed)?;
-    let begun_set = set.as_deref().map(UnfinishedFolder::begin).transpose()?;
+    let begun = UnfinishedFolder::begin(&packed);
+    let begun_set = set.as_deref().map(UnfinishedFolder::begin);
     let set = args.layout.zip(set);
     let set = set.map(|(layout, folder)| Writer::new(layout, folder, args.sweeps));
     let counts = generate(&stage, &Settings::default(), numbers.clone(), &packed, |done| {
@@ -139,11 +154,11 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     begun_set.into_iter().for_each(UnfinishedFolder::finish);
     begun.finish();
     if let Some(shard) = args.shard {
-        parts::write_record(&args.out, shard, settings(&stage, args)?)?;
+        parts::write_record(out, shard, settings(&stage, args)?)?;
     }
     bar.finish_and_clear();
     let seconds = started.elapsed().as_secs_f64();
-    formats::say!(
+    program::say!(
         "{} sweeps of {} points on average in {seconds:.1} s ({:.1} a second)",
         numbers.len(),
         n_points / numbers.len(),
@@ -154,19 +169,19 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
         report_missing(&stage, &stand, numbers.len());
     }
     let has_clusters = report(&stage, &counts, is_whole)?;
-    formats::say!("Clusters: {}. Picture: {}.", packed.display(), preview.display());
+    program::say!("Clusters: {}. Picture: {}.", packed.display(), preview.display());
     if n_points == 0 {
-        formats::say!("warning: no beam returned a point");
+        program::say!("warning: no beam returned a point");
     }
     Ok(if n_points > 0 && has_clusters { Outcome::Success } else { Outcome::SomeRefused })
 }
 
 /// Draws the sweep of a scene, each point in the colour of its class.
 fn draw(stage: &Stage, done: &LabelledScene, out: &Path) -> anyhow::Result<()> {
-    let (names, values) = sweep_file::point_classes(stage, done);
+    let (names, values) = labels::point_classes(stage, done);
     let labels = Labels { name: "class", values, names: Some(names) };
     let shown = Frame::of_scan(String::new(), done.sweep.scan.clone(), vec![labels]);
-    preview::draw(&shown, None, "scene 0", out)
+    preview::draw(&shown, out)
 }
 
 /// Warns of objects of the recipe that stand in none of `n_scenes` scenes, unless they had no turn: a
@@ -183,7 +198,7 @@ fn report_missing(stage: &Stage, stand: &[bool], n_scenes: usize) {
         } else {
             continue;
         };
-        formats::say!("warning: object[{i}], a {}: no scene has it: {why}", object.class);
+        program::say!("warning: object[{i}], a {}: no scene has it: {why}", object.class);
     }
 }
 
@@ -198,12 +213,12 @@ fn report(stage: &Stage, counts: &ClusterCounts, is_whole: bool) -> std::io::Res
     let [has_train, has_test] =
         [&counts.train, &counts.test].map(|part| part.iter().any(|n| *n > 0));
     if is_whole && !has_train && !has_test {
-        formats::say!(
+        program::say!(
             "warning: no object is in a cluster: expected some above the ground that stand where the \
              sensors see them"
         );
     } else if is_whole && !has_test {
-        formats::say!("warning: no cluster is in the test part, which has every tenth of --sweeps");
+        program::say!("warning: no cluster is in the test part, which has every tenth of --sweeps");
     }
     Ok(has_train || has_test || !is_whole)
 }
@@ -219,7 +234,6 @@ fn settings(stage: &Stage, args: &Args) -> Result<Value, FormatError> {
         "sweeps": args.sweeps,
         "seed": args.seed,
         "save": args.save,
-        "format": args.format.to_string(),
         "layout": args.layout.map(Layout::name),
     }))
 }
@@ -231,37 +245,20 @@ pub fn is_written(file: &Path) -> bool {
     match &*extension {
         "npz" if ["train", "test"].contains(&&*stem) => true,
         "txt" if ["train", "val", "calib", "poses", "times"].contains(&&*stem) => true,
-        "npz" | "npy" | "json" | "bin" | "label" | "pcd" | "las" | "txt" => {
+        "npz" | "npy" | "json" | "bin" | "label" | "txt" => {
             stem.len() >= 6 && stem.parse::<u32>().is_ok()
         }
         _ => false,
     }
 }
 
-/// Reads a built-in recipe by its name, or the recipe in a file.
-pub fn read_recipe(recipe: &Path) -> anyhow::Result<Recipe> {
-    let built_in = SCENE_RECIPES.iter().find(|(name, _)| Path::new(name) == recipe);
-    Ok(match built_in {
-        Some((_, text)) => Recipe::parse(text, recipe)?,
-        None if !recipe.exists() => {
-            let names = SCENE_RECIPES.map(|(name, _)| name).join(", ");
-            bail!("{}: expected a recipe's file, or one of {names}", recipe.display())
-        }
-        None => Recipe::load(recipe)?,
-    })
-}
-
 /// Writes the sweep, and the objects of the scene as JSON.
 fn save(stage: &Stage, done: &LabelledScene, args: &Args) -> anyhow::Result<()> {
-    let sweeps = args.out.join("sweeps");
-    sweep_file::write(stage, done, args.format, &sweeps)?;
-    let mut described = description(stage, done);
-    if args.format != SweepFormat::Npz {
-        described["classes"] = json!(sweep_file::classes(stage));
-    }
-    let file = sweeps.join(format!("{:06}.json", done.scene.number));
-    atomic::write_bytes(&file, serde_json::to_vec_pretty(&described).context("writing JSON")?)?;
-    Ok(())
+    let sweeps = args.folder().join("sweeps");
+    let file = |end: &str| sweeps.join(format!("{:06}.{end}", done.scene.number));
+    write_scan(&file("npz"), ScanFormat::Npz, Hashing::None, &done.sweep.scan)?;
+    let described = serde_json::to_vec_pretty(&description(stage, done)).context("writing JSON")?;
+    Ok(atomic::write_bytes(&file("json"), described)?)
 }
 
 fn description(stage: &Stage, done: &LabelledScene) -> Value {

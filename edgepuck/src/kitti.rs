@@ -1,16 +1,15 @@
 //! Labels of KITTI's object benchmark, as the readme of its development kit defines them.
 
 use anyhow::Context;
-use edgepuck_segment::OrientedBox;
 use formats::FormatError;
-use formats::foreign::read_text;
+use formats::geometry::OrientedBox;
 use formats::periodic::shorter_way;
+use formats::plausible::read_text;
 use glam::{DMat3, DMat4, DVec3};
 use sim_gpu::glam;
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use crate::cuboid;
 use crate::street::StreetClass;
 
 /// The most that products of a rotation's rows may be off: KITTI rounds to 7 digits, others to 3.
@@ -138,14 +137,13 @@ pub fn line(
     class: &str,
     [truncated, occluded]: [f64; 2],
     bounds: Option<[f64; 4]>,
-    place: &OrientedBox,
+    place: OrientedBox<f32>,
     camera: Option<&Camera>,
 ) -> String {
     let kind = StreetClass::named(class).map_or(class, |known| known.kitti);
     let kind = kind.replace(char::is_whitespace, "_");
-    let [length, width, height] = place.size_m.map(f64::from);
-    let yaw_rad = f64::from(place.yaw_rad);
-    let base = DVec3::from(place.centre_m.map(f64::from)) - 0.5 * height * DVec3::Z;
+    let OrientedBox { centre_m, size_m: [length, width, height], yaw_rad } = place.widened();
+    let base = DVec3::from(centre_m) - 0.5 * height * DVec3::Z;
     let (mut alpha, mut at, mut rotation) = (-10.0, base, yaw_rad);
     if let Some(camera) = camera {
         let along = DVec3::new(libm::cos(yaw_rad), libm::sin(yaw_rad), 0.0);
@@ -163,13 +161,6 @@ pub fn line(
     )
 }
 
-/// The [corners](cuboid::corners) of a box.
-pub fn corners(place: &OrientedBox) -> [DVec3; 8] {
-    let OrientedBox { centre_m, size_m, yaw_rad } = *place;
-    let [centre_m, size_m] = [centre_m, size_m].map(|of| DVec3::from(of.map(f64::from)));
-    cuboid::corners(centre_m, size_m, yaw_rad.into())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -180,8 +171,8 @@ mod tests {
 
     fn label(class: &str, centre_m: [f32; 3], camera: Option<&Camera>) -> String {
         let place = OrientedBox { centre_m, size_m: [4.0, 2.0, 1.0], yaw_rad: 0.0 };
-        let bounds = camera.and_then(|camera| camera.bounds(corners(&place)));
-        line(class, [-1.0, -1.0], bounds, &place, camera)
+        let bounds = camera.and_then(|camera| camera.bounds(place.widened().corners()));
+        line(class, [-1.0, -1.0], bounds, place, camera)
     }
 
     #[test]

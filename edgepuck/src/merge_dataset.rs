@@ -20,13 +20,13 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let folders: Vec<PathBuf> = folders.collect();
     if folders.iter().any(|folder| parts::record(folder).exists()) {
         parts::merge(&folders, &args.out)?;
-        formats::say!("{} parts: {}", folders.len(), args.out.display());
+        program::say!("{} parts: {}", folders.len(), args.out.display());
         return Ok(Outcome::Success);
     }
     let manifest = merge(&folders, &args.out)?;
-    formats::say!("{} meshes: {}", manifest.meshes.len(), args.out.display());
+    program::say!("{} meshes: {}", manifest.meshes.len(), args.out.display());
     if manifest.adapters.len() > 1 {
-        formats::say!(
+        program::say!(
             "The shards were cast on different adapters ({}): the clean scans equal those of one \
              run, but the noise differs in its last digits.",
             manifest.adapters.join(", ")

@@ -1,10 +1,10 @@
 use crate::Outcome;
-use crate::significant_digits::digits;
 use formats::atomic;
-use formats::outputs::{Overwrite, need_extension};
 use glam::DVec3;
+use program::outputs::{Overwrite, need_extension};
+use program::significant_digits::digits;
 use sim_gpu::glam;
-use sim_gpu::internals::sensor::{BeamPattern, Layout, SensorProfile, builtin_names};
+use sim_gpu::sensors::{BeamPattern, Layout, SensorProfile, builtin_names};
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -42,7 +42,7 @@ pub fn run(args: &ProfileArgs) -> anyhow::Result<Outcome> {
     let pattern = sensor.pattern();
     out.write_all(described(&sensor, &pattern).as_bytes())?;
     for oddity in oddities(&sensor, &pattern) {
-        formats::say!("warning: {oddity}");
+        program::say!("warning: {oddity}");
     }
     if let Some(file) = &args.beams {
         atomic::write_bytes(file, beams(&pattern))?;
@@ -123,11 +123,6 @@ fn slips(sensor: &SensorProfile, n_rays: usize) -> impl Iterator<Item = String> 
     found.push(odd(sigma_m > 0.5, "noise.typical_sigma_m", sigma_m, "metres"));
     let widest_deg = sensor.footprint.map_or(0.0, |shape| shape.divergence_deg[0]);
     found.push(odd(widest_deg > 2.0, "footprint.divergence_deg", widest_deg, "degrees"));
-    let views_m = sensor.views.as_ref().map_or(0.0, |views| views.distance_m);
-    if views_m > range.max_m {
-        let most_m = range.max_m;
-        found.push(Some(format!("views.distance_m = {views_m}: range.max_m is {most_m} m")));
-    }
     if let Layout::Uniform(raster) = &sensor.layout
         && (raster.azimuth_to_deg - raster.azimuth_from_deg).rem_euclid(360.0) == 0.0
         && raster.azimuth_steps > 1
@@ -135,16 +130,7 @@ fn slips(sensor: &SensorProfile, n_rays: usize) -> impl Iterator<Item = String> 
         let cause = "uniform: the first and the last azimuth are the same direction";
         found.push(Some(cause.to_owned()));
     }
-    if let Layout::Grid(grid) = &sensor.layout {
-        for (key, at, n) in [("cx", grid.cx, grid.width), ("cy", grid.cy, grid.height)] {
-            let most = f64::from(n) - 1.0;
-            let doubt = |at| format!("grid.{key} = {at}: the picture has pixels from 0 to {most}");
-            found.push(at.filter(|at| !(0.0..=most).contains(at)).map(doubt));
-        }
-    }
     if let Layout::Rotating(head) = &sensor.layout {
-        let quantum_deg = head.azimuth_quantum_deg.unwrap_or_default();
-        found.push(odd(quantum_deg > 5.0, "rotating.azimuth_quantum_deg", quantum_deg, "degrees"));
         let is_odd = !(60.0..=6_000.0).contains(&head.rpm);
         found.push(odd(is_odd, "rotating.rpm", head.rpm, "revolutions a minute"));
         let firings = 60e6 / head.rpm / head.sequence_us;
@@ -188,7 +174,7 @@ fn oddities(sensor: &SensorProfile, pattern: &BeamPattern) -> Vec<String> {
     }
     if let Layout::Rotating(head) = &sensor.layout {
         for (i, beam) in head.beam.iter().enumerate() {
-            let same = |other: &&sim_gpu::internals::sensor::Beam| {
+            let same = |other: &&sim_gpu::sensors::Beam| {
                 other.elevation_deg == beam.elevation_deg
                     && other.azimuth_offset_deg == beam.azimuth_offset_deg
             };

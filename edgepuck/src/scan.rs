@@ -4,27 +4,28 @@ use crate::caster::CasterArgs;
 use crate::effect_flags::EffectFlags;
 use crate::{Outcome, Usage, flags};
 use anyhow::{Context, ensure};
+use edgepuck_mesh::MeshFormat;
+use edgepuck_mesh::frame::{Normalize, Unit, Up};
+use edgepuck_mesh::import::Format;
 use formats::atomic;
 use formats::hash::Hashing;
-use formats::outputs::Overwrite;
+use formats::plausible::{Warning, mesh_size};
 use formats::scan::Attribute;
 use formats::scan_file::ScanFormat;
 use formats::vlp32c::{self, Returns};
 use glam::{DAffine3, DVec3};
-use sim_gpu::internals::import::Format;
-use sim_gpu::internals::mesh::MeshFormat;
-use sim_gpu::internals::mesh::frame::{Normalize, Unit, Up};
-use sim_gpu::internals::packets;
-use sim_gpu::internals::scene::SceneFile;
-use sim_gpu::internals::simplify::Simplify;
+use program::outputs::Overwrite;
+use sim_gpu::effects::Intensity;
+use sim_gpu::packets;
+use sim_gpu::scene_files::SceneFile;
 use sim_gpu::{Extent, FilePlace, Import, Mesh, MountedSensor, Pose, Scan, Scene, Sensor};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 pub struct Args {
     /// Scene file (TOML), or meshes (OBJ, OFF, PLY, STL), glTF files and robots (URDF) where their files
-    /// have them. The nodes of glTF and the links of robots are objects; joints are at 0, and animation
-    /// runs from time 0 on [default: two chairs, written to data/default-scene for you to edit]
+    /// have them. The nodes of glTF and the links of robots are objects; joints are at 0
+    /// [default: two chairs, written to data/default-scene for you to edit]
     #[arg(value_name = "SCENE|MESH...")]
     inputs: Vec<PathBuf>,
 
@@ -40,11 +41,6 @@ pub struct Args {
     /// Returns of each beam in the packets: strongest, last, or dual (both)
     #[arg(long, value_name = "WHICH")]
     returns: Option<Returns>,
-
-    /// Simplify meshes of a scene as gen-dataset does; applies to objects without a `simplify` key
-    /// in the scene file
-    #[arg(long, value_name = "auto|M")]
-    simplify: Option<Simplify>,
 
     #[command(flatten)]
     meshes: MeshArgs,
@@ -120,7 +116,7 @@ impl MeshArgs {
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let format = ScanFormat::of_path(&args.out)?;
     let (mut scene, what) = scene(args)?;
-    scene.warnings().iter().for_each(|warning| formats::say!("warning: {warning}"));
+    scene.warnings().iter().for_each(|warning| program::say!("warning: {warning}"));
     let mut returns = Returns::default();
     if format == ScanFormat::Pcap {
         returns = cast_packet_geometry(&mut scene, args.returns).with_context(|| what.clone())?;
@@ -142,7 +138,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     for ((scan, mounted), file) in scans.iter().zip(&scene.sensors).zip(&files) {
         let sensor = &mounted.name;
         if scan.cast_on_cpu {
-            formats::say!(
+            program::say!(
                 "{sensor}: one mesh exceeds the GPU's largest buffer, so the CPU cast it"
             );
         }
@@ -153,10 +149,10 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
             }
             _ => scan.save(file)?,
         }
-        formats::say!("{sensor}: {}: {}", told(&scene, scan), file.display());
+        program::say!("{sensor}: {}: {}", summary(&scene, scan), file.display());
     }
     if scans.iter().all(|scan| scan.is_empty()) {
-        formats::say!(
+        program::say!(
             "warning: no beam returned a point: expected an object in the sensor's range and view, \
              larger than the gaps between beams, and not seen edge-on"
         );
@@ -208,33 +204,29 @@ fn scene(args: &Args) -> anyhow::Result<(Scene, String)> {
     if args.inputs.is_empty() {
         write_default_scene()?;
     }
-    let mut scene = SceneFile::load(&file)?;
-    scene.simplify = args.simplify.or(scene.simplify);
-    scene.check_triangles().map_err(|error| Usage(error.to_string()))?;
-    flags::need_simplification(scene.simplifies())?;
+    let scene = SceneFile::load(&file)?;
     Ok((Scene::try_from(&scene).with_context(|| what.clone())?, what))
 }
 
 /// The meshes where their files have them, and a sensor that looks at their middle.
 fn scene_of_meshes(args: &Args) -> anyhow::Result<Scene> {
     let unit = args.meshes.units.unwrap_or_default();
-    ensure!(args.simplify.is_none(), Usage("--simplify applies to scenes only".to_owned()));
     let mut scene = Scene::new();
     scene.seed = args.meshes.seed.unwrap_or_default();
     scene.attributes.insert(Attribute::Intensity);
     if !args.meshes.attributes.is_empty() {
         scene.attributes = args.meshes.attributes.iter().copied().collect();
     }
-    let with_intensity = scene.attributes.contains(&Attribute::Intensity);
-    scene.effects = args.effects.effects(0.0, with_intensity)?;
+    scene.effects = args.effects.effects(0.0)?;
+    if scene.attributes.contains(&Attribute::Intensity) {
+        scene.effects.intensity.get_or_insert(Intensity);
+    }
     let mut extents = Vec::new();
     for file in &args.inputs {
         let extent = add_input(&mut scene, args, file)?;
-        if let Some(doubt) = extent.doubtful_size(unit) {
-            formats::say!("warning: {}: {doubt}; --units names another unit", file.display());
-        }
-        if let Some(doubt) = extent.doubtful_effects(&scene.effects) {
-            formats::say!("warning: {}: {doubt}", file.display());
+        let size = mesh_size(extent.size_m(), unit, "--units names another unit");
+        for warning in size.into_iter().chain(extent.hidden_by(&scene.effects)) {
+            program::say!("warning: {}: {warning}", file.display());
         }
         extents.push(extent);
     }
@@ -248,10 +240,9 @@ fn scene_of_meshes(args: &Args) -> anyhow::Result<Scene> {
     pose.position_m += all.map_or(DVec3::ZERO, |all| 0.5 * (all.low + all.high));
     for (file, extent) in args.inputs.iter().zip(extents) {
         if extent.surrounds(&[pose.position_m]) {
-            let file = file.display();
-            formats::say!(
-                "warning: {file}: the sensor stands inside its bounding box: expected a larger --distance, or another of --units"
-            );
+            let remedy = "a larger --distance, or another of --units".to_owned();
+            let warning = Warning::SensorInside(remedy);
+            program::say!("warning: {}: {warning}", file.display());
         }
     }
     let sensor = Sensor::resolve(args.meshes.sensor.as_deref().unwrap_or("vlp32c"))?;
@@ -287,21 +278,17 @@ fn add_input(scene: &mut Scene, args: &Args, file: &Path) -> anyhow::Result<Exte
     extents.reduce(Extent::and).context("invariant: a file has a part")
 }
 
-/// Lists the objects of `scene`, and what simplification made of them.
+/// Lists the objects of `scene`.
 fn tell_objects(scene: &Scene) {
     for (number, object) in scene.instances().iter().enumerate() {
         let name = object.name.as_deref().unwrap_or_default();
         let label = object.label.as_ref().map(|label| format!(", a {label}")).unwrap_or_default();
-        let simplified = object
-            .simplified
-            .map(|s| format!(", {} triangles left, within {:.2e} m", s.triangles, s.bound_m))
-            .unwrap_or_default();
-        formats::say!("object {number}: {name}{label}{simplified}");
+        program::say!("object {number}: {name}{label}");
     }
 }
 
 /// The number of points of `scan`, and what became of the other returns.
-fn told(scene: &Scene, scan: &Scan) -> String {
+fn summary(scene: &Scene, scan: &Scan) -> String {
     let (tally, effects) = (&scan.tally, &scene.effects);
     let of_the_air = effects.weather.as_ref().map(|_| format!("{} of the air, ", tally.scattered));
     let can_be_missed = effects.detection.is_some() || effects.weather.is_some();
@@ -329,7 +316,7 @@ fn write_default_scene() -> anyhow::Result<()> {
             atomic::write_bytes(&file, text)?;
         }
     }
-    formats::say!("No scene was named: scanning that of {DEFAULT_SCENE}.");
+    program::say!("No scene was named: scanning that of {DEFAULT_SCENE}.");
     Ok(())
 }
 

@@ -1,40 +1,31 @@
+//! `edgepuck detect --segment-only`: the ground and the clusters of a sweep.
+
+use crate::colours::{self, Rgb};
 use crate::points::SweepArgs;
-use crate::{Outcome, Usage, colours, preview};
+use crate::view::preview;
+use crate::{Outcome, Usage};
 use edgepuck_segment::{Label, Segmentation, Segmenter, Settings, Sweep};
 use formats::atomic::UnfinishedFolder;
 use formats::cloud_file::write_cloud;
 use formats::hash::Hashing;
-use formats::outputs::Overwrite;
 use formats::scan::Column;
 use formats::{FormatError, Scan, rows};
-use plotters::style::RGBColor;
-use std::path::{Path, PathBuf};
+use program::outputs::Overwrite;
+use std::path::Path;
 use std::time::Instant;
 
-#[derive(clap::Args)]
-pub struct SegmentArgs {
-    #[command(flatten)]
-    input: SweepArgs,
-
-    /// Folder for cluster-0000.npy and so on (the points of each cluster in metres from the
-    /// sensor), sweep.ply (the sweep, coloured by cluster) and preview.png
-    #[arg(long, value_name = "DIR")]
-    out: PathBuf,
-
-    #[command(flatten)]
-    overwrite: Overwrite,
-
-    /// Compute connected components of points within this many metres instead, for clouds that are
-    /// not sweeps of a sensor; these have no ground
-    #[arg(long, value_name = "M")]
+/// Cuts the sweep `input` into clusters, of connected points within `radius` metres if there is one,
+/// and writes them into the folder `out`.
+pub fn run(
+    input: &SweepArgs,
+    out: &Path,
+    overwrite: &Overwrite,
     radius: Option<f32>,
-}
-
-pub fn run(args: &SegmentArgs) -> anyhow::Result<Outcome> {
-    args.overwrite.check_folder(&args.out)?;
-    let (scan, settings) = match args.radius {
-        Some(radius_m) => (args.input.read()?, Settings::of_components(radius_m)),
-        None => (args.input.read_upright()?, Settings::default()),
+) -> anyhow::Result<Outcome> {
+    overwrite.check_folder(out)?;
+    let (scan, settings) = match radius {
+        Some(radius_m) => (input.read()?, Settings::of_components(radius_m)),
+        None => (input.read_upright()?, Settings::default()),
     };
     let mut segmenter = Segmenter::new(settings).map_err(|error| Usage(error.to_string()))?;
     let sweep = Sweep { points: &scan.positions, rings: scan.ring.as_deref() };
@@ -44,32 +35,26 @@ pub fn run(args: &SegmentArgs) -> anyhow::Result<Outcome> {
     let segmentation = segmenter.segment(&sweep)?;
     let elapsed_ms = 1e3 * start.elapsed().as_secs_f64();
 
-    let begun = UnfinishedFolder::begin_new(&args.out)?;
-    write_clusters(&args.out, &scan, segmentation)?;
+    let begun = UnfinishedFolder::begin_new(out);
+    write_clusters(out, &scan, segmentation)?;
     let tints: Vec<_> = segmentation.labels().iter().map(|label| tint(*label)).collect();
-    write_ply(&args.out.join("sweep.ply"), &scan.positions, &tints)?;
-    preview::draw_from_above(
-        &scan,
-        &tints,
-        &[],
-        &args.input.title(),
-        &args.out.join("preview.png"),
-    )?;
+    write_ply(&out.join("sweep.ply"), &scan.positions, &tints)?;
+    preview::draw_sweep(&scan, &tints, &[], &out.join("preview.png"))?;
     begun.into_iter().for_each(UnfinishedFolder::finish);
     let ground = segmentation.labels().iter().filter(|label| **label == Label::Ground).count();
-    formats::say!(
+    program::say!(
         "{} points in {elapsed_ms:.1} ms: {} clusters, {:.0} % ground: {}",
         scan.len(),
         segmentation.clusters().len(),
         100.0 * ground as f64 / scan.len().max(1) as f64,
-        args.out.display()
+        out.display()
     );
     Ok(Outcome::Success)
 }
 
 /// The colour of a label: grey for the ground, light grey for points in no cluster, and that of its
 /// number for a cluster.
-pub fn tint(label: Label) -> RGBColor {
+pub fn tint(label: Label) -> Rgb {
     match label {
         Label::Ground => colours::of_class("ground"),
         Label::Small | Label::Invalid => colours::of_class("small"),
@@ -92,9 +77,9 @@ fn write_clusters(folder: &Path, scan: &Scan, found: &Segmentation) -> Result<()
     Ok(())
 }
 
-fn write_ply(file: &Path, points: &[[f32; 3]], tints: &[RGBColor]) -> Result<(), FormatError> {
+fn write_ply(file: &Path, points: &[[f32; 3]], tints: &[Rgb]) -> Result<(), FormatError> {
     let [red, green, blue] =
-        [0, 1, 2].map(|of| tints.iter().map(|t| [t.0, t.1, t.2][of]).collect::<Vec<_>>());
+        [0, 1, 2].map(|of| tints.iter().map(|tint| tint[of]).collect::<Vec<_>>());
     let columns = [
         (rows::AXES.to_vec(), Column::Vector(points)),
         (vec!["red"], Column::U8(&red)),

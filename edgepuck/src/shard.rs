@@ -38,14 +38,13 @@ impl Shard {
                 let of = of.ok_or("expected auto/N with a whole N of at least 1")?;
                 Self::of_array(of, variable)
             }
-            None if text == "auto" => Self::of_array(tasks_of_slurm(&variable)?, variable),
             Some((number, of)) => match (number.parse::<u32>(), of.parse::<u32>()) {
                 (Ok(number), Ok(of)) if 1 <= number && number <= of => {
                     Ok(Self { number: number - 1, of })
                 }
                 _ => Err("expected I/N with whole I from 1 to N".to_owned()),
             },
-            None => Err("expected I/N, such as 1/4, auto/N, or auto".to_owned()),
+            None => Err("expected I/N, such as 1/4, or auto/N".to_owned()),
         }
     }
 
@@ -63,25 +62,6 @@ impl Shard {
             Ok(number) if number < of => Ok(Self { number, of }),
             _ => Err(format!("auto: expected {name} from 0 to {}, found {number}", of - 1)),
         }
-    }
-}
-
-/// The number of tasks of the array of Slurm to which this task belongs.
-fn tasks_of_slurm(variable: impl Fn(&str) -> Option<String>) -> Result<u32, String> {
-    let number = |name: &str| variable(name).and_then(|value| value.parse::<u32>().ok());
-    let [first, last, count] =
-        ["SLURM_ARRAY_TASK_MIN", "SLURM_ARRAY_TASK_MAX", "SLURM_ARRAY_TASK_COUNT"].map(number);
-    match (first, last, count) {
-        (Some(0), Some(last), Some(count)) if last.checked_add(1) == Some(count) => Ok(count),
-        (None, None, None) => {
-            let cause = "auto: expected a job array of Slurm, found none of its variables; \
-                         elsewhere, give the number of tasks with auto/N";
-            Err(cause.to_owned())
-        }
-        // A part of the array that is run again does not have the number of all tasks.
-        _ => Err("auto: expected a whole array from 0, as `sbatch --array=0-7` makes it; \
-                  otherwise give the number of tasks with auto/N"
-            .to_owned()),
     }
 }
 
@@ -103,13 +83,6 @@ mod tests {
             assert_eq!(parsed("auto/8", &[(name, "7")]), Ok((7, 8)), "{name}");
             assert!(parsed("auto/8", &[(name, "8")]).unwrap_err().contains("from 0 to 7"));
         }
-        let array = [
-            ("SLURM_ARRAY_TASK_ID", "3"),
-            ("SLURM_ARRAY_TASK_MIN", "0"),
-            ("SLURM_ARRAY_TASK_MAX", "7"),
-            ("SLURM_ARRAY_TASK_COUNT", "8"),
-        ];
-        assert_eq!(parsed("auto", &array), Ok((3, 8)));
     }
 
     #[test]
@@ -126,14 +99,5 @@ mod tests {
         for text in ["0/4", "5/4", "1/0", "auto/0", "auto/x", "auto/8", "auto", "4", "1/4/2"] {
             assert!(parsed(text, &[]).is_err(), "{text}");
         }
-        // Tasks 3 and 5 of an array that is run again in part.
-        let again = [
-            ("SLURM_ARRAY_TASK_ID", "5"),
-            ("SLURM_ARRAY_TASK_MIN", "3"),
-            ("SLURM_ARRAY_TASK_MAX", "5"),
-            ("SLURM_ARRAY_TASK_COUNT", "2"),
-        ];
-        assert!(parsed("auto", &again).unwrap_err().contains("auto/N"));
-        assert_eq!(parsed("auto/8", &again), Ok((5, 8)));
     }
 }

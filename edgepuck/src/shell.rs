@@ -1,13 +1,8 @@
 use std::process::Command;
 
-/// `word`, quoted for a POSIX shell.
-pub fn posix_quoted(word: &str) -> String {
-    format!("'{}'", word.replace('\'', "'\\''"))
-}
-
 /// `word`, quoted for the system's shell.
 pub fn quoted(word: &str) -> String {
-    if cfg!(windows) { format!("\"{word}\"") } else { posix_quoted(word) }
+    if cfg!(windows) { format!("\"{word}\"") } else { format!("'{}'", word.replace('\'', "'\\''")) }
 }
 
 /// A command that runs `words` in the system's shell.

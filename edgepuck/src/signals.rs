@@ -57,8 +57,8 @@ fn end(signal: i32) {
     }
     atomic::abandon();
     if run.is_some_and(|(_, is_scanned)| is_scanned.load(SeqCst)) {
-        formats::outcome::say("stopped before the scans were packed; --resume continues");
-        process::exit(i32::from(formats::outcome::exit_code(Ok(crate::Outcome::Interrupted))));
+        program::outcome::say("stopped before the scans were packed; --resume continues");
+        process::exit(i32::from(program::outcome::exit_code(Ok(crate::Outcome::Interrupted))));
     }
     let _ = signal_hook::low_level::emulate_default_handler(signal);
 }

@@ -1,8 +1,21 @@
-//! What the C interfaces of Edgepuck share: the error of a call as a status and a text, the boundary that
-//! stops panics, and the pointers of callers, checked as far as possible.
+//! The C interface of Edgepuck, `include/edgepuck.h`: functions that take pointers, check them, and return
+//! a status. The feature `classify` has the functions of `infer-cpu`, `scan` those of `sim-gpu`.
+//!
+//! Doc comments here are for readers of that header, which is generated from them.
 
-mod failure;
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+#![expect(unsafe_code, reason = "callers in C pass pointers; every block says why it is sound")]
+
+#[cfg(feature = "classify")]
+mod classify;
 mod pointers;
+#[cfg(feature = "scan")]
+mod scan;
+mod status;
 
-pub use failure::{Failure, Status, StatusOf, guard, guard_status, last_error};
-pub use pointers::{BadPointer, check, free, make, need, path, slice, text, write};
+#[cfg(feature = "classify")]
+pub use classify::*;
+#[cfg(feature = "scan")]
+pub use scan::*;
+pub use status::*;

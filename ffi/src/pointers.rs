@@ -9,33 +9,19 @@ use std::ffi::{CStr, c_char};
 use std::mem::MaybeUninit;
 use std::path::PathBuf;
 
-use crate::failure::{Failure, Status, StatusOf, caught, guard_status, store};
-
-/// A pointer cannot be used.
-#[derive(Debug, thiserror::Error)]
-#[error("expected `{name}` to be {expected}")]
-pub struct BadPointer {
-    name: &'static str,
-    expected: String,
-}
-
-impl<S: Status> StatusOf<BadPointer> for S {
-    fn of(_: &BadPointer) -> Self {
-        S::BAD_POINTER
-    }
-}
+use crate::status::{EdgepuckStatus, Failure, caught, guard_status, store};
 
 /// The object that the argument called `name` points at, unless it is null.
-pub fn need<T>(pointer: Option<T>, name: &'static str) -> Result<T, BadPointer> {
-    pointer.ok_or_else(|| BadPointer { name, expected: "a pointer, found null".to_owned() })
+pub(crate) fn need<T>(pointer: Option<T>, name: &str) -> Result<T, Failure> {
+    pointer.ok_or_else(|| bad(name, "a pointer, found null"))
 }
 
 /// Writes the address of the object that `make` returns to `out`, an argument of this name, or null if it
 /// fails. [`free`] takes the address back.
-pub fn make<T, S: Status>(
+pub(crate) fn make<T>(
     out: Option<&mut MaybeUninit<Option<Box<T>>>>,
-    make: impl FnOnce() -> Result<T, Failure<S>>,
-) -> S {
+    make: impl FnOnce() -> Result<T, Failure>,
+) -> EdgepuckStatus {
     guard_status(|| {
         let out = need(out, "out")?.write(None);
         *out = Some(Box::new(make()?));
@@ -44,19 +30,16 @@ pub fn make<T, S: Status>(
 }
 
 /// Drops an object of [`make`]. There is no status to return: a panic leaves its message.
-pub fn free<T>(object: Option<Box<T>>) {
+pub(crate) fn free<T>(object: Option<Box<T>>) {
     if let Err(message) = caught(|| drop(object)) {
         store(&message);
     }
 }
 
 /// Checks that `pointer`, the argument called `name`, is not null and is aligned for `T`.
-pub fn check<T>(pointer: *const T, name: &'static str) -> Result<(), BadPointer> {
+pub(crate) fn check<T>(pointer: *const T, name: &str) -> Result<(), Failure> {
     match pointer.is_null() || !pointer.is_aligned() {
-        true => {
-            let expected = "an aligned pointer, found a null or misaligned one".to_owned();
-            Err(BadPointer { name, expected })
-        }
+        true => Err(bad(name, "an aligned pointer, found a null or misaligned one")),
         false => Ok(()),
     }
 }
@@ -65,19 +48,18 @@ pub fn check<T>(pointer: *const T, name: &'static str) -> Result<(), BadPointer>
 ///
 /// # Safety
 /// If it is neither null nor misaligned, `n` elements lie there that nobody changes during `'a`.
-pub unsafe fn slice<'a, T>(
+pub(crate) unsafe fn slice<'a, T>(
     pointer: *const T,
     n: usize,
-    name: &'static str,
-) -> Result<&'a [T], BadPointer> {
+    name: &str,
+) -> Result<&'a [T], Failure> {
     if n == 0 {
         return Ok(&[]);
     }
     check(pointer, name)?;
     let n_bytes = n.checked_mul(size_of::<T>());
     if n_bytes.is_none_or(|n_bytes| isize::try_from(n_bytes).is_err()) {
-        let expected = format!("an array that fits in memory, found {n} elements");
-        return Err(BadPointer { name, expected });
+        return Err(bad(name, &format!("an array that fits in memory, found {n} elements")));
     }
     // SAFETY: not null, aligned, and not too long for a slice; the header requires `n` elements there.
     Ok(unsafe { std::slice::from_raw_parts(pointer, n) })
@@ -88,11 +70,7 @@ pub unsafe fn slice<'a, T>(
 /// # Safety
 /// If it is neither null nor misaligned, as many values may be written there, and nobody else uses them
 /// now.
-pub unsafe fn write<T: Copy>(
-    values: &[T],
-    out: *mut T,
-    name: &'static str,
-) -> Result<(), BadPointer> {
+pub(crate) unsafe fn write<T: Copy>(values: &[T], out: *mut T, name: &str) -> Result<(), Failure> {
     if out.is_null() {
         return Ok(());
     }
@@ -107,10 +85,7 @@ pub unsafe fn write<T: Copy>(
 ///
 /// # Safety
 /// If it is not null, it is a NUL-terminated string that nobody changes during `'a`.
-pub unsafe fn text<'a>(
-    pointer: *const c_char,
-    name: &'static str,
-) -> Result<Cow<'a, str>, BadPointer> {
+pub(crate) unsafe fn text<'a>(pointer: *const c_char, name: &str) -> Result<Cow<'a, str>, Failure> {
     check(pointer, name)?;
     // SAFETY: not null; the header requires a NUL-terminated string.
     Ok(unsafe { CStr::from_ptr(pointer) }.to_string_lossy())
@@ -120,7 +95,7 @@ pub unsafe fn text<'a>(
 ///
 /// # Safety
 /// As [`text`].
-pub unsafe fn path(pointer: *const c_char, name: &'static str) -> Result<PathBuf, BadPointer> {
+pub(crate) unsafe fn path(pointer: *const c_char, name: &str) -> Result<PathBuf, Failure> {
     check(pointer, name)?;
     // SAFETY: not null; the header requires a NUL-terminated string.
     let path = unsafe { CStr::from_ptr(pointer) };
@@ -129,4 +104,8 @@ pub unsafe fn path(pointer: *const c_char, name: &'static str) -> Result<PathBuf
     #[cfg(not(unix))]
     let path = path.to_string_lossy().into_owned();
     Ok(PathBuf::from(path))
+}
+
+fn bad(name: &str, expected: &str) -> Failure {
+    Failure::new(EdgepuckStatus::BadPointer, format!("expected `{name}` to be {expected}"))
 }

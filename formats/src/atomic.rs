@@ -5,8 +5,6 @@
 //! synced to the disk, which would guard against power cuts but cost more than writing a small scan.
 
 use std::collections::BTreeSet;
-#[cfg(feature = "dataset")]
-use std::fmt::Display;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -16,8 +14,7 @@ use tempfile::TempPath;
 
 use crate::error::FormatError;
 #[cfg(feature = "dataset")]
-use crate::hash::{FileHash, HashedFile, Hasher, Hashing};
-use crate::new_outputs;
+use crate::hash::{FileHash, Hasher, Hashing};
 
 const PREFIX: &str = ".edgepuck-";
 const SUFFIX: &str = ".tmp";
@@ -39,8 +36,16 @@ fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
 pub fn abandon() {
     let unfinished = unfinished();
     for path in unfinished.iter() {
-        // What cannot be removed stays: the process ends anyway.
-        let _ = if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
+        // While another thread puts a file into a folder, the folder cannot be removed. What stays after
+        // some attempts stays: the process ends anyway.
+        for _ in 0..100 {
+            let removed =
+                if path.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
+            if removed.is_ok() || !path.exists() {
+                break;
+            }
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
     }
     std::mem::forget(unfinished);
 }
@@ -50,34 +55,17 @@ pub struct UnfinishedFolder(PathBuf);
 
 impl UnfinishedFolder {
     /// Begins the folder at `path`, which does not exist yet or is empty.
-    ///
-    /// # Errors
-    /// Errors of the system; another program made the folder since this one looked.
-    pub fn begin(path: &Path) -> Result<Self, FormatError> {
-        let is_new = new_outputs::take(path);
-        if is_new {
-            make_folder_of(path)?;
-        }
-        let mut unfinished = unfinished();
-        if is_new {
-            fs::create_dir(path).map_err(|source| match source.kind() {
-                io::ErrorKind::AlreadyExists => {
-                    FormatError::io(path, new_outputs::made_meanwhile())
-                }
-                _ => FormatError::io(path, source),
-            })?;
-        }
-        unfinished.insert(path.to_path_buf());
-        Ok(Self(path.to_path_buf()))
+    #[must_use]
+    pub fn begin(path: &Path) -> Self {
+        unfinished().insert(path.to_path_buf());
+        Self(path.to_path_buf())
     }
 
     /// Begins the folder at `path`; `None` if it has entries already, which others may need.
-    ///
-    /// # Errors
-    /// As [`UnfinishedFolder::begin`].
-    pub fn begin_new(path: &Path) -> Result<Option<Self>, FormatError> {
+    #[must_use]
+    pub fn begin_new(path: &Path) -> Option<Self> {
         let has_entries = fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_some());
-        if has_entries && !new_outputs::has(path) { Ok(None) } else { Self::begin(path).map(Some) }
+        (!has_entries).then(|| Self::begin(path))
     }
 
     /// Keeps the folder.
@@ -188,23 +176,23 @@ impl Temporary {
     fn persist(self, path: &Path) -> io::Result<()> {
         let Self { path: temporary, known } = self;
         let unfinished = unfinished();
-        let persisted = match new_outputs::take(path) {
-            true => persist_new(temporary, path),
-            false => temporary.persist(path).map_err(|error| error.error),
-        };
+        let persisted = temporary.persist(path).map_err(|error| error.error);
         drop(unfinished);
         drop(known);
         persisted
     }
 }
 
-fn persist_new(temporary: TempPath, path: &Path) -> io::Result<()> {
-    temporary.persist_noclobber(path).or_else(|error| match error.error.kind() {
-        io::ErrorKind::AlreadyExists => Err(new_outputs::made_meanwhile()),
-        // Some file systems cannot do both at once.
-        _ if !path.exists() => error.path.persist(path).map_err(|error| error.error),
-        _ => Err(error.error),
-    })
+/// Follows the symbolic links at `path` to a file, which need not exist. Without links, this is `path`.
+fn behind_links(path: &Path) -> PathBuf {
+    // As many as Linux follows.
+    const MOST_LINKS: usize = 40;
+    let mut path = path.to_path_buf();
+    for _ in 0..MOST_LINKS {
+        let Ok(target) = fs::read_link(&path) else { break };
+        path = path.parent().unwrap_or(Path::new("")).join(target);
+    }
+    path
 }
 
 impl Unfinished {
@@ -230,7 +218,7 @@ impl Unfinished {
 
 impl<W: Write> Unfinished<W> {
     fn open(path: &Path, open: impl FnOnce(File) -> W) -> Result<Self, FormatError> {
-        let path = new_outputs::behind_links(path);
+        let path = behind_links(path);
         let (file, temporary) = Temporary::of(&path)?;
         let writer = BufWriter::with_capacity(BUFFER, open(file));
         Ok(Self { path, writer, temporary })
@@ -263,18 +251,6 @@ impl<W: Write> Unfinished<W> {
 /// As [`write()`].
 pub fn write_bytes(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), FormatError> {
     write(path, |writer| writer.write_all(bytes.as_ref()))
-}
-
-#[cfg(feature = "dataset")]
-pub(crate) fn write_lines(
-    path: PathBuf,
-    hashing: Hashing,
-    lines: impl IntoIterator<Item = impl Display>,
-) -> Result<HashedFile, FormatError> {
-    let hash = write_hashed(&path, hashing, |writer| {
-        lines.into_iter().try_for_each(|line| writeln!(writer, "{line}"))
-    })?;
-    Ok(HashedFile { path, hash })
 }
 
 pub(crate) fn make_folder_of(path: &Path) -> Result<&Path, FormatError> {
@@ -349,33 +325,6 @@ mod tests {
         assert_eq!(names(path.parent().unwrap()), ["scan.bin"]);
     }
 
-    #[cfg(feature = "cli")]
-    #[test]
-    fn what_another_program_made_meanwhile_stays() {
-        let folder = tempfile::tempdir().unwrap();
-        let [file, made] = ["scan.bin", "made"].map(|name| folder.path().join(name));
-        for path in [&file, &made] {
-            new_outputs::expect(path, true);
-        }
-        fs::write(&file, "theirs").unwrap();
-        fs::create_dir(&made).unwrap();
-        let refused = write_bytes(&file, "ours").unwrap_err().to_string();
-        assert!(refused.contains("scan.bin") && refused.contains("meanwhile"), "{refused}");
-        assert!(UnfinishedFolder::begin(&made).is_err() && made.is_dir());
-        assert_eq!(fs::read(&file).unwrap(), b"theirs");
-        // What a later command may replace, it replaces.
-        new_outputs::expect(&file, true);
-        new_outputs::expect(&file, false);
-        write_bytes(&file, "ours").unwrap();
-        // What this process made itself, it may replace.
-        let own = folder.path().join("own.bin");
-        new_outputs::expect(&own, true);
-        write_bytes(&own, "first").unwrap();
-        write_bytes(&own, "second").unwrap();
-        assert_eq!(fs::read(&own).unwrap(), b"second");
-        assert_eq!(names(folder.path()), ["made", "own.bin", "scan.bin"]);
-    }
-
     #[cfg(unix)]
     #[test]
     fn a_link_is_followed() {
@@ -433,16 +382,16 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         for (name, is_kept) in [("kept", true), ("lost", false)] {
             let path = folder.path().join(name);
-            let begun = UnfinishedFolder::begin(&path).unwrap();
+            let begun = UnfinishedFolder::begin(&path);
             write_bytes(&path.join("a"), b"x").unwrap();
             if is_kept {
                 begun.finish();
             }
         }
         assert_eq!(names(folder.path()), ["kept"]);
-        assert!(UnfinishedFolder::begin_new(&folder.path().join("new")).unwrap().is_some());
+        assert!(UnfinishedFolder::begin_new(&folder.path().join("new")).is_some());
         // With files of others, it stays.
-        assert!(UnfinishedFolder::begin_new(folder.path()).unwrap().is_none());
+        assert!(UnfinishedFolder::begin_new(folder.path()).is_none());
     }
 
     #[test]

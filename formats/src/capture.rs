@@ -164,31 +164,27 @@ impl Display for Senders {
     }
 }
 
-/// Passes each UDP packet of the sensor in a capture to `take` until it breaks. `is_data` is for
-/// [`Senders::takes`].
+/// Passes each UDP packet of the sensor in a capture to `take` until it breaks. Counts those that `take`
+/// refuses, and goes on: a damaged packet spoils no recording. `is_data` is for [`Senders::takes`].
 pub(crate) fn each_packet<E: Display>(
     path: &Path,
     senders: &mut Senders,
     is_data: impl Fn(&[u8]) -> bool,
     mut take: impl FnMut(&[u8]) -> Result<ControlFlow<()>, E>,
 ) -> Result<Counts, FormatError> {
-    let mut flaw = None;
+    let (mut number, mut flawed, mut first_flawed) = (0, 0, None);
     let counts = pcap::read(path, |packet| {
-        if !senders.takes(packet.sender(), || is_data(&packet.payload)) {
+        number += 1;
+        if !senders.takes(packet.sender, || is_data(&packet.payload)) {
             return ControlFlow::Continue(());
         }
         take(&packet.payload).unwrap_or_else(|cause| {
-            flaw = Some(cause);
-            ControlFlow::Break(())
+            flawed += 1;
+            first_flawed.get_or_insert_with(|| (number - 1, cause.to_string()));
+            ControlFlow::Continue(())
         })
     })?;
-    match flaw {
-        None => Ok(counts),
-        Some(cause) => {
-            let number = counts.packets.saturating_sub(1);
-            Err(FormatError::malformed(path, format!("UDP packet {number}"), cause))
-        }
-    }
+    Ok(Counts { flawed, first_flawed, ..counts })
 }
 
 /// The returns of a scan that is being read.

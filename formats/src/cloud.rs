@@ -45,7 +45,8 @@ pub fn normalize_unit_sphere(points: &mut [[f32; 3]]) {
 #[must_use]
 pub fn resample<T: Copy>(points: &[T], n: usize, key: StreamKey) -> Option<Vec<T>> {
     if points.len() > n {
-        return Some(draw_without_replacement(points, n, key));
+        let drawn = draw_without_replacement(points.len(), n, key);
+        return Some(drawn.into_iter().map(|i| points[i]).collect());
     }
     if points.is_empty() && n > 0 {
         return None;
@@ -57,15 +58,15 @@ pub fn resample<T: Copy>(points: &[T], n: usize, key: StreamKey) -> Option<Vec<T
     Some(cloud)
 }
 
-/// The first `n` steps of a Fisher-Yates shuffle. It stores only the indices that were swapped, at
-/// most `n`.
-fn draw_without_replacement<T: Copy>(points: &[T], n: usize, key: StreamKey) -> Vec<T> {
+/// The first `n` of `len` indices in a Fisher-Yates shuffle. It stores only the indices that were
+/// swapped, at most `n`. It is no generic function, so that this crate compiles it, optimized.
+fn draw_without_replacement(len: usize, n: usize, key: StreamKey) -> Vec<usize> {
     let mut moved = HashMap::with_capacity(n);
     (0..n)
         .map(|i| {
-            let j = i + key.below((points.len() - i) as u64, i as u64) as usize;
+            let j = i + key.below((len - i) as u64, i as u64) as usize;
             let at_i = moved.get(&i).copied().unwrap_or(i);
-            points[moved.insert(j, at_i).unwrap_or(j)]
+            moved.insert(j, at_i).unwrap_or(j)
         })
         .collect()
 }

@@ -1,4 +1,4 @@
-//! The errors of this crate.
+//! The errors of files and of values.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -83,5 +83,28 @@ impl FormatError {
     #[must_use]
     pub fn instance(name: &str, cause: impl Into<String>) -> Self {
         Self::Instance { name: name.to_owned(), cause: cause.into() }
+    }
+}
+
+/// A key whose value cannot be used, and why.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{key}: {cause}")]
+pub struct InvalidValue {
+    /// The path of the key, such as `rotating.beam[3].elevation_deg`.
+    pub key: String,
+    /// The cause.
+    pub cause: String,
+}
+
+impl InvalidValue {
+    /// The error that the value of `key` cannot be used because of `cause`.
+    pub fn new(key: impl Into<String>, cause: impl Into<String>) -> Self {
+        Self { key: key.into(), cause: cause.into() }
+    }
+}
+
+impl From<InvalidValue> for Vec<InvalidValue> {
+    fn from(invalid: InvalidValue) -> Self {
+        vec![invalid]
     }
 }

@@ -7,8 +7,6 @@ use std::fmt::{self, Display, Formatter};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
-#[cfg(feature = "dataset")]
-use std::path::PathBuf;
 
 crate::named! {
     /// The hash of the files of a dataset.
@@ -19,94 +17,41 @@ crate::named! {
         /// most of x86-64 since 2019, and of AArch64.
         #[default]
         Sha256 = "sha256",
-        /// BLAKE3, which `b3sum` checks. With AVX2 it is as fast as SHA-256 with instructions.
-        Blake3 = "blake3",
         /// No hash: later changes of files may go unnoticed.
         None = "none",
     }
 }
 
-/// The hash of a file's bytes, in hexadecimal digits. It is serialised as one field with the name
-/// of the hash.
+/// The hash of a file's bytes. It is serialised as a field with the name of the hash.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum FileHash {
-    /// SHA-256, as `sha256sum` prints it.
-    Sha256(String),
-    /// BLAKE3, as `b3sum` prints it.
-    Blake3(String),
-}
-
-impl FileHash {
-    /// The kind of hash.
-    #[must_use]
-    pub const fn hashing(&self) -> Hashing {
-        match self {
-            Self::Sha256(_) => Hashing::Sha256,
-            Self::Blake3(_) => Hashing::Blake3,
-        }
-    }
-
-    /// Its hexadecimal digits.
-    #[must_use]
-    pub fn digits(&self) -> &str {
-        match self {
-            Self::Sha256(digits) | Self::Blake3(digits) => digits,
-        }
-    }
+pub struct FileHash {
+    /// SHA-256 in hexadecimal digits, as `sha256sum` prints it.
+    pub sha256: String,
 }
 
 impl Display for FileHash {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Sha256(digits) => write!(f, "SHA-256 is {digits}"),
-            Self::Blake3(digits) => write!(f, "BLAKE3 is {digits}"),
-        }
+        write!(f, "SHA-256 is {}", self.sha256)
     }
 }
 
-/// A file that was written.
 #[cfg(feature = "dataset")]
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct HashedFile {
-    /// The path of the file.
-    pub path: PathBuf,
-    /// Its hash, if one was asked for.
-    pub hash: Option<FileHash>,
-}
-
-#[cfg(feature = "dataset")]
-pub(crate) enum Hasher {
-    Sha256(Sha256),
-    // A state of 2 KiB.
-    Blake3(Box<blake3::Hasher>),
-    None,
-}
+pub(crate) struct Hasher(Option<Sha256>);
 
 #[cfg(feature = "dataset")]
 impl Hasher {
     pub(crate) fn new(hashing: Hashing) -> Self {
-        match hashing {
-            Hashing::Sha256 => Self::Sha256(Sha256::new()),
-            Hashing::Blake3 => Self::Blake3(Box::default()),
-            Hashing::None => Self::None,
-        }
+        Self((hashing == Hashing::Sha256).then(Sha256::new))
     }
 
     pub(crate) fn update(&mut self, bytes: &[u8]) {
-        match self {
-            Self::Sha256(hash) => hash.update(bytes),
-            Self::Blake3(hash) => drop(hash.update(bytes)),
-            Self::None => {}
+        if let Some(hash) = &mut self.0 {
+            hash.update(bytes);
         }
     }
 
     pub(crate) fn finish(self) -> Option<FileHash> {
-        match self {
-            Self::Sha256(hash) => Some(FileHash::Sha256(hexadecimal(&hash.finalize()))),
-            Self::Blake3(hash) => Some(FileHash::Blake3(hash.finalize().to_string())),
-            Self::None => None,
-        }
+        self.0.map(|hash| FileHash { sha256: hexadecimal(&hash.finalize()) })
     }
 }
 
@@ -158,7 +103,7 @@ fn for_each_block(path: &Path, mut take: impl FnMut(&[u8])) -> Result<(), Format
 /// The SHA-256 of `bytes`, in hexadecimal digits.
 #[must_use]
 pub fn of_bytes(bytes: &[u8]) -> String {
-    hexadecimal(&Sha256::digest(bytes))
+    of_parts([bytes])
 }
 
 /// The SHA-256 of the concatenated `parts`, in hexadecimal digits.
@@ -182,13 +127,10 @@ mod tests {
 
     #[test]
     fn hashes_equal_published_ones() {
-        // FIPS 180-2, appendix B.1, and BLAKE3's test_vectors.json: no input.
+        // FIPS 180-2, appendix B.1.
         let sha256 = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
-        let blake3 = "af1349b9f5f9a1a6a0404dea36dcc9499bcb25c9adc112b7cc9a93cae41f3262";
         let hash = Hashing::Sha256.of_bytes(b"abc").unwrap();
-        assert_eq!(hash, FileHash::Sha256(sha256.to_owned()));
-        let hash = Hashing::Blake3.of_bytes(b"").unwrap();
-        assert_eq!(hash, FileHash::Blake3(blake3.to_owned()));
+        assert_eq!(hash, FileHash { sha256: sha256.to_owned() });
         assert_eq!(Hashing::None.of_bytes(b"abc"), None);
     }
 
@@ -201,8 +143,7 @@ mod tests {
             hash: Option<FileHash>,
         }
         for (hash, text) in [
-            (Some(FileHash::Sha256("0a".to_owned())), r#"{"file":1,"sha256":"0a"}"#),
-            (Some(FileHash::Blake3("0b".to_owned())), r#"{"file":1,"blake3":"0b"}"#),
+            (Some(FileHash { sha256: "0a".to_owned() }), r#"{"file":1,"sha256":"0a"}"#),
             (None, r#"{"file":1}"#),
         ] {
             let record = Record { file: 1, hash };

@@ -19,8 +19,6 @@
 //! | `sensor`, with `offsets` | text | `[m]` | the sensor's name; may be absent |
 //! | `ids`, with `offsets` | text | `[m]` | `FRAME#TRACK`, or any other name of the object; may be absent |
 //! | `sensor_origin`, with `offsets` | floating | `[3]` or `[m, 3]` | where the sensor was, from where `points` are then counted; may be absent |
-//! | `raw_labels`, with `offsets` | text | `[m]` | class names as the data's source has them; may be absent |
-//! | `fold`, with `offsets` | whole numbers | `[m]` | part of a cross-validation; may be absent |
 //!
 //! Where labels are text and no classes are listed, the classes are the sorted
 //! distinct labels. `packed` writes both kinds. Other keys are ignored.
@@ -55,10 +53,6 @@ pub struct LabelledSet {
     pub sensor: Option<Vec<String>>,
     /// Frame and track of each cloud, `FRAME#TRACK`, where the set lists them.
     pub ids: Option<Vec<String>>,
-    /// Class of each cloud as the data's source names it, where the set lists them.
-    pub raw_labels: Option<Vec<String>>,
-    /// Part of a cross-validation that each cloud is in, where the set lists them.
-    pub fold: Option<Vec<u32>>,
 }
 
 impl Default for LabelledSet {
@@ -75,8 +69,6 @@ impl Default for LabelledSet {
             truth_share: None,
             sensor: None,
             ids: None,
-            raw_labels: None,
-            fold: None,
         }
     }
 }
@@ -145,8 +137,6 @@ impl LabelledSet {
             truth_share: chosen(self.truth_share.as_ref(), indices),
             sensor: chosen(self.sensor.as_ref(), indices),
             ids: chosen(self.ids.as_ref(), indices),
-            raw_labels: chosen(self.raw_labels.as_ref(), indices),
-            fold: chosen(self.fold.as_ref(), indices),
             ..Self::default()
         };
         indices.iter().for_each(|&i| some.push(self.cloud(i), self.labels[i]));

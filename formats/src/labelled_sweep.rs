@@ -4,7 +4,6 @@
 //! | --- | --- | --- | --- |
 //! | `xyz_mm` | whole numbers | `[n, 3]` | points, millimetres, z up |
 //! | `laser`, may be absent | whole numbers | `[n]` | the laser of each point |
-//! | `offset_ns`, may be absent | whole numbers | `[n]` | time of each point since the sweep's reference |
 //! | `boxes` | floating | `[b, 7]` | centre, length, width, height (metres), yaw (radians) |
 //! | `classes` | text | `[b]` | the class of each box |
 //!
@@ -15,6 +14,7 @@ use std::path::Path;
 use crate::archive::NpzReader;
 use crate::decoding::invalid;
 use crate::error::FormatError;
+use crate::geometry::OrientedBox;
 use crate::npy;
 
 /// A sweep with labelled boxes.
@@ -24,8 +24,6 @@ pub struct LabelledSweep {
     pub points: Vec<[f64; 3]>,
     /// The laser of each point, if the file has them.
     pub lasers: Option<Vec<u16>>,
-    /// The time of each point since the sweep's reference in seconds, if the file has them.
-    pub times_s: Option<Vec<f64>>,
     /// The labelled objects.
     pub boxes: Vec<LabelledBox>,
 }
@@ -35,23 +33,8 @@ pub struct LabelledSweep {
 pub struct LabelledBox {
     /// Its class.
     pub class: String,
-    /// Its centre, metres.
-    pub centre_m: [f64; 3],
-    /// Its length, width and height, metres.
-    pub size_m: [f64; 3],
-    /// The direction of its length, from x towards y, radians.
-    pub yaw_rad: f64,
-}
-
-impl LabelledBox {
-    /// Whether `point` lies in the box, widened by `margin_m` on each side.
-    #[must_use]
-    pub fn contains(&self, point: [f64; 3], margin_m: f64) -> bool {
-        let [x, y, z] = [0, 1, 2].map(|axis| point[axis] - self.centre_m[axis]);
-        let (sin, cos) = libm::sincos(self.yaw_rad);
-        let own = [cos * x + sin * y, cos * y - sin * x, z];
-        own.iter().zip(self.size_m).all(|(at, size)| at.abs() <= size / 2.0 + margin_m)
-    }
+    /// Where it is.
+    pub place: OrientedBox,
 }
 
 /// Reads the labelled sweep at `path`.
@@ -60,20 +43,16 @@ pub fn read_labelled_sweep(path: &Path) -> Result<LabelledSweep, FormatError> {
     let millimetres = rows(&mut npz, "xyz_mm", 3)?;
     let points: Vec<_> =
         millimetres.chunks_exact(3).map(|row| [row[0], row[1], row[2]].map(|x| x * 1e-3)).collect();
-    let mut of_points = |key| -> Result<Option<Vec<f64>>, FormatError> {
-        if !npz.has(key) {
-            return Ok(None);
-        }
-        let values = rows(&mut npz, key, 1)?;
-        if values.len() != points.len() {
-            let (expected, found) = (points.len(), values.len());
+    let mut lasers: Option<Vec<u16>> = None;
+    if npz.has("laser") {
+        let numbers = rows(&mut npz, "laser", 1)?;
+        if numbers.len() != points.len() {
+            let (expected, found) = (points.len(), numbers.len());
             let cause = format!("expected {expected} values, one for each point, found {found}");
-            return Err(npz.error(key, cause));
+            return Err(npz.error("laser", cause));
         }
-        Ok(Some(values))
-    };
-    let lasers = of_points("laser")?.map(|all| all.iter().map(|&laser| laser as u16).collect());
-    let times_s = of_points("offset_ns")?.map(|all| all.iter().map(|ns| ns * 1e-9).collect());
+        lasers = Some(numbers.iter().map(|&laser| laser as u16).collect());
+    }
     let numbers = rows(&mut npz, "boxes", 7)?;
     let classes = npz.text("classes")?;
     if classes.len() * 7 != numbers.len() {
@@ -81,13 +60,11 @@ pub fn read_labelled_sweep(path: &Path) -> Result<LabelledSweep, FormatError> {
         let cause = format!("expected {expected} names, one for each box, found {found}");
         return Err(npz.error("classes", cause));
     }
-    let boxes = numbers.chunks_exact(7).zip(classes).map(|(row, class)| LabelledBox {
-        class,
-        centre_m: [row[0], row[1], row[2]],
-        size_m: [row[3], row[4], row[5]],
-        yaw_rad: row[6],
+    let boxes = numbers.chunks_exact(7).zip(classes).map(|(row, class)| {
+        let [centre_m, size_m] = [[row[0], row[1], row[2]], [row[3], row[4], row[5]]];
+        LabelledBox { class, place: OrientedBox { centre_m, size_m, yaw_rad: row[6] } }
     });
-    Ok(LabelledSweep { boxes: boxes.collect(), points, lasers, times_s })
+    Ok(LabelledSweep { boxes: boxes.collect(), points, lasers })
 }
 
 /// The numbers of the array `key`, of shape `[n, width]`, or `[n]` for a width of 1.
@@ -133,12 +110,11 @@ mod tests {
         let sweep = read_labelled_sweep(&path).unwrap();
         assert_eq!(sweep.points, [[1.0, -2.0, 0.5], [0.0, 0.0, 0.0]]);
         assert_eq!(sweep.lasers, Some(vec![31, 7]));
-        assert_eq!(sweep.times_s, None);
         assert_eq!(sweep.boxes[0].class, "Car");
         // The length of 4 m lies along y.
-        assert!(sweep.boxes[0].contains([1.0, -0.1, 0.5], 0.0));
-        assert!(!sweep.boxes[0].contains([2.1, -2.0, 0.5], 0.0));
-        assert!(sweep.boxes[0].contains([2.1, -2.0, 0.5], 0.2));
+        assert!(sweep.boxes[0].place.contains([1.0, -0.1, 0.5], 0.0));
+        assert!(!sweep.boxes[0].place.contains([2.1, -2.0, 0.5], 0.0));
+        assert!(sweep.boxes[0].place.contains([2.1, -2.0, 0.5], 0.2));
     }
 
     #[test]

@@ -8,33 +8,30 @@
 //! | `files` | `atomic` writes; clouds (`cloud_file`) as text, NPY, KITTI's and nuScenes' `.bin` |
 //! | `npz`, `ply`, `pcd`, `las` | clouds in one more format each; `npz` `labelled` sets and sweeps too |
 //! | `cloud-files` | all of these |
-//! | `dataset` | scans, packed sets, sets of clusters and yanx27's layout, written and read; tars of WebDataset, written |
+//! | `dataset` | scans, packed sets, sets of clusters, written and read; tars of WebDataset, written |
 //! | `pcap` | packets in captures: a VLP-32C's, written (`vlp32c`; whole scans with `dataset` too), and a VLP-16's, VLP-32C's (`velodyne`) or Ouster's (`ouster`), read |
+//! | `poses` | poses alone and over time (`geometry`), and trajectories read (`trajectory`) |
 //! | `weights` | models (`weights`) and their cards (`model_card`) |
-//! | `chamfer` | the Chamfer distance of two clouds (`chamfer`) |
-//! | `hdf5` | ModelNet40's HDF5 layout |
-//! | `cli` | exit codes and error messages of programs (`outcome`) |
 //!
 //! None of them needs a C compiler for its target.
 
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+#![warn(clippy::print_stdout, clippy::print_stderr)]
 #![cfg_attr(
     not(all(feature = "dataset", feature = "cloud-files")),
     allow(dead_code, reason = "formats that are left out leave helpers that others share")
 )]
 
-#[cfg(feature = "chamfer")]
-pub mod chamfer;
 pub mod cloud;
 #[cfg(feature = "files")]
 pub mod cloud_file;
+#[doc(hidden)]
+pub mod geometry;
 pub mod hash;
 #[cfg(feature = "npz")]
 pub mod labelled;
 #[cfg(feature = "weights")]
 pub mod model_card;
-#[cfg(feature = "hdf5")]
-pub mod modelnet_h5;
 #[cfg(feature = "pcap")]
 pub mod ouster;
 #[cfg(feature = "dataset")]
@@ -43,6 +40,9 @@ pub mod packed;
 pub mod pcap;
 #[cfg(feature = "pcap")]
 pub mod periodic;
+pub mod plausible;
+#[cfg(all(feature = "dataset", feature = "pcap"))]
+pub mod points_file;
 pub mod returns;
 pub mod rng;
 pub mod scan;
@@ -60,23 +60,10 @@ pub mod weights;
 #[cfg(feature = "files")]
 pub mod atomic;
 #[doc(hidden)]
-pub mod foreign;
-#[doc(hidden)]
 pub mod interval;
 #[doc(hidden)]
 #[cfg(feature = "npz")]
 pub mod labelled_sweep;
-#[doc(hidden)]
-pub mod modelnet_h5_list;
-#[doc(hidden)]
-#[cfg(feature = "files")]
-pub mod new_outputs;
-#[doc(hidden)]
-#[cfg(feature = "cli")]
-pub mod outcome;
-#[doc(hidden)]
-#[cfg(feature = "cli")]
-pub mod outputs;
 #[doc(hidden)]
 #[cfg(feature = "pcap")]
 pub mod packets;
@@ -90,16 +77,15 @@ pub mod rows;
 pub mod split;
 pub mod streams;
 #[doc(hidden)]
+#[cfg(feature = "poses")]
 pub mod trajectory;
 #[doc(hidden)]
 #[cfg(feature = "pcap")]
 pub mod turns;
+pub mod unit;
 #[doc(hidden)]
 #[cfg(feature = "dataset")]
 pub mod webdataset;
-#[doc(hidden)]
-#[cfg(feature = "dataset")]
-pub mod yanx27;
 
 #[cfg(feature = "npz")]
 mod archive;
@@ -124,7 +110,7 @@ mod records;
 
 #[cfg(feature = "pcap")]
 pub use capture::{ChosenSender, Senders};
-pub use error::FormatError;
+pub use error::{FormatError, InvalidValue};
 pub use scan::{Attribute, AttributeSet, Scan};
 pub use split::Split;
 

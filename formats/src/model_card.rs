@@ -7,21 +7,16 @@
 //! | `sampler` | sampler in training, as `infer-cpu --sampler` names it | `all` |
 //! | `points` | points that the sampler keeps | none |
 //! | `fps_start` | `farthest` or `first` | `farthest` |
-//! | `outlier_filter` | `true` if outliers are removed before the sampler | `false` |
 //! | `transform_after` | number of layers of the trunk before the feature transform | `1` |
 //! | `pooled` | `relu` if the trunk's last layer has a ReLU, else `linear` | `linear` |
 //! | `edge_radii` | JSON list: the radius of the neighbourhoods of each layer `edge.conv1…` | none |
 //! | `abstractions` | JSON list: the number of centres and the radius of each set abstraction `sa1…` | none |
 //! | `activation_ranges` | JSON object: layer to its largest activation, for int8 | calibrated at load |
 //! | `unknown_classes` | JSON list of the classes that are answered as `unknown` | none |
-//! | `unknown_energy` | energy above which a cloud is answered as `unknown` | infinity |
-//! | `temperature` | divisor of the logits before the softmax and the energy | `1` |
+//! | `temperature` | divisor of the logits before the softmax | `1` |
 //! | `trained` | `false` for a model of random weights | `true` |
 //! | `training_set`, `accuracy`, `provenance` | free text | |
 //! | `widths` | for people only; the tensors decide | |
-//!
-//! The energy of logits f at temperature T is -T ln Σ exp(f / T) (Liu et al. 2020,
-//! "Energy-based out-of-distribution detection").
 
 use std::collections::BTreeMap;
 use std::fmt::Display;
@@ -46,8 +41,6 @@ pub struct ModelCard {
     pub points: Option<usize>,
     /// The first point of farthest point sampling in training.
     pub fps_start: Option<String>,
-    /// Whether outliers were removed before the sampler in training.
-    pub outlier_filter: bool,
     /// The number of layers of the trunk before the feature transform.
     pub transform_after: usize,
     /// Whether the trunk's last layer has a ReLU.
@@ -61,9 +54,7 @@ pub struct ModelCard {
     /// The classes that are not objects of interest, such as trees or walls, and are answered as
     /// `unknown`.
     pub unknown_classes: Vec<String>,
-    /// The energy above which a cloud is answered as `unknown`.
-    pub unknown_energy: Option<f64>,
-    /// The divisor of the logits before the softmax and the energy.
+    /// The divisor of the logits before the softmax.
     pub temperature: f64,
     /// Whether the weights were trained.
     pub trained: bool,
@@ -77,7 +68,8 @@ pub struct ModelCard {
 
 crate::named! {
     /// The normalisation of a cloud before it enters a network.
-    #[derive(Default)]
+    #[derive(Default, serde::Serialize, serde::Deserialize)]
+    #[serde(rename_all = "kebab-case")]
     pub enum Normalization: "normalization" {
         /// Mean to 0, largest radius to 1.
         #[default]
@@ -110,14 +102,12 @@ impl Default for ModelCard {
             sampler: None,
             points: None,
             fps_start: None,
-            outlier_filter: false,
             transform_after: 1,
             pooled_relu: false,
             edge_radii: Vec::new(),
             abstractions: Vec::new(),
             activation_ranges: BTreeMap::new(),
             unknown_classes: Vec::new(),
-            unknown_energy: None,
             temperature: 1.0,
             trained: true,
             training_set: None,
@@ -157,18 +147,12 @@ impl ModelCard {
             sampler: text("sampler"),
             points: entries.get("points", |word| count(word).map(Some), None)?,
             fps_start: text("fps_start"),
-            outlier_filter: entries.get(
-                "outlier_filter",
-                either("false", "true"),
-                default.outlier_filter,
-            )?,
             transform_after: entries.get("transform_after", count, default.transform_after)?,
             pooled_relu: entries.get("pooled", either("linear", "relu"), default.pooled_relu)?,
             edge_radii: entries.get("edge_radii", json, default.edge_radii)?,
             abstractions: entries.get("abstractions", json, default.abstractions)?,
             activation_ranges: entries.get("activation_ranges", json, BTreeMap::new())?,
             unknown_classes,
-            unknown_energy: entries.get("unknown_energy", |word| finite(word).map(Some), None)?,
             temperature: entries.get("temperature", positive, default.temperature)?,
             trained: entries.get("trained", either("false", "true"), default.trained)?,
             training_set: text("training_set"),
@@ -190,7 +174,6 @@ impl ModelCard {
             ("sampler", self.sampler.clone()),
             ("points", self.points.map(|points| points.to_string())),
             ("fps_start", self.fps_start.clone()),
-            ("outlier_filter", self.outlier_filter.then(|| "true".to_owned())),
             ("transform_after", Some(self.transform_after.to_string())),
             ("pooled", Some(if self.pooled_relu { "relu" } else { "linear" }.to_owned())),
             ("edge_radii", (!self.edge_radii.is_empty()).then(|| format!("{:?}", self.edge_radii))),
@@ -200,7 +183,6 @@ impl ModelCard {
                 "unknown_classes",
                 (!self.unknown_classes.is_empty()).then(|| json!(self.unknown_classes).to_string()),
             ),
-            ("unknown_energy", self.unknown_energy.map(|energy| energy.to_string())),
             ("temperature", (self.temperature != 1.0).then(|| self.temperature.to_string())),
             ("trained", Some(self.trained.to_string())),
             ("training_set", self.training_set.clone()),
@@ -277,14 +259,12 @@ mod tests {
             sampler: Some("cpl".into()),
             points: Some(64),
             fps_start: Some("first".into()),
-            outlier_filter: true,
             transform_after: 2,
             pooled_relu: true,
             edge_radii: vec![0.1, 0.4],
             abstractions: vec![(256, 0.2), (64, 0.4)],
             activation_ranges: BTreeMap::from([("feat.conv1".into(), 1.1)]),
             unknown_classes: vec!["cup".into()],
-            unknown_energy: Some(-3.25),
             temperature: 1.5,
             trained: false,
             training_set: Some("t".into()),
@@ -303,7 +283,6 @@ mod tests {
             "classes",
             "normalization",
             "points",
-            "outlier_filter",
             "transform_after",
             "pooled",
             "edge_radii",
@@ -327,7 +306,7 @@ mod tests {
     #[test]
     fn defaults_of_unknown_objects_are_left_out_of_the_metadata() {
         let metadata = ModelCard::default().to_metadata();
-        let keys = ["unknown_classes", "unknown_energy", "temperature"];
+        let keys = ["unknown_classes", "temperature"];
         assert!(keys.iter().all(|&key| !metadata.contains_key(key)), "{metadata:?}");
     }
 }

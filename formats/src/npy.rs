@@ -269,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_what_numpy_writes() {
+    fn arrays_have_the_bytes_of_numpy() {
         let bytes = header_bytes("<f4", &[5, 3]);
         assert_eq!(bytes.len(), 128);
         let text = "{'descr': '<f4', 'fortran_order': False, 'shape': (5, 3), }";

@@ -62,7 +62,7 @@ impl Decoder {
         };
         let decoder = Box::new(ouster::Decoder::new(metadata));
         let before = decoder.header(payload)?.measurement_id;
-        let unsent = metadata.n_columns_unsent() / metadata.columns_per_packet();
+        let unsent = metadata.n_columns_unsent() / metadata.columns_per_packet;
         let yaw_rad = metadata.yaw_rad();
         Ok(Self::Ouster { decoder, yaw_rad, n_unsent: unsent.into(), before })
     }

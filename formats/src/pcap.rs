@@ -23,7 +23,7 @@ use pcap_parser::traits::PcapNGPacketBlock;
 use pcap_parser::{Block, Linktype, PIB_MAGIC, PcapBlockOwned, PcapError, create_reader};
 
 use crate::error::FormatError;
-use crate::foreign::or_foreign_file;
+use crate::plausible::or_foreign_file;
 
 /// The magic number of a file in this byte order with times in microseconds.
 const MAGIC: u32 = 0xa1b2_c3d4;
@@ -92,22 +92,10 @@ pub struct Sender {
 pub struct UdpPacket<'a> {
     /// The time of capture, seconds of Unix time, if the capture has it.
     pub time_s: Option<f64>,
-    /// The sender.
-    pub source: IpAddr,
-    /// The source port.
-    pub source_port: u16,
-    /// The destination port.
-    pub port: u16,
+    /// Who sent it.
+    pub sender: Sender,
     /// The payload.
     pub payload: Cow<'a, [u8]>,
-}
-
-impl UdpPacket<'_> {
-    /// Who sent it.
-    #[must_use]
-    pub fn sender(&self) -> Sender {
-        Sender { ip: self.source, ports: [self.source_port, self.port] }
-    }
 }
 
 /// What a capture has.
@@ -123,6 +111,10 @@ pub struct Counts {
     pub first_unread: Option<(usize, String)>,
     /// UDP packets that are probably missing in a turn of a sensor, by the times of the others.
     pub missing: u64,
+    /// UDP packets that a decoder of the sensor's data refused.
+    pub flawed: u64,
+    /// The number of the first of these among the UDP packets, from 0, and its flaw.
+    pub first_flawed: Option<(u64, String)>,
 }
 
 /// What was not read, for the end of a sentence; nothing if all was.
@@ -134,6 +126,10 @@ impl Display for Counts {
         if let Some((first, flaw)) = &self.first_unread {
             let n = self.unread;
             write!(f, ", beside {n} frames that cannot be read (the first, {first}: {flaw})")?;
+        }
+        if let Some((first, flaw)) = &self.first_flawed {
+            let n = self.flawed;
+            write!(f, ", {n} of them flawed and not used (the first, UDP packet {first}: {flaw})")?;
         }
         Ok(())
     }
@@ -344,16 +340,14 @@ impl<'a> Frame<'a> {
             }
             return Ok(None);
         };
-        let source = match &packet.net {
+        let ip = match &packet.net {
             Some(NetSlice::Ipv4(ip)) => ip.header().source_addr().into(),
             Some(NetSlice::Ipv6(ip)) => ip.header().source_addr().into(),
             _ => return Ok(None),
         };
         let packet_with = |udp: &UdpSlice<'_>, payload| UdpPacket {
             time_s: self.time_s,
-            source,
-            source_port: udp.source_port(),
-            port: udp.destination_port(),
+            sender: Sender { ip, ports: [udp.source_port(), udp.destination_port()] },
             payload,
         };
         if packet.is_ip_payload_fragmented() {

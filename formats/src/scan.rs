@@ -133,8 +133,32 @@ pub enum ColumnSlot<'a> {
     Vector(&'a mut Option<Vec<[f32; 3]>>),
 }
 
+impl ColumnSlot<'_> {
+    /// Stores the `numbers` of all points, three for each vector; the error names one of another type.
+    #[cfg(feature = "dataset")]
+    pub(crate) fn set(self, numbers: &[f64]) -> Result<(), String> {
+        match self {
+            Self::F32(slot) => *slot = Some(numbers.iter().map(|&x| x as f32).collect()),
+            Self::U8(slot) => *slot = Some(all_whole(numbers)?),
+            Self::U16(slot) => *slot = Some(all_whole(numbers)?),
+            Self::U32(slot) => *slot = Some(all_whole(numbers)?),
+            Self::Vector(slot) => {
+                let vectors = numbers.as_chunks::<3>().0.iter();
+                *slot = Some(vectors.map(|vector| vector.map(|x| x as f32)).collect());
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(feature = "dataset")]
+fn all_whole<T: TryFrom<u32>>(numbers: &[f64]) -> Result<Vec<T>, String> {
+    numbers.iter().map(|&x| whole(x)).collect()
+}
+
 /// The whole number `x`, if the type has it.
-pub(crate) fn whole<T: TryFrom<u32>>(x: f64) -> Result<T, String> {
+#[cfg(feature = "dataset")]
+fn whole<T: TryFrom<u32>>(x: f64) -> Result<T, String> {
     let is_u32 = x.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&x);
     let fits = is_u32.then_some(x as u32).and_then(|n| T::try_from(n).ok());
     let bits = 8 * size_of::<T>();

@@ -28,7 +28,7 @@ use crate::error::FormatError;
 use crate::hash::{FileHash, Hashing};
 use crate::number::Number;
 use crate::number::NumberType::{F16, F32, F64};
-use crate::scan::{Attribute, Column, ColumnSlot, Scan, whole};
+use crate::scan::{Attribute, Column, Scan};
 use crate::{csv, npy, ply, rows};
 
 crate::named! {
@@ -119,11 +119,8 @@ pub fn read_scan(path: &Path) -> Result<Scan, FormatError> {
     match ScanFormat::of_path(path)? {
         ScanFormat::Npz => read_npz(path),
         ScanFormat::Ply => ply::read_scan(path),
-        ScanFormat::Csv => {
-            refuse("CSV is read as a cloud, with no attributes but the intensity and the ring")
-        }
-        ScanFormat::Pcd => {
-            refuse("PCD is read as a cloud, with no attributes but the intensity and the ring")
+        ScanFormat::Csv | ScanFormat::Pcd => {
+            refuse("it is read as a cloud, with no attributes but the intensity and the ring")
         }
         ScanFormat::Pcap => refuse("packets hold a sensor's ranges, not points"),
     }
@@ -178,39 +175,26 @@ fn read_npz(path: &Path) -> Result<Scan, FormatError> {
         if !npz.has(attribute.name()) {
             continue;
         }
-        let of = &mut npz;
-        match scan.slot(attribute) {
-            ColumnSlot::F32(slot) => *slot = Some(read_column(of, attribute, 1, n, single)?),
-            // Other numbers are intensities.
-            ColumnSlot::U8(slot) if attribute == Attribute::Reflectivity => {
-                *slot = read_column(of, attribute, 1, n, whole).ok();
-            }
-            ColumnSlot::U8(slot) => *slot = Some(read_column(of, attribute, 1, n, whole)?),
-            ColumnSlot::U16(slot) => *slot = Some(read_column(of, attribute, 1, n, whole)?),
-            ColumnSlot::U32(slot) => *slot = Some(read_column(of, attribute, 1, n, whole)?),
-            ColumnSlot::Vector(slot) => {
-                let numbers = read_column(of, attribute, 3, n, single)?;
-                *slot = Some(numbers.as_chunks::<3>().0.to_vec());
-            }
+        let stored = read_column(&mut npz, attribute, n).and_then(|numbers| {
+            let stored = scan.slot(attribute).set(&numbers);
+            stored.map_err(|cause| npz.error(attribute.name(), cause))
+        });
+        // Other reflectivities are intensities.
+        if attribute != Attribute::Reflectivity {
+            stored?;
         }
     }
     Ok(scan)
 }
 
-fn single(x: f64) -> Result<f32, String> {
-    Ok(x as f32)
-}
-
-/// The numbers of an attribute of `n` points, `width` for each.
-fn read_column<T: Copy>(
+/// The numbers of an attribute of `n` points.
+fn read_column(
     npz: &mut NpzReader,
     attribute: Attribute,
-    width: usize,
     n: usize,
-    of_number: impl Fn(f64) -> Result<T, String>,
-) -> Result<Vec<T>, FormatError> {
+) -> Result<Vec<f64>, FormatError> {
     npz.entry(attribute.name(), |header, _, elements| {
-        npy::check_columns(&header, width, n)?;
+        npy::check_columns(&header, attribute.column_names().len(), n)?;
         let is_whole = !matches!(header.number(), Some((F16 | F32 | F64, _)));
         // Whole numbers are probably milliseconds or millimetres.
         if is_whole && matches!(attribute, Attribute::Time | Attribute::Range) {
@@ -218,7 +202,6 @@ fn read_column<T: Copy>(
             let cause = format!("expected seconds or metres of a floating type, found {found}");
             return Err(invalid(cause));
         }
-        let numbers = npy::read_numbers(elements, &header, |x| x)?;
-        numbers.into_iter().map(of_number).collect::<Result<_, _>>().map_err(invalid)
+        npy::read_numbers(elements, &header, |x| x)
     })
 }

@@ -9,48 +9,45 @@
 
 use std::path::Path;
 
-use crate::error::FormatError;
-use crate::foreign::{or_foreign_file, read_text};
+use glam::DQuat;
 
-/// A pose at a time.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct KeyedPose {
-    /// The time, seconds.
-    pub time_s: f64,
-    /// The position, metres.
-    pub position_m: [f64; 3],
-    /// The attitude: a quaternion of length 1, x y z w.
-    pub quaternion_xyzw: [f64; 4],
-}
+use crate::error::FormatError;
+use crate::geometry::{Pose, Trajectory};
+use crate::plausible::{or_foreign_file, read_text};
 
 /// The time between poses in KITTI's format, which has no times: its sensor turns 10 times a second.
 pub const KITTI_PERIOD_S: f64 = 0.1;
 
-/// Reads a trajectory in TUM's or KITTI's format, which the count of numbers in a line tells apart.
-/// The poses of KITTI's format are [`KITTI_PERIOD_S`] apart and begin at 0.
-pub fn read_trajectory(path: &Path) -> Result<Vec<KeyedPose>, FormatError> {
-    read(path).map_err(|error| or_foreign_file(path, "a trajectory", error))
+impl Trajectory {
+    /// Reads a trajectory in TUM's or KITTI's format, which the count of numbers in a line tells apart.
+    /// The poses of KITTI's format are [`KITTI_PERIOD_S`] apart and begin at 0.
+    ///
+    /// # Errors
+    /// The file cannot be read; a line is no pose, or not after the one before; there is no pose.
+    pub fn load(path: &Path) -> Result<Self, FormatError> {
+        let poses = read(path).map_err(|error| or_foreign_file(path, "a trajectory", error))?;
+        Ok(Self(poses))
+    }
 }
 
-fn read(path: &Path) -> Result<Vec<KeyedPose>, FormatError> {
+fn read(path: &Path) -> Result<Vec<(f64, Pose)>, FormatError> {
     let io = |source| FormatError::io(path, source);
     let text = read_text(path, u64::MAX).map_err(io)?;
     let flaw =
         |line: usize, cause: &str| Err(FormatError::malformed(path, format!("line {line}"), cause));
-    let mut poses: Vec<KeyedPose> = Vec::new();
+    let mut poses: Vec<(f64, Pose)> = Vec::new();
     for (line, text) in (1..).zip(text.lines()) {
         if text.trim().is_empty() || text.trim_start().starts_with('#') {
             continue;
         }
-        let pose = match pose_of(text, poses.len() as f64 * KITTI_PERIOD_S) {
-            Ok(pose) => pose,
+        let (time_s, pose) = match pose_of(text, poses.len() as f64 * KITTI_PERIOD_S) {
+            Ok(timed) => timed,
             Err(cause) => return flaw(line, &cause),
         };
-        if let Some(before) = poses.last().filter(|before| pose.time_s <= before.time_s) {
-            let (before_s, time_s) = (before.time_s, pose.time_s);
+        if let Some((before_s, _)) = poses.last().filter(|(before_s, _)| time_s <= *before_s) {
             return flaw(line, &format!("expected a time after {before_s} s, found {time_s} s"));
         }
-        poses.push(pose);
+        poses.push((time_s, pose));
     }
     if poses.is_empty() {
         return flaw(1, "expected a pose, found none in the file");
@@ -73,7 +70,7 @@ fn not_a_number(word: &str) -> String {
     format!("expected a number, found {word:?}{hint}")
 }
 
-fn pose_of(line: &str, at_s: f64) -> Result<KeyedPose, String> {
+fn pose_of(line: &str, at_s: f64) -> Result<(f64, Pose), String> {
     let numbers: Vec<f64> = line
         .split_whitespace()
         .map(|word| word.parse().ok().filter(|x: &f64| x.is_finite()).ok_or(word))
@@ -96,41 +93,8 @@ fn pose_of(line: &str, at_s: f64) -> Result<KeyedPose, String> {
     if (length - 1.0).abs() > 1e-3 {
         return Err(format!("expected a quaternion of length 1, found length {length}"));
     }
-    Ok(KeyedPose { time_s, position_m, quaternion_xyzw: quaternion.map(|q| q / length) })
-}
-
-/// Faster than cars, metres per second.
-const FASTEST_M_S: f64 = 100.0;
-
-/// Why `poses` are probably not those of `what`, such as "the sensor", in metres and seconds, if something
-/// speaks against it.
-#[must_use]
-pub fn doubtful_speed(what: &str, poses: &[KeyedPose]) -> Option<String> {
-    let speeds = poses.windows(2).map(|pair| {
-        let (a, b) = (&pair[0], &pair[1]);
-        let square = |axis: usize| (b.position_m[axis] - a.position_m[axis]).powi(2);
-        ([0, 1, 2].map(square).iter().sum::<f64>().sqrt() / (b.time_s - a.time_s), a.time_s)
-    });
-    let (speed_m_s, at_s) = speeds.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    (speed_m_s > FASTEST_M_S).then(|| {
-        format!(
-            "{what} moves at {speed_m_s:.0} m/s at {at_s} s: expected at most {FASTEST_M_S} m/s; are \
-             the positions in metres and the times in seconds?"
-        )
-    })
-}
-
-/// Why the rotations of `poses` are probably not those of `what`, which stands upright.
-#[must_use]
-pub fn doubtful_rotation(what: &str, poses: &[KeyedPose]) -> Option<String> {
-    // 0.5 is a z axis that is level, and 1 one that points down.
-    const MOST: f64 = 0.6;
-    let is_inverted = |pose: &&KeyedPose| {
-        let [x, y, ..] = pose.quaternion_xyzw;
-        x * x + y * y > MOST
-    };
-    (2 * poses.iter().filter(is_inverted).count() > poses.len())
-        .then(|| format!("{what} stands on its head: expected quaternions in the order x y z w"))
+    let rotation = DQuat::from_array(quaternion.map(|q| q / length));
+    Ok((time_s, Pose { position_m: position_m.into(), rotation }))
 }
 
 /// Times of packets that are further outside of poses have none: a recording may begin and end
@@ -216,13 +180,15 @@ fn quaternion_of(rows: [[f64; 3]; 3]) -> Result<[f64; 4], String> {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
 
-    fn read(text: &str) -> Result<Vec<KeyedPose>, String> {
+    fn read(text: &str) -> Result<Trajectory, String> {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), text).unwrap();
         let name = file.path().display().to_string();
-        read_trajectory(file.path()).map_err(|error| error.to_string().replace(&name, "f"))
+        Trajectory::load(file.path()).map_err(|error| error.to_string().replace(&name, "f"))
     }
 
     #[test]
@@ -237,14 +203,23 @@ mod tests {
             "0 0 1 1 1 0 0 2 0 1 0 3\n-1 0 0 0 0 -1 0 0 0 0 1 0\n1 0 0 0 0 {cosine} {} 0 0 {sine} {cosine} 0\n",
             -sine
         ));
-        let (tum, kitti) = (tum.unwrap(), kitti.unwrap());
+        let (tum, kitti) = (tum.unwrap().0, kitti.unwrap().0);
         assert_eq!((tum.len(), kitti.len()), (3, 3));
-        for (a, b) in tum.iter().zip(&kitti) {
-            assert!((a.time_s - b.time_s).abs() < 1e-12 && a.position_m == b.position_m);
-            for (p, q) in a.quaternion_xyzw.iter().zip(b.quaternion_xyzw) {
-                assert!((p - q).abs() < 1e-12, "{a:?} {b:?}");
-            }
+        for ((at_s, a), (expected_s, b)) in tum.into_iter().zip(kitti) {
+            assert!((at_s - expected_s).abs() < 1e-12 && a.position_m == b.position_m);
+            assert!(a.rotation.abs_diff_eq(b.rotation, 1e-12), "{a:?} {b:?}");
         }
+    }
+
+    #[test]
+    fn poses_are_interpolated_and_stay_beyond_their_ends() {
+        let motion = read("# time x y z q\n1 0 0 0 0 0 0 1\n\n3 2 0 4 0 0 1 0\n").unwrap();
+        let pose = motion.at(2.0);
+        assert!(pose.position_m.distance(DVec3::new(1.0, 0.0, 2.0)) < 1e-12);
+        assert!((pose.rotation * DVec3::X).distance(DVec3::Y) < 1e-12);
+        assert_eq!(motion.at(-7.0).position_m, DVec3::ZERO);
+        assert_eq!(motion.at(9.0).position_m, DVec3::new(2.0, 0.0, 4.0));
+        assert_eq!(motion.known_s(), [1.0, 3.0]);
     }
 
     #[test]

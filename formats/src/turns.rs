@@ -20,6 +20,10 @@ pub struct TurnedReturn {
     /// Clockwise turns up to the direction of the return. The fraction is its azimuth, clockwise
     /// from x.
     pub turns: f64,
+    /// The number of the turn in which it was fired, from 0. Turns begin where the first packet does, those
+    /// of a sensor that sends a sector only at the start of the sector, and an Ouster's at its first
+    /// column.
+    pub turn: u64,
     /// Time since the first packet, seconds.
     pub time_s: f64,
     /// The number of gaps between packets before it.
@@ -28,11 +32,11 @@ pub struct TurnedReturn {
 
 /// Passes the returns of the capture at `path` to `each` until it breaks: of the sensor with these
 /// `metadata` or, without them, of a VLP-16 or VLP-32C, whose model it returns. Packets of another
-/// length, of another of the `senders`, or not later than those before are skipped.
+/// length, of another of the `senders`, or not later than those before are skipped, and so are those that
+/// cannot be decoded, which are counted.
 ///
 /// # Errors
-/// A file that is not a capture or has no packet of such a sensor; a packet that cannot be decoded,
-/// with its number.
+/// A file that is not a capture or has no packet of such a sensor.
 pub fn read_turns(
     path: &Path,
     metadata: Option<&ouster::Metadata>,
@@ -43,7 +47,12 @@ pub fn read_turns(
         Some(metadata) => ouster::Decoder::new(metadata).packet_size(),
         None => crate::vlp32c::packet::PAYLOAD_SIZE,
     };
+    let sector = match metadata {
+        Some(_) => velodyne::Sector::default(),
+        None => velodyne::Sector::of_capture(path, senders)?,
+    };
     let (mut decoder, mut head, mut lost) = (None::<Decoder>, None::<Head>, 0);
+    let mut start = None;
     let mut found = Vec::new();
     let is_data = |payload: &[u8]| payload.len() == size;
     let mut counts = each_packet(path, senders, is_data, |payload| {
@@ -67,17 +76,35 @@ pub fn read_turns(
         if let Some(before) = head
             && now.gaps > before.gaps
         {
-            let step = (now.time_us - before.time_us) / before.facts.duration_us;
+            let passed = sector.unsent_between(before.facts.azimuth_rad, facts.azimuth_rad);
+            let unsent_us =
+                if passed > 0.0 { passed * TAU / before.facts.speed_rad_us } else { 0.0 };
+            let step = (now.time_us - before.time_us - unsent_us) / before.facts.duration_us;
             lost += (step.round() as u64).saturating_sub(1 + facts.n_unsent);
         }
         head = Some(now);
+        let start = *start.get_or_insert_with(|| {
+            let since = match metadata {
+                Some(metadata) => (facts.azimuth_rad + metadata.yaw_rad()) / TAU,
+                None => sector.since_start(facts.azimuth_rad),
+            };
+            now.turns - since.rem_euclid(1.0)
+        });
         for &found in &found {
             let [x, y, _] = found.point_m.map(f64::from);
             // Adding 1.5 makes the whole numbers round to the nearest.
             let ahead =
                 ((-libm::atan2(y, x) - facts.azimuth_rad) / TAU + 1.5).rem_euclid(1.0) - 0.5;
             let time_s = (now.time_us + found.after_us) * 1e-6;
-            let turned = TurnedReturn { found, turns: now.turns + ahead, time_s, gaps: now.gaps };
+            // A firing at the border is on its later side, whatever the rounding.
+            let fired = now.turns + facts.speed_rad_us * found.after_us / TAU + 1e-9;
+            let turned = TurnedReturn {
+                found,
+                turns: now.turns + ahead,
+                turn: (fired - start) as u64,
+                time_s,
+                gaps: now.gaps,
+            };
             if each(&turned).is_break() {
                 return Ok(ControlFlow::Break(()));
             }

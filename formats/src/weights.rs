@@ -11,7 +11,7 @@ use safetensors::tensor::{Dtype, Metadata, TensorInfo};
 
 use crate::atomic;
 use crate::error::FormatError;
-use crate::foreign::or_foreign;
+use crate::plausible::or_foreign;
 
 /// The header's length comes first, as u64.
 const LENGTH_SIZE: u64 = 8;
@@ -20,7 +20,8 @@ const LONGEST_HEADER: u64 = 100_000_000;
 
 /// Bytes that tell other kinds of files: the name of a zip archive's first entry is among them.
 const EXAMINED: u64 = 256;
-const CHECKPOINT: &str = "a PyTorch checkpoint: import its weights";
+const CHECKPOINT: &str =
+    "a PyTorch checkpoint: import its weights with edgepuck.torch.import_weights in Python";
 
 /// A tensor of f32 and its shape.
 #[derive(Clone, Debug, PartialEq)]
@@ -298,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_comes_back_and_safetensors_reads_it() {
+    fn written_weights_come_back_and_safetensors_reads_them() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("m.safetensors");
         let metadata = BTreeMap::from([("z".into(), "1".into()), ("a".into(), "2".into())]);

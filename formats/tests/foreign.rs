@@ -3,20 +3,20 @@ use std::path::Path;
 
 use formats::FormatError;
 use formats::cloud_file::read_cloud;
+use formats::geometry::Trajectory;
 use formats::ouster::Metadata;
-use formats::trajectory::read_trajectory;
 use formats::weights::WeightsFile;
 
 type Reader = fn(&Path) -> Result<(), FormatError>;
 
 #[test]
-fn what_stands_in_place_of_a_file_is_named() {
+fn stand_ins_of_files_are_named() {
     let cloud: Reader = |path| read_cloud(path).map(drop);
     let capture: Reader =
         |path| formats::pcap::read(path, |_| std::ops::ControlFlow::Continue(())).map(drop);
     let mut readers: Vec<(&str, &str, Reader)> = vec![
         ("a.pcap", "a capture", capture),
-        ("a.tum", "a trajectory", |path| read_trajectory(path).map(drop)),
+        ("a.tum", "a trajectory", |path| Trajectory::load(path).map(drop)),
         ("a.json", "metadata in JSON", |path| Metadata::read(path).map(drop)),
         ("a.safetensors", "safetensors", |path| WeightsFile::open(path).map(drop)),
     ];

@@ -56,9 +56,7 @@ fn clusters_of_any_size_have_offsets_and_labels_that_may_be_names() {
     let labels = ("labels", "|S4", "(2,)", &b"tree\x63ar\0"[..]);
     let range = ("range_m", "<f2", "(2,)", &[0, 0x3c, 0, 0x7e][..]);
     let ids = ("ids", "|S3", "(2,)", &b"0#10#2"[..]);
-    let fold = ("fold", "|u1", "(2,)", &[3, 1][..]);
-    let raw = ("raw_labels", "|S3", "(2,)", &b"elmute"[..]);
-    let set = read(&[RAGGED, OFFSETS, labels, range, ids, fold, raw]).unwrap();
+    let set = read(&[RAGGED, OFFSETS, labels, range, ids]).unwrap();
     assert_eq!((set.len(), set.smallest_cloud()), (2, 1));
     assert_eq!(set.cloud(0), [[1.0, 0.0, -1.0]]);
     assert_eq!(set.cloud(1), [[1.0, 2.0, 3.0], [0.0; 3]]);
@@ -68,8 +66,7 @@ fn clusters_of_any_size_have_offsets_and_labels_that_may_be_names() {
     assert!(range[0] == 1.0 && range[1].is_nan(), "{range:?}");
     assert_eq!(set.ids.as_ref().unwrap()[..], ["0#1", "0#2"]);
     let turned = set.select(&[1, 0, 1]);
-    assert_eq!(turned.fold.as_ref().unwrap()[..], [1, 3, 1]);
-    assert_eq!(turned.raw_labels.as_ref().unwrap()[..], ["ute", "elm", "ute"]);
+    assert_eq!(turned.ids.as_ref().unwrap()[..], ["0#2", "0#1", "0#2"]);
     assert_eq!((turned.offsets.as_slice(), turned.cloud(2)), (&[0, 2, 3, 5][..], set.cloud(1)));
     let classes = ("classes", "|S4", "(3,)", &b"bus\0tree\x63ar\0"[..]);
     assert_eq!(read(&[RAGGED, OFFSETS, labels, classes]).unwrap().labels, [1, 2]);
@@ -117,90 +114,63 @@ fn names_and_classes_may_be_absent_and_labels_of_any_type() {
 }
 
 #[test]
-fn what_is_no_labelled_set_is_refused_with_its_key() {
-    let classes = ("classes", "|S1", "(1,)", &b"a"[..]);
-    for (arrays, message) in [
-        (vec![LABELS], "points: expected a packed set of labelled clouds, found the keys [labels]"),
-        (vec![I16], "labels: missing"),
+fn malformed_sets_are_refused_with_their_key() {
+    let refused = |arrays: &[Array<'_>], message: &str| {
+        assert_eq!(read(arrays).unwrap_err(), message);
+    };
+    for (descr, shape, data, message) in [
+        ("|u1", "(3,)", &[0; 3][..], "expected 2 values, one for each cloud, found 3"),
+        ("|i1", "(2,)", &[0, 0xff], "expected whole numbers from 0, found -1"),
+        ("<f2", "(2,)", &[0, 0x38, 0, 0], "expected whole numbers from 0, found 0.5"),
+        ("|u1", "(1, 2)", &[0; 2], "expected shape [m], found [1, 2]"),
+    ] {
+        let labels = ("labels", descr, shape, data);
+        refused(&[F16, labels], &format!("labels: {message}"));
+    }
+    for (descr, shape, data, message) in [
+        ("|u1", "(3,)", &[1, 1, 3][..], "expected 0 first, found 1"),
+        ("|u1", "(0,)", &[], "expected 0 first, found none"),
+        ("|u1", "(3,)", &[0, 1, 4], "expected 3 last, found 4"),
+        ("|u1", "(4,)", &[0, 2, 1, 3], "expected values that ascend, found 1 after 2"),
+        ("|i1", "(3,)", &[0, 0xff, 3], "expected whole numbers from 0, found -1"),
+    ] {
+        let offsets = ("offsets", descr, shape, data);
+        refused(&[RAGGED, offsets, LABELS], &format!("offsets: {message}"));
+    }
+    let one = "expected 2 values, one for each cloud, found 1";
+    for (sets, key, descr, data) in [
+        (&[F16, LABELS][..], "names", "|S1", &b"a"[..]),
+        (&[F16, LABELS], "n_raw", "<i8", &[7, 0, 0, 0, 0, 0, 0, 0]),
+        (&[RAGGED, OFFSETS, LABELS], "sensor", "|S1", b"a"),
+    ] {
+        refused(&[sets, &[(key, descr, "(1,)", data)]].concat(), &format!("{key}: {one}"));
+    }
+    for (points, message) in [
         (
-            vec![("points", "<i2", "(2, 1, 3)", I16.3), LABELS],
-            "points: expected elements of type f2, f4 or f8, found <i2",
+            ("points", "<i2", "(2, 1, 3)", I16.3),
+            "expected elements of type f2, f4 or f8, found <i2",
         ),
+        (("points", "<f2", "(2, 3)", F16.3), "expected shape [m, n, 3], found [2, 3]"),
+        (RAGGED, "expected shape [m, n, 3], found [3, 3]"),
         (
-            vec![("points", "<f2", "(2, 3)", F16.3), LABELS],
-            "points: expected shape [m, n, 3], found [2, 3]",
-        ),
-        (
-            vec![F16, ("labels", "|u1", "(3,)", &[0; 3])],
-            "labels: expected 2 values, one for each cloud, found 3",
-        ),
-        (
-            vec![F16, ("labels", "|i1", "(2,)", &[0, 0xff])],
-            "labels: expected whole numbers from 0, found -1",
-        ),
-        (
-            vec![F16, ("labels", "<f2", "(2,)", &[0, 0x38, 0, 0])],
-            "labels: expected whole numbers from 0, found 0.5",
-        ),
-        (
-            vec![F16, ("labels", "|u1", "(1, 2)", &[0; 2])],
-            "labels: expected shape [m], found [1, 2]",
-        ),
-        (
-            vec![F16, LABELS, ("names", "|S1", "(1,)", b"a")],
-            "names: expected 2 values, one for each cloud, found 1",
-        ),
-        (
-            vec![F16, LABELS, ("n_raw", "<i8", "(1,)", &[7, 0, 0, 0, 0, 0, 0, 0])],
-            "n_raw: expected 2 values, one for each cloud, found 1",
-        ),
-        (
-            vec![F16, LABELS, ("names", "|O", "(2,)", b"ab")],
-            "names: expected a list of text, found |O of shape [2]",
-        ),
-        (vec![F16, LABELS, classes], "labels: expected labels below 1, found 1"),
-        (vec![RAGGED, LABELS], "points: expected shape [m, n, 3], found [3, 3]"),
-        (
-            vec![("points", "<f2", "(9,)", RAGGED.3), OFFSETS, LABELS],
-            "points: expected shape [total, 3], found [9]",
-        ),
-        (
-            vec![RAGGED, ("offsets", "|u1", "(3,)", &[1, 1, 3]), LABELS],
-            "offsets: expected 0 first, found 1",
-        ),
-        (
-            vec![RAGGED, ("offsets", "|u1", "(0,)", &[]), LABELS],
-            "offsets: expected 0 first, found none",
-        ),
-        (
-            vec![RAGGED, ("offsets", "|u1", "(3,)", &[0, 1, 4]), LABELS],
-            "offsets: expected 3 last, found 4",
-        ),
-        (
-            vec![RAGGED, ("offsets", "|u1", "(4,)", &[0, 2, 1, 3]), LABELS],
-            "offsets: expected values that ascend, found 1 after 2",
-        ),
-        (
-            vec![RAGGED, ("offsets", "|i1", "(3,)", &[0, 0xff, 3]), LABELS],
-            "offsets: expected whole numbers from 0, found -1",
-        ),
-        (
-            vec![RAGGED, ("offsets", "|u1", "(2,)", &[0, 3]), LABELS],
-            "labels: expected 1 values, one for each cloud, found 2",
-        ),
-        (
-            vec![RAGGED, OFFSETS, LABELS, ("sensor", "|S1", "(1,)", b"a")],
-            "sensor: expected 2 values, one for each cloud, found 1",
-        ),
-        (
-            vec![F16, ("labels", "|S1", "(2,)", b"ab"), classes],
-            "labels: expected one of the classes, found `b`",
-        ),
-        (
-            vec![("points", "<f2", "(1000000000000000000, 1, 3)", F16.3), LABELS],
-            "points: the file ends after 6 of 3000000000000000000",
+            ("points", "<f2", "(1000000000000000000, 1, 3)", F16.3),
+            "the file ends after 6 of 3000000000000000000",
         ),
     ] {
-        assert_eq!(read(&arrays).unwrap_err(), message);
+        refused(&[points, LABELS], &format!("points: {message}"));
     }
+    let flat = ("points", "<f2", "(9,)", RAGGED.3);
+    refused(&[flat, OFFSETS, LABELS], "points: expected shape [total, 3], found [9]");
+    let packed = "points: expected a packed set of labelled clouds, found the keys [labels]";
+    refused(&[LABELS], packed);
+    refused(&[I16], "labels: missing");
+    let objects = ("names", "|O", "(2,)", &b"ab"[..]);
+    refused(&[F16, LABELS, objects], "names: expected a list of text, found |O of shape [2]");
+    let classes = ("classes", "|S1", "(1,)", &b"a"[..]);
+    refused(&[F16, LABELS, classes], "labels: expected labels below 1, found 1");
+    let words = ("labels", "|S1", "(2,)", &b"ab"[..]);
+    refused(&[F16, words, classes], "labels: expected one of the classes, found `b`");
+    let short = ("offsets", "|u1", "(2,)", &[0, 3][..]);
+    let message = "labels: expected 1 values, one for each cloud, found 2";
+    refused(&[RAGGED, short, LABELS], message);
 }

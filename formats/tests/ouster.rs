@@ -196,7 +196,7 @@ fn the_farthest_range_of_each_profile_is_read_to_its_last_bit() {
 }
 
 #[test]
-fn what_was_not_measured_gives_no_return() {
+fn unmeasured_pixels_give_no_return() {
     let decoder = decoder(Profile::Single);
     let mut bytes = packet(Profile::Single, 1, 4);
     let column = 12 + 3 * 12;
@@ -218,7 +218,7 @@ fn what_was_not_measured_gives_no_return() {
 }
 
 #[test]
-fn what_is_no_lidar_packet_is_named() {
+fn other_packets_are_named() {
     let decoder = decoder(Profile::Single);
     let bytes = packet(Profile::Single, 1, 4);
     let said = |bytes: &[u8]| decoder.header(bytes).unwrap_err().to_string();
@@ -318,7 +318,7 @@ fn the_oldest_metadata_are_completed_as_by_ouster_sdk() {
     let object = old.as_object_mut().unwrap();
     object.remove("data_format");
     assert_eq!(parse(&old), parse(&stated));
-    assert_eq!(parse(&stated).unwrap().origin_m(), [ORIGIN_M, 0.0]);
+    assert_eq!(parse(&stated).unwrap().origin_m, [ORIGIN_M, 0.0]);
     let object = old.as_object_mut().unwrap();
     object.remove("lidar_to_sensor_transform");
     object.remove("lidar_origin_to_beam_origin_mm");
@@ -337,7 +337,7 @@ fn the_oldest_metadata_are_completed_as_by_ouster_sdk() {
 
     let path = need!(shared_data("bug_inputs/flat_nofmt.json"));
     let metadata = Metadata::read(&path).unwrap();
-    assert_eq!((metadata.columns_per_frame(), metadata.columns_per_packet()), (1024, 16));
+    assert_eq!((metadata.columns_per_frame, metadata.columns_per_packet), (1024, 16));
     // Firmware 1.13: 16 columns of 64 pixels of 12 bytes, with 20 bytes around each column.
     let decoder = Decoder::new(&metadata);
     assert_eq!((decoder.packet_size(), decoder.columns()), (12_608, 16));
@@ -354,7 +354,7 @@ fn beams_do_not_depend_on_the_profile_of_packets() {
         metadata["data_format"]["udp_profile_lidar"] = json!(profile);
         fs::write(&path, format!("\u{feff}{metadata}")).unwrap();
         let beams = Metadata::read_beams(&path).unwrap();
-        assert_eq!(beams.beams_deg(), ROWS_DEG);
+        assert_eq!(beams.beams_deg, ROWS_DEG);
         assert_eq!(beams.range_unit_m(), unit_m);
         let error = Metadata::read(&path).unwrap_err().to_string();
         assert!(error.contains(&format!("unknown lidar profile `{profile}`")), "{error}");
@@ -368,49 +368,37 @@ fn metadata_that_make_no_sense_are_named() {
         *metadata.pointer_mut(pointer).unwrap() = value;
         parse(&metadata).unwrap_err()
     };
-    let format = |name: &str, value: Value| said(&format!("/data_format/{name}"), value);
-    for (found, expected) in [
+    for (pointer, value, expected) in [
         (
-            format("columns_per_frame", json!(1 << 20)),
-            "columns_per_frame: expected a whole number, 1 to 4096, found 1048576",
+            "data_format/columns_per_frame",
+            json!(1 << 20),
+            "expected a whole number, 1 to 4096, found 1048576",
         ),
+        ("data_format/columns_per_packet", json!(65), "expected a whole number, 1 to 64, found 65"),
         (
-            format("columns_per_packet", json!(65)),
-            "columns_per_packet: expected a whole number, 1 to 64, found 65",
+            "data_format/udp_profile_lidar",
+            json!("RNG1"),
+            "unknown lidar profile `RNG1`, expected one of LEGACY,",
         ),
-        (format("pixels_per_column", json!(2)), "beam_altitude_angles: expected 2 values, found 3"),
+        ("data_format/udp_profile_lidar", json!(1), "expected a name, found 1"),
+        ("data_format/column_window", json!([0, 32]), "expected a whole number, 0 to 31, found 32"),
+        ("lidar_mode", json!("1024x10"), "expected a mode such as 32x10, found \"1024x10\""),
+        ("beam_azimuth_angles", json!([0, "x", 0]), "expected a number, -360 to 360, found \"x\""),
+        ("lidar_origin_to_beam_origin_mm", json!(1e9), "expected a number, -10000"),
         (
-            format("udp_profile_lidar", json!("RNG1")),
-            "udp_profile_lidar: unknown lidar profile `RNG1`, expected one of LEGACY,",
-        ),
-        (format("udp_profile_lidar", json!(1)), "udp_profile_lidar: expected a name, found 1"),
-        (
-            format("column_window", json!([0, 32])),
-            "column_window: expected a whole number, 0 to 31, found 32",
-        ),
-        (
-            said("/data_format", json!("error")),
-            "data_format.columns_per_frame: expected a value, found none",
-        ),
-        (
-            said("/lidar_mode", json!("1024x10")),
-            "lidar_mode: expected a mode such as 32x10, found \"1024x10\"",
-        ),
-        (
-            said("/beam_azimuth_angles", json!([0, "x", 0])),
-            "beam_azimuth_angles: expected a number, -360 to 360, found \"x\"",
-        ),
-        (
-            said("/lidar_origin_to_beam_origin_mm", json!(1e9)),
-            "lidar_origin_to_beam_origin_mm: expected a number, -10000",
-        ),
-        (
-            said("/lidar_to_sensor_transform", json!(vec![0; 16])),
-            "lidar_to_sensor_transform: expected a rotation and a translation, found [0,0",
+            "lidar_to_sensor_transform",
+            json!(vec![0; 16]),
+            "expected a rotation and a translation, found [0,0",
         ),
     ] {
-        assert!(found.starts_with("m.json: ") && found.contains(expected), "{found}");
+        let expected = format!("m.json: {}: {expected}", pointer.replace('/', "."));
+        let found = said(&format!("/{pointer}"), value);
+        assert!(found.starts_with(&expected), "{found}");
     }
+    let pixels = said("/data_format/pixels_per_column", json!(2));
+    assert_eq!(pixels, "m.json: beam_altitude_angles: expected 2 values, found 3");
+    let none = said("/data_format", json!("error"));
+    assert_eq!(none, "m.json: data_format.columns_per_frame: expected a value, found none");
     let error = Metadata::parse("{", Path::new("m.json")).unwrap_err().to_string();
     assert!(error.starts_with("m.json: metadata: expected JSON: EOF"), "{error}");
     let error = Metadata::parse(&" ".repeat(5 << 20), Path::new("m.json")).unwrap_err().to_string();

@@ -7,8 +7,6 @@ mod clouds;
 mod foreign;
 #[cfg(all(feature = "npz", feature = "dataset"))]
 mod labelled_sets;
-#[cfg(feature = "hdf5")]
-mod modelnet_h5;
 #[cfg(feature = "npz")]
 mod numpy;
 #[cfg(feature = "pcap")]

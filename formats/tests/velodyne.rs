@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use formats::hash::Hashing;
 use formats::pcap;
+use formats::turns::read_turns;
 use formats::velodyne::{Decoder, Header, Model, count_returns, read_turn};
 use formats::vlp32c::{Returns, Revolution, write};
 use formats::{FormatError, Scan, Senders};
@@ -151,7 +152,7 @@ fn a_turn_that_was_written_is_read_to_the_units_of_its_packets() {
 
 /// Headers by <https://www.tcpdump.org/linktypes.html>.
 #[test]
-fn what_carries_the_packets_changes_nothing() {
+fn links_of_packets_change_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let file = capture(folder.path(), Returns::Strongest);
     let expected = read_turn(&file, &mut Senders::default()).unwrap();
@@ -185,7 +186,7 @@ fn what_carries_the_packets_changes_nothing() {
     let path = need!(shared_data("bug_inputs/linux_cooked.pcap"));
     let mut packets = 0;
     pcap::read(&path, |packet| {
-        assert_eq!((packet.port, packet.payload.len()), (2368, 1206));
+        assert_eq!((packet.sender.ports[1], packet.payload.len()), (2368, 1206));
         packets += 1;
         ControlFlow::Continue(())
     })
@@ -324,7 +325,7 @@ fn a_turn_ends_within_a_packet() {
 }
 
 #[test]
-fn what_a_capture_lacks_is_told() {
+fn missing_packets_are_counted() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("x.pcap");
     let frames = frames(&fs::read(capture(folder.path(), Returns::Strongest)).unwrap());
@@ -372,7 +373,7 @@ fn what_a_capture_lacks_is_told() {
 /// A second sensor of the model at another address, whose ranges are the first's plus 16.384 m, and
 /// another program of the network.
 #[test]
-fn of_two_sensors_one_is_read() {
+fn one_of_two_sensors_is_read() {
     let folder = tempfile::tempdir().unwrap();
     let alone = capture(folder.path(), Returns::Strongest);
     let path = folder.path().join("two.pcapng");
@@ -417,7 +418,7 @@ fn of_two_sensors_one_is_read() {
 /// The same two sensors behind one address: the second's packets go to another port, or come from
 /// another one.
 #[test]
-fn sensors_of_one_address_are_told_apart_by_their_ports() {
+fn ports_distinguish_sensors_of_one_address() {
     let folder = tempfile::tempdir().unwrap();
     let alone = capture(folder.path(), Returns::Strongest);
     let path = folder.path().join("two.pcapng");
@@ -461,7 +462,7 @@ fn sensors_of_one_address_are_told_apart_by_their_ports() {
 }
 
 #[test]
-fn what_is_no_turn_is_named() {
+fn incomplete_turns_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let path = capture(folder.path(), Returns::Strongest);
     let whole = fs::read(&path).unwrap();
@@ -481,20 +482,133 @@ fn what_is_no_turn_is_named() {
     let expected = ": packets: expected a turn of a VLP-16 or VLP-32C, found 167.2 degrees of one";
     assert_eq!(found, format!("{expected} among 70 UDP packets"));
     assert!(error(&whole[..FILE]).ends_with("found none among 0 UDP packets"));
+    let mut flawed = whole.clone();
+    flawed[FILE..]
+        .chunks_mut(FRAME + PROTOCOLS + 1206)
+        .for_each(|frame| frame[FRAME + PROTOCOLS] = 0);
+    let found = error(&flawed);
+    let expected =
+        "of them flawed and not used (the first, UDP packet 0: block 0: expected the flag";
+    assert!(found.contains("found none among 151 UDP packets, 151 of them flawed"), "{found}");
+    assert!(found.contains(expected), "{found}");
+}
+
+#[test]
+fn a_flawed_packet_is_skipped_and_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let whole = fs::read(capture(folder.path(), Returns::Strongest)).unwrap();
+    let path = folder.path().join("x.pcap");
     let second = FILE + 2 * FRAME + 2 * PROTOCOLS + 1206;
-    let changed = |at: usize, byte: u8| {
+    let without: Vec<_> =
+        [0].into_iter().chain(2..151).map(|i| frames(&whole)[i].clone()).collect();
+    fs::write(&path, classic(1, &without, 65_535)).unwrap();
+    let expected = read_turn(&path, &mut Senders::default()).unwrap().0;
+    for (at, byte, flaw) in [
+        (0, 0, "block 0: expected the flag ff ee"),
+        (3, 0xff, "block 0: expected an azimuth below 36000"),
+        (1204, 0, "expected the return mode 0x37"),
+        (1205, 0x21, "expected a packet of a VLP-16"),
+        (1205, 0x22, "expected a packet of a vlp32c, found one of a vlp16"),
+    ] {
         let mut bytes = whole.clone();
-        bytes[at] = byte;
-        error(&bytes)
+        bytes[second + at] = byte;
+        fs::write(&path, bytes).unwrap();
+        let (scan, counts) = read_turn(&path, &mut Senders::default()).unwrap();
+        assert!(scan.positions == expected.positions, "{flaw}");
+        let (number, found) = counts.first_flawed.unwrap();
+        assert!((counts.flawed, number, found.starts_with(flaw)) == (1, 1, true), "{found}");
+        assert!(count_returns(&path).unwrap_err().to_string().contains("UDP packet 1"));
+        let mut n = 0;
+        let (_, counts) = read_turns(&path, None, &mut Senders::default(), |_| {
+            n += 1;
+            ControlFlow::Continue(())
+        })
+        .unwrap();
+        assert_eq!((counts.flawed, n), (1, expected.len()), "{flaw}");
+    }
+}
+
+/// Frames of a VLP-16 at 1266 rpm that sends `width` degrees clockwise from `from`, and sees a wall 10 m
+/// away with every laser. Packets are filled with the blocks that it sends, as those of the sensor are, so
+/// that some go on behind what is not sent. Also the number of points of each pass.
+fn sector(headers: &[u8], from: f64, width: f64, passes: u32) -> (Vec<Vec<u8>>, Vec<usize>) {
+    const STEP_DEG: f64 = 0.84;
+    let (mut blocks, mut counts) = (Vec::new(), vec![0; passes as usize]);
+    for k in 0..(f64::from(passes) * 360.0 / STEP_DEG) as u32 {
+        let ahead = f64::from(k) * STEP_DEG;
+        if ahead % 360.0 < width {
+            blocks.push((((from + ahead) * 100.0).round() as u32 % 36_000, f64::from(k) * 110.592));
+            counts[(ahead / 360.0) as usize] += 32;
+        }
+    }
+    // What does not fill a packet is not sent yet.
+    let rest = blocks.chunks_exact(12).remainder().len();
+    *counts.last_mut().unwrap() -= 32 * rest;
+    let frame = |group: &[(u32, f64)]| {
+        let mut packet = standing(0x22, 2);
+        for (block, (azimuth, _)) in packet.chunks_mut(100).zip(group) {
+            block[2..4].copy_from_slice(&(*azimuth as u16).to_le_bytes());
+            block[4..].chunks_mut(3).for_each(|it| it[..2].copy_from_slice(&5000u16.to_le_bytes()));
+        }
+        packet[1200..1204].copy_from_slice(&(group[0].1.round() as u32).to_le_bytes());
+        [&headers[..PROTOCOLS], &packet].concat()
     };
-    assert_eq!(changed(second, 0), ": UDP packet 1: block 0: expected the flag ff ee");
-    assert!(changed(second + 3, 0xff).contains("block 0: expected an azimuth below 36000"));
-    assert!(changed(second + 1204, 0).contains("expected the return mode 0x37"));
-    assert!(changed(second + 1205, 0x21).contains("expected a packet of a VLP-16"));
-    let other = changed(second + 1205, 0x22);
-    assert_eq!(other, ": UDP packet 1: expected a packet of a vlp32c, found one of a vlp16");
-    let folder_of_count = folder.path().join("x.pcap");
-    assert!(count_returns(&folder_of_count).unwrap_err().to_string().contains("UDP packet 1"));
+    (blocks.chunks_exact(12).map(frame).collect(), counts)
+}
+
+#[test]
+fn a_turn_of_a_sector_is_one_pass_over_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let headers = &frames(&fs::read(capture(folder.path(), Returns::Strongest)).unwrap())[0];
+    let path = folder.path().join("sector.pcap");
+    let write = |frames: &[Vec<u8>]| fs::write(&path, classic(1, frames, 65_535)).unwrap();
+    for (from, width) in [
+        (110.0, 140.0),
+        (300.0, 120.0),
+        (90.0, 180.0),
+        (10.0, 200.0),
+        (200.0, 270.0),
+        (350.0, 340.0),
+    ] {
+        let (frames, counts) = sector(headers, from, width, 5);
+        write(&frames);
+        let (scan, found) = read_turn(&path, &mut Senders::default()).unwrap();
+        assert_eq!((scan.len(), found.missing), (counts[0], 0), "{from} {width}");
+        let ahead = |[x, y, _]: [f32; 3]| {
+            (-f64::from(y).atan2(x.into()).to_degrees() - from + 5.0).rem_euclid(360.0) - 5.0
+        };
+        let all = scan.positions.iter().map(|point| ahead(*point));
+        assert!(all.clone().fold(0.0, f64::max) < width + 1.0, "{from} {width}");
+        assert!(all.fold(360.0, f64::min) > -1.0, "{from} {width}");
+        let last = scan.time_s.unwrap().into_iter().fold(0.0, f32::max);
+        let pass_s = width / 0.84 * 110.592e-6;
+        assert!((f64::from(last) - pass_s).abs() < 3e-4, "{from} {width}: {last} {pass_s}");
+
+        let mut turns = vec![0; counts.len()];
+        let (_, found) = read_turns(&path, None, &mut Senders::default(), |turned| {
+            turns[turned.turn as usize] += 1;
+            ControlFlow::Continue(())
+        })
+        .unwrap();
+        assert_eq!((turns, found.missing), (counts.clone(), 0), "{from} {width}");
+
+        // A capture that begins within a pass has the next one, and a lost packet of it is counted.
+        let mut late = frames[5..].to_vec();
+        write(&late);
+        assert_eq!(read_turn(&path, &mut Senders::default()).unwrap().0.len(), counts[1]);
+        late.remove(counts[0].div_ceil(12 * 32) - 5 + 4);
+        write(&late);
+        let (scan, found) = read_turn(&path, &mut Senders::default()).unwrap();
+        assert_eq!((scan.len(), found.missing), (counts[1] - 12 * 32, 1), "{from} {width}");
+    }
+}
+
+#[test]
+fn a_capture_of_a_sector_from_the_developers_is_read_pass_by_pass() {
+    let path = need!(shared_data("bug_inputs/fov140_vlp16.pcap"));
+    let (scan, counts) = read_turn(&path, &mut Senders::default()).unwrap();
+    // 167 blocks of 32 firings.
+    assert_eq!((scan.len(), counts.missing), (5344, 0));
 }
 
 #[test]

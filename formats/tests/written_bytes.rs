@@ -4,7 +4,8 @@
 use formats::Scan;
 use formats::hash::{FileHash, Hashing};
 use formats::packed::PackedWriter;
-use formats::scan_file::{ScanFormat, write_scan};
+use formats::scan_file::ScanFormat::{Csv, Npz, Ply};
+use formats::scan_file::write_scan;
 
 /// A scan of `n` points with every attribute.
 pub fn scan(n: usize, origin: [f64; 3]) -> Scan {
@@ -51,44 +52,19 @@ fn a_scan_is_written_as_it_ever_was() {
             normal: all.normal,
             ..Scan::default()
         };
-        let told = write_scan(&path, format, Hashing::Sha256, &scan).unwrap();
-        assert_eq!(told, Hashing::Sha256.of_file(&path).unwrap(), "{format} of {n} points");
-        told
+        let found = write_scan(&path, format, Hashing::Sha256, &scan).unwrap();
+        assert_eq!(found, Hashing::Sha256.of_file(&path).unwrap(), "{format} of {n} points");
+        found
     };
-    let far = [1e7, -0.5, 0.0];
+    let (near, far) = ([0.0; 3], [1e7, -0.5, 0.0]);
     for (format, n, origin, hash) in [
-        (
-            ScanFormat::Npz,
-            0,
-            [0.0; 3],
-            "0d6ff950c58f740063e80664529d15a95221ca297daa6fd50fbe0f24d9cbee20",
-        ),
-        (
-            ScanFormat::Npz,
-            1,
-            far,
-            "e8c0b6dd5816b900bbb08300ce0dd56968c6b24a2b4d0b844b5d7fb23a2c0ec3",
-        ),
-        (
-            ScanFormat::Npz,
-            5000,
-            [0.0; 3],
-            "19b2c2e9b7f40f1073137b5f696ab4c0612a736b4e672cb834a1efd4fd0eaf15",
-        ),
-        (
-            ScanFormat::Ply,
-            5000,
-            far,
-            "1058ab91220e86d2bab9f93690951ecdac2038b541142633a361343eefa55a4d",
-        ),
-        (
-            ScanFormat::Csv,
-            5000,
-            far,
-            "f56d5af0f7e370e680e2b19154ba675b446576498af07dcea024154504289c72",
-        ),
+        (Npz, 0, near, "0d6ff950c58f740063e80664529d15a95221ca297daa6fd50fbe0f24d9cbee20"),
+        (Npz, 1, far, "e8c0b6dd5816b900bbb08300ce0dd56968c6b24a2b4d0b844b5d7fb23a2c0ec3"),
+        (Npz, 5000, near, "19b2c2e9b7f40f1073137b5f696ab4c0612a736b4e672cb834a1efd4fd0eaf15"),
+        (Ply, 5000, far, "1058ab91220e86d2bab9f93690951ecdac2038b541142633a361343eefa55a4d"),
+        (Csv, 5000, far, "f56d5af0f7e370e680e2b19154ba675b446576498af07dcea024154504289c72"),
     ] {
-        let hash = Some(FileHash::Sha256(hash.to_owned()));
+        let hash = Some(FileHash { sha256: hash.to_owned() });
         assert_eq!(hash_of(format, n, origin), hash, "{format} of {n} points");
     }
 }
@@ -104,15 +80,15 @@ fn a_packed_set_is_written_as_it_ever_was() {
             let cloud: Vec<_> = (0..64).map(|j| [i as f32, j as f32, 0.5]).collect();
             writer.push(&cloud, i % 2, &format!("mesh_{i}_v0"), 10 + i as u32).unwrap();
         }
-        let told = writer.finish(Hashing::Sha256).unwrap();
-        assert_eq!(told, Hashing::Sha256.of_file(&path).unwrap(), "{m} clouds");
-        told
+        let found = writer.finish(Hashing::Sha256).unwrap();
+        assert_eq!(found, Hashing::Sha256.of_file(&path).unwrap(), "{m} clouds");
+        found
     };
     for (m, hash) in [
         (0, "2c32501de24f92aeb91e6a6130a89f382200b2eab2fbed12e120064c76fcdd88"),
         (1, "3237d3c694e014be7d3cba50ff25ec09fc6b90c4cf635129926555b810770719"),
         (700, "827d109ef1d90f84e355adb3d754328bcefe96a1013fae67bcfe136c7778d261"),
     ] {
-        assert_eq!(hash_of(m), Some(FileHash::Sha256(hash.to_owned())), "{m} clouds");
+        assert_eq!(hash_of(m), Some(FileHash { sha256: hash.to_owned() }), "{m} clouds");
     }
 }

@@ -1,7 +1,7 @@
+use edgepuck_kernels::KernelName;
 use formats::FormatError;
 
-use crate::kernel::KernelName;
-use crate::options::{MOST_POINTS, MOST_THREADS};
+use crate::limits::{MOST_POINTS, MOST_THREADS};
 
 /// An error of loading a model or classifying a cloud.
 #[derive(Debug, thiserror::Error)]
@@ -43,9 +43,6 @@ pub enum Error {
         /// The precision.
         precision: crate::Precision,
     },
-    /// The outlier filter needs clouds in the unit sphere.
-    #[error("expected clouds normalised to unit-sphere for the outlier filter, found {0}")]
-    OutlierFilter(formats::model_card::Normalization),
     /// Arithmetic left the range of f32.
     #[error("the network overflows on this cloud: its logits are not finite")]
     Overflow,
@@ -60,11 +57,6 @@ pub enum Error {
         /// What the model has instead.
         what: &'static str,
     },
-    /// Several votes without random draws or rotations would all be the same.
-    #[error(
-        "expected the sampler random or rotations for several votes, found the sampler {0}, whose votes would all be the same"
-    )]
-    VotesWithoutDraws(crate::sampler::SamplerKind),
     /// The capacity exceeds 2^28 points.
     #[error("expected a capacity of at most {MOST_POINTS} points, found {0}")]
     TooMuchRoom(usize),

@@ -1,8 +1,8 @@
 //! Classifies clouds of points without a GPU.
 
 use clap::{CommandFactory, Parser};
-use formats::outcome::{exit_code, parsed};
 use infer_cpu::cli::{Command, run};
+use program::outcome::{exit_code, parsed};
 use std::process::ExitCode;
 
 /// Classify point clouds on a CPU with PointNet, after a Critical Points Layer or another sampler.

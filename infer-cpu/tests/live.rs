@@ -1,27 +1,19 @@
 //! The pipeline from packets to tracked objects, with lost, late, foreign and damaged packets, and
 //! with clocks that jump.
 
-#![expect(clippy::unwrap_used, reason = "tests")]
-
-#[path = "support/street.rs"]
-#[allow(dead_code, reason = "the tests of the program use all of it")]
-mod street;
-
-#[path = "live/content.rs"]
 mod content;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use formats::ouster::Metadata;
-use formats::rng::StreamKey;
-use glam::DVec3;
-use infer_cpu::live::{Arrival, Counts, EgoMotion, LiveOptions, Object, Pipeline};
-use infer_cpu::{Classifier, Options};
-use street::{
+use crate::street::{
     OUSTER_PACKETS_PER_S, PACKET, PACKET_S, PACKETS_PER_S, Thing, ouster_metadata, ouster_packet,
     packets, street,
 };
+use formats::ouster::Metadata;
+use formats::rng::StreamKey;
+use infer_cpu::live::{Arrival, Counts, LiveOptions, Object, Pipeline, Pose, Trajectory};
+use infer_cpu::{Classifier, Options};
 
 /// Unix time at the first packet, seconds.
 const START_S: f64 = 1.7e9;
@@ -104,7 +96,7 @@ fn each_object_keeps_its_track_and_has_its_velocity() {
 }
 
 #[test]
-fn an_object_is_reported_from_the_sighting_that_is_asked_for() {
+fn objects_are_reported_from_min_turns_on() {
     let sent = packets(&street(), 5_000, PACKETS_PER_S);
     let objects = run(&mut pipeline(&all()), on_time(&sent));
     assert_eq!(LiveOptions::default().min_turns, 2);
@@ -209,7 +201,7 @@ fn a_sensor_that_restarts_and_clocks_that_jump_begin_a_new_stream() {
 }
 
 #[test]
-fn time_that_runs_backwards_answers_nothing_and_harms_nothing() {
+fn packets_with_descending_times_are_ignored() {
     let sent = packets(&street(), 5_000, PACKETS_PER_S);
     let mut pipeline = pipeline(&all());
     let backwards = sent.iter().rev().enumerate();
@@ -221,7 +213,7 @@ fn time_that_runs_backwards_answers_nothing_and_harms_nothing() {
 }
 
 #[test]
-fn foreign_packets_are_counted_and_each_kind_is_told_once() {
+fn foreign_packets_are_counted_and_each_kind_is_reported_once() {
     let sent = packets(&street(), 5_000, PACKETS_PER_S);
     let key = StreamKey::new(0, "foreign packets", 0);
     let noise: Vec<u8> = (0..PACKET).map(|i| (key.unit(i as u64) * 256.0) as u8).collect();
@@ -264,16 +256,38 @@ fn a_sensor_that_is_replaced_by_another_model_is_taken_after_a_while() {
     assert!(objects.len() > 30, "{}", objects.len());
 }
 
+#[test]
+fn tracks_end_where_another_sensor_took_over() {
+    let mut sent = packets(&street(), 5_000, 3 * PACKETS_PER_S);
+    // For 310 packets another model sends; 300 are needed for either to be taken, which completes clusters.
+    let taken_over = PACKETS_PER_S;
+    sent[taken_over..taken_over + 310].iter_mut().for_each(|packet| packet[1205] = 0x28);
+    let mut pipeline = pipeline(&all());
+    let mut tracks = [BTreeSet::new(), BTreeSet::new()];
+    for (i, (time_s, packet)) in on_time(&sent).enumerate() {
+        pipeline.take(packet, Arrival { time_s: START_S + time_s, moment: None });
+        let tracks = &mut tracks[usize::from(i >= taken_over)];
+        pipeline.answer(|object| {
+            if !(taken_over..taken_over + 620).contains(&i) {
+                tracks.insert(object.track);
+            }
+        });
+    }
+    assert_eq!(pipeline.counts().restarts, 2);
+    assert!(tracks.iter().all(|tracks| !tracks.is_empty()));
+    assert!(tracks[0].is_disjoint(&tracks[1]), "{tracks:?}");
+}
+
 /// The sensor drives through a static world, which moves relative to it.
 #[test]
-fn with_the_sensors_motion_what_stands_still_stands_still() {
+fn static_objects_stand_still_in_the_world() {
     // In the sensor's frame, static things move backwards.
     let things: Vec<_> =
         street()[..1].iter().map(|thing| Thing { velocity: [-4.0, 0.0], ..*thing }).collect();
     let sent = packets(&things, 5_000, 2 * PACKETS_PER_S);
     let mut options = all();
-    options.ego_motion =
-        Some(EgoMotion::Twist { linear_m_s: DVec3::X * 4.0, angular_rad_s: DVec3::ZERO });
+    let poses = [0.0, 10.0].map(|after_s| (START_S + after_s, Pose::at([4.0 * after_s, 0.0, 0.0])));
+    options.ego_motion = Some(Trajectory::new(poses.to_vec()).unwrap());
     let objects = run(&mut pipeline(&options), on_time(&sent));
     let parked: Vec<_> =
         objects.iter().filter(|o| (o.position_m[0] - 8.0).abs() < 1.0 && o.turn > 5).collect();
@@ -288,7 +302,7 @@ fn with_the_sensors_motion_what_stands_still_stands_still() {
 }
 
 #[test]
-fn clusters_of_few_points_are_reported_and_not_guessed() {
+fn clusters_of_few_points_have_no_class() {
     let sent = packets(&street(), 5_000, PACKETS_PER_S);
     let mut options = all();
     options.min_points = 1_000_000;

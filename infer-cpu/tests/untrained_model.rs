@@ -1,11 +1,7 @@
 //! Checks that the bundled model with random weights is the generated one. `UPDATE_GOLDEN=1`
 //! rewrites it.
 
-#![expect(clippy::unwrap_used, reason = "tests")]
-
-#[path = "support/tiny_model.rs"]
-mod tiny_model;
-
+use crate::tiny_model;
 use std::path::Path;
 
 use formats::model_card::ModelCard;

@@ -138,7 +138,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as shapes:
         meshes = Path(sys.argv[1] if len(sys.argv) > 1 else shapes)
         if len(sys.argv) == 1:
-            command = [sys.executable, "-m", "edgepuck", "gen-shapes", "--out", shapes]
+            command = [sys.executable, "-m", "edgepuck", "gen-dataset", "--save-meshes", shapes]
             subprocess.run(command, check=True, capture_output=True)
         rounds: dict[str, list[float]] = {}
         for _ in range(ROUNDS):

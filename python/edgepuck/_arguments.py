@@ -33,6 +33,14 @@ def whole(name: str, value: Any, least: int, most: int) -> int:
     return number
 
 
+def real(name: str, value: Any) -> float:
+    """`value` as a number."""
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise Error(f"{name}: expected a number, found {value!r}") from None
+
+
 def seed(value: Any) -> int:
     """`value` as a seed."""
     return whole("seed", value, 0, 2**64 - 1)
@@ -57,6 +65,19 @@ def check_extension(path: str | os.PathLike[str], extension: str) -> None:
     """Check that the name of the file to write has this extension."""
     if not os.fspath(path).lower().endswith(extension):
         raise Error(f"path: expected a name with {extension}, found {os.fspath(path)}")
+
+
+def write(path: str | os.PathLike[str], content: bytes) -> None:
+    """Write a file, which is complete or not there."""
+    unfinished = f"{os.fspath(path)}.{os.getpid()}"
+    try:
+        with open(unfinished, "wb") as file:
+            file.write(content)
+        os.replace(unfinished, path)
+    except OSError as error:
+        if os.path.exists(unfinished):
+            os.remove(unfinished)
+        raise Error(f"{os.fspath(path)}: {error.strerror}") from None
 
 
 def run(words: Sequence[str], folder: str) -> None:

@@ -39,8 +39,8 @@ class Classifier(Remade):
             `set-64` is slower and more accurate), `shapes-rotational-64` (scans of the built-in
             shapes) or `street-128` (cars and persons among other things), or the path of a model
             file.
-        precision: The precision: f32, f32-fc16, f16 or i8.
-        sampler: The sampler of points: all, random, fps, voxel or cpl. By default, as in training.
+        precision: The precision: f32 or i8.
+        sampler: The sampler of points: all, random, fps or cpl. By default, as in training.
         points: The number of points that the sampler chooses.
 
     Raises:

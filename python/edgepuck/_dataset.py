@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _arguments, _edgepuck
-from ._arguments import number, place, whole
+from ._arguments import number, place, real, whole
 
 Range = float | tuple[float, float]
 
@@ -87,28 +87,29 @@ class Dataset:
     ) -> None:
         if not (effects is None or isinstance(effects, (str, os.PathLike))):
             raise _edgepuck.Error(f"effects: expected the path of a TOML file, found {type(effects).__name__}")
-        flags = {
+        if effects is not None and (noise is not None or dropout is not None):
+            raise _edgepuck.Error("effects: cannot be used with noise or dropout")
+        settings = {
             "sensor": place(sensor),
-            "points": points,
-            "views": views,
-            "distance": _from_to(distance),
-            "elevation": _from_to(elevation),
-            "azimuth-jitter": azimuth_jitter,
+            "points": whole("points", points, 1, 2**24),
+            "views": whole("views", views, 1, 2**32 - 1),
+            "distance": _from_to("distance", distance),
+            "elevation": _from_to("elevation", elevation),
+            "azimuth_jitter": real("azimuth_jitter", azimuth_jitter),
             "seed": _arguments.seed(seed),
             "normalize": normalize,
             "units": units,
             "up": up,
-            "min-points": min_points,
+            "min_points": whole("min_points", min_points, 1, 2**32 - 1),
             "effects": None if effects is None else place(effects),
-            "noise": noise,
-            "dropout": dropout,
+            "noise": None if noise is None else real("noise", noise),
+            "dropout": None if dropout is None else real("dropout", dropout),
         }
-        words = [f"--{flag}={value}" for flag, value in flags.items() if value is not None]
         self._seed, self._transform = seed, transform
         cache = whole("cache_mb", cache_mb, 0, 2**30) << 20
         if isinstance(attributes, str):
             raise _edgepuck.Error(f"attributes: expected a list of names, found {attributes!r}")
-        self._arguments = (os.path.abspath(meshes), split, words, list(attributes), cache, adapter)
+        self._arguments = (os.path.abspath(meshes), split, settings, list(attributes), cache, adapter)
         self._clouds = _edgepuck.Clouds(*self._arguments)
         # Shared memory, so that workers that persist over epochs see the current epoch.
         self._epoch = multiprocessing.RawValue("Q", 0)
@@ -176,5 +177,9 @@ class Dataset:
         self._epoch = multiprocessing.RawValue("Q", state["epoch"]) if shared is None else shared
 
 
-def _from_to(value: Range) -> str:
-    return ",".join(map(str, value)) if isinstance(value, (tuple, list)) else str(value)
+def _from_to(name: str, value: Range) -> tuple[float, float | None]:
+    if isinstance(value, (tuple, list)):
+        if len(value) != 2:
+            raise _edgepuck.Error(f"{name}: expected a number, or two, found {value!r}")
+        return real(name, value[0]), real(name, value[1])
+    return real(name, value), None

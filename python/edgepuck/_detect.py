@@ -57,7 +57,7 @@ def detect(
             columns are ignored.
         model: `street-128`, or the path of a model of clusters.
         rings: The ring of each point, from below, [n]. A scan has its own.
-        precision: The precision of the network: f32, f32-fc16, f16 or i8.
+        precision: The precision of the network: f32 or i8.
         min_points: The smallest number of points of an object.
         min_confidence: The smallest confidence of an object; 0 returns all that resemble a known class.
 

@@ -12,16 +12,19 @@ __all__ = [
     "Scene",
     "Scenes",
     "Sensor",
+    "activation_ranges",
     "adapters",
     "detect",
     "main",
     "read_grey16",
+    "read_network",
     "read_points",
     "run",
     "save_scan",
     "seed_of_epoch",
     "segment",
     "set_num_threads",
+    "write_weights",
 ]
 
 class Error(ValueError): ...
@@ -41,7 +44,7 @@ class Mesh:
     def __len__(self) -> int: ...
     @property
     def scale(self) -> float: ...
-    def doubtful_size(self, units: str) -> str | None: ...
+    def odd_size(self, units: str) -> str | None: ...
     @property
     def centre(self) -> list[float]: ...
     @property
@@ -108,7 +111,7 @@ class Clouds:
         cls,
         meshes: str,
         split: str | None,
-        flags: Sequence[str],
+        settings: dict[str, Any],
         attributes: Sequence[str],
         cache_bytes: int,
         adapter: str,
@@ -143,6 +146,7 @@ class Scenes:
     def classes(self) -> list[str]: ...
     def draw(self, number: int) -> dict[str, Any]: ...
 
+def activation_ranges(model: str, clouds: str) -> str: ...
 def adapters() -> list[str]: ...
 def detect(
     cloud: NDArray[np.float32],
@@ -153,6 +157,7 @@ def detect(
     min_confidence: float,
 ) -> list[dict[str, Any]]: ...
 def read_grey16(file: str) -> NDArray[np.uint16]: ...
+def read_network(model: str) -> tuple[dict[str, str], dict[str, Any]]: ...
 def read_points(
     path: str, format: str | None, metadata: str | None, sender: str | None
 ) -> Mapping[str, Any]: ...
@@ -167,3 +172,6 @@ def segment(
     min_points: int | None,
 ) -> NDArray[np.int32]: ...
 def set_num_threads(threads: int) -> None: ...
+def write_weights(
+    path: str, tensors: Mapping[str, NDArray[np.float32]], metadata: Mapping[str, str], is_half: bool
+) -> None: ...

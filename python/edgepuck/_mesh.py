@@ -83,9 +83,9 @@ class Mesh(Remade):
     def _warn(self, what: str) -> None:
         """Warn if the unit of the source is probably another."""
         settings = self._made_of[1]
-        doubt = self._mesh.doubtful_size(settings["units"] or "m")
-        if settings["normalize"] == "none" and settings["units"] != "m" and doubt:
-            warnings.warn(f"{what}: {doubt}; `units` names another unit", stacklevel=3)
+        warning = self._mesh.odd_size(settings["units"] or "m")
+        if settings["normalize"] == "none" and settings["units"] != "m" and warning:
+            warnings.warn(f"{what}: {warning}", stacklevel=3)
 
     def __len__(self) -> int:
         """The number of triangles."""

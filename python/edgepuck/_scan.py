@@ -114,7 +114,7 @@ class Scan:
         metadata: str | os.PathLike[str] | None = None,
         sender: str | None = None,
     ) -> Scan:
-        """Read the points in a file like `edgepuck preview`: a scan, a cloud, or the first turn of a
+        """Read the points in a file like `edgepuck view`: a scan, a cloud, or the first turn of a
         capture.
 
         Args:

@@ -18,30 +18,29 @@ from ._scan import Scan, scan_of
 def scan(
     scene: _edgepuck.Scene,
     sensor: _edgepuck.Sensor,
-    *,
-    distance: float | None,
-    elevation: float | None,
-    azimuth: float | None,
-    pose: ArrayLike | None,
-    noise: float,
-    dropout: float,
-    effects: Mapping[str, Any] | None,
+    at: list[float],
+    effects: str | None,
     attributes: Iterable[str] | None,
     seed: int | None,
 ) -> Scan:
-    """Scan `scene` by `sensor`. `Scene.scan` describes the arguments."""
+    """Scan `scene` by `sensor` at a `place` with `encoded` effects. `Scene.scan` describes the others."""
     if isinstance(attributes, str):
         raise _edgepuck.Error(f"attributes: expected a list of names, found {attributes!r}")
-    around = [distance, elevation, azimuth]
-    if pose is None:
-        at = [usual if one is None else float(one) for one, usual in zip(around, (3.0, 20.0, 0.0), strict=True)]
-    elif around != [None] * 3:
-        raise _edgepuck.Error("expected a pose, or a distance, an elevation and an azimuth, found both")
-    else:
-        at = matrix(pose)
     names = None if attributes is None else list(attributes)
     key = None if seed is None else _arguments.seed(seed)
-    return scan_of(scene.scan(sensor, at, encoded(noise, dropout, effects), names, key))
+    return scan_of(scene.scan(sensor, at, effects, names, key))
+
+
+def place(
+    pose: ArrayLike | None, distance: float | None, elevation: float | None, azimuth: float | None
+) -> list[float]:
+    """The rows of the pose of a sensor, or the three numbers of a sensor that looks at the origin."""
+    around = [distance, elevation, azimuth]
+    if pose is None:
+        return [usual if one is None else float(one) for one, usual in zip(around, (3.0, 20.0, 0.0), strict=True)]
+    if around != [None] * 3:
+        raise _edgepuck.Error("expected a pose, or a distance, an elevation and an azimuth, found both")
+    return matrix(pose)
 
 
 def encoded(noise: float, dropout: float, effects: Mapping[str, Any] | None) -> str | None:

@@ -54,7 +54,7 @@ class Scene:
         names.
 
         Each node of glTF that has a mesh, and each geometry of a robot's links, is an instance with its name;
-        its label is the name of the mesh or of the link. Animated nodes move while a scan runs.
+        its label is the name of the mesh or of the link.
 
         Args:
             file: A TOML, .glb, .gltf or .urdf file.
@@ -132,7 +132,7 @@ class Scene:
     def bounds(self) -> NDArray[np.float64]:
         """The least and the largest coordinates of the instances, metres, [n, 2, 3].
 
-        Those of animated instances are at time 0.
+        Those of instances that move are at time 0.
         """
         return np.array(self._scene.bounds()).reshape(-1, 2, 3)
 
@@ -244,19 +244,9 @@ class Scene:
         Raises:
             Error: A value is out of its limits, or an attribute or effect is unknown.
         """
-        return _scanning.scan(
-            self._scene,
-            sensor_of(sensor),
-            distance=distance,
-            elevation=elevation,
-            azimuth=azimuth,
-            pose=pose,
-            noise=noise,
-            dropout=dropout,
-            effects=effects,
-            attributes=attributes,
-            seed=seed,
-        )
+        at = _scanning.place(pose, distance, elevation, azimuth)
+        wanted = _scanning.encoded(noise, dropout, effects)
+        return _scanning.scan(self._scene, sensor_of(sensor), at, wanted, attributes, seed)
 
     def cast(
         self,

@@ -27,7 +27,7 @@ class DrawnScene:
     """`class`, `position` (the middle of the footprint), `size` and `yaw_deg` of each object. The
     origin is on the ground below the sensor, and x is along the road."""
     cluster: NDArray[np.int32]
-    """The cluster of each point, numbered as by `segment`. The segmentation allows for the lowest
+    """The cluster of each point, numbered as by `ep.segment`. The segmentation allows for the lowest
     ground that the recipe can draw. [n]."""
     cluster_class: NDArray[np.int64]
     """The class of each cluster, an index into `Scenes.classes`, [n_clusters]."""
@@ -91,5 +91,5 @@ class Scenes(Remade):
         return self._scenes.classes
 
     def __getitem__(self, index: int) -> DrawnScene:
-        told = self._scenes.draw(number("scenes", index, self._length))
-        return DrawnScene(**{**told, "scan": scan_of(told["scan"])})
+        drawn = self._scenes.draw(number("scenes", index, self._length))
+        return DrawnScene(**{**drawn, "scan": scan_of(drawn["scan"])})

@@ -80,19 +80,9 @@ class Sensor(Remade):
         """
         scene = _edgepuck.Scene()
         scene.add(mesh_of(mesh), np.eye(4).ravel().tolist(), [1.0] * 3, None, None, 1.0, 0.0)
-        return _scanning.scan(
-            scene,
-            self._sensor,
-            distance=distance,
-            elevation=elevation,
-            azimuth=azimuth,
-            pose=pose,
-            noise=noise,
-            dropout=dropout,
-            effects=effects,
-            attributes=attributes,
-            seed=seed,
-        )
+        at = _scanning.place(pose, distance, elevation, azimuth)
+        wanted = _scanning.encoded(noise, dropout, effects)
+        return _scanning.scan(scene, self._sensor, at, wanted, attributes, seed)
 
     def __repr__(self) -> str:
         return f"Sensor({self.name!r})"

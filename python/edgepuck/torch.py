@@ -1,24 +1,25 @@
-"""Networks to train in PyTorch, and their export to `infer-cpu`. Only this module imports PyTorch."""
+"""Networks to train in PyTorch, and model files of their weights and of other checkpoints."""
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import re
-import tempfile
-from collections.abc import Sequence
+import warnings
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import torch
 from torch import Tensor, nn
 
-from . import _arguments, _edgepuck
+from . import _arguments, _checkpoint, _model_file
 
 
 class PointNet(nn.Module):
     """PointNet without T-Nets (Qi et al., CVPR 2017), for clouds of shape [batch, n, 3].
 
-    The names of layers are those of yanx27's `pointnet_cls`, which `edgepuck import-weights` reads.
+    The names of layers are those of yanx27's `pointnet_cls`, which `import_weights` reads.
 
     Args:
         n_classes: The number of classes.
@@ -62,7 +63,7 @@ class SetNetwork(nn.Module):
 
     Layers that all points share come first. Each level then takes the maximum over the neighborhood of each of its
     centres, which are farthest points, and applies more shared layers to it. The maximum and the mean over the last
-    level's centres go to dense layers. Names and arithmetic are those of `edgepuck train --recipe set-64`.
+    level's centres go to dense layers. Names and arithmetic are those of infer-cpu.
 
     Args:
         n_classes: The number of classes.
@@ -214,7 +215,7 @@ def export(
         model: The network.
         path: The file, `.safetensors`.
         classes: The names of the classes in the order of the logits, all different.
-        sampler: The sampler of points: all, random, fps, voxel or cpl. The default is fps, or random for a
+        sampler: The sampler of points: all, random, fps or cpl. The default is fps, or random for a
             `SetNetwork`, which chooses its own farthest points.
         points: The number of points that the sampler chooses. The default is 64, or 1,024 for a `SetNetwork`.
         training_set: The name of the training set.
@@ -226,24 +227,82 @@ def export(
             differ, or a value is out of its limits.
     """
     _arguments.check_extension(path, ".safetensors")
-    if isinstance(classes, str) or not all(isinstance(name, str) for name in classes):
-        raise _edgepuck.Error(f"classes: expected a list of names, found {classes!r}")
+    state = _folded(model) if half else {name: value.float() for name, value in model.state_dict().items()}
+    tensors = {name: value.cpu().numpy() for name, value in state.items() if not name.endswith("num_batches_tracked")}
+    _model_file.check_classes(classes, tensors)
     is_sets = isinstance(model, SetNetwork)
-    sampler = ("random" if is_sets else "fps") if sampler is None else sampler
     points = (1024 if is_sets else 64) if points is None else _arguments.whole("points", points, 1, 2**32)
-    with tempfile.TemporaryDirectory() as folder:
-        checkpoint, names, table = (Path(folder, name) for name in ("model", "classes", "table.toml"))
-        state = _folded(model) if half else {name: value.cpu() for name, value in model.state_dict().items()}
-        torch.save({"model_state_dict": state}, checkpoint)
-        names.write_text("\n".join(classes) + "\n")
-        words = ["import-weights", checkpoint, f"--out={os.fspath(path)}", f"--classes={names}", "--overwrite"]
-        words += [f"--sampler={sampler}", f"--points={points}", "--provenance=edgepuck.torch.export"]
-        words += [] if training_set is None else [f"--training-set={training_set}"]
-        words += [] if calibrate is None else [f"--calibrate={os.fspath(calibrate)}"]
-        if isinstance(model, SetNetwork):
-            table.write_text(_table(model))
-            words += [f"--table={table}"]
-        _arguments.run([str(word) for word in words], folder)
+    sampler = ("random" if is_sets else "fps") if sampler is None else sampler
+    card = {"classes": json.dumps(list(classes)), "sampler": sampler, "points": str(points)}
+    card["provenance"] = "edgepuck.torch.export"
+    if training_set is not None:
+        card["training_set"] = training_set
+    if isinstance(model, SetNetwork):
+        card["abstractions"] = json.dumps([(n, radius) for n, radius, _ in model.levels])
+    _model_file.write(path, tensors, card, calibrate=calibrate, source="model")
+
+
+def import_weights(
+    checkpoint: str | os.PathLike[str],
+    path: str | os.PathLike[str],
+    *,
+    classes: Sequence[str] | None = None,
+    sampler: str | None = None,
+    points: int | None = None,
+    layers: Mapping[str, str] | None = None,
+    card: Mapping[str, str] | None = None,
+    calibrate: str | os.PathLike[str] | None = None,
+) -> None:
+    """Write a model file of the weights in a PyTorch checkpoint. An existing file is replaced.
+
+    The layers have the names of the repositories yanx27 (`pointnet_cls`), fxia22 or 3dcertify, or those that `layers`
+    states. The weights may be in `state_dict` or `model_state_dict` beside an optimiser's, of a network in
+    `DataParallel`, and in f16, bf16, f32 or f64. If all are in f16, so are the model's. No code of the checkpoint is
+    executed.
+
+    Args:
+        checkpoint: A file that `torch.save` wrote, in the format of zip archives or that before PyTorch 1.6.
+        path: The model file, `.safetensors`.
+        classes: The names of the classes in the order of the logits. The default is ModelNet40's for 40 logits.
+        sampler: The sampler in training: all, random, fps or cpl. The default is the repository's.
+        points: The number of points that the sampler chose. The default is the repository's.
+        layers: Our name of each layer by its name in the checkpoint, such as `{"encoder.{i}": "feat.conv{i}"}`, where
+            `{i}` is any number. Trunks are named `feat.conv1`, `feat.bn1`, ..., T-Nets `feat.stn.conv1` and
+            `feat.fstn.conv1`, and heads `fc1`, `bn1`, ....
+        card: More of what the model file says of the network, by its keys: `normalization` (unit-sphere or none),
+            `pooled` (relu if a ReLU precedes the pooling, or linear), `fps_start` (first or farthest), `training_set`,
+            `accuracy`, `provenance` and others. The default provenance is the checkpoint's name and SHA-256.
+        calibrate: A packed NPZ file of clouds that the network was trained on, to measure the ranges that int8 needs.
+
+    Raises:
+        Error: The checkpoint cannot be read, has other layers, or makes no network; a value is out of its limits; or
+            the file cannot be written.
+    """
+    _arguments.check_extension(path, ".safetensors")
+    read = _checkpoint.read(checkpoint)
+    names, theirs = read.named(layers)
+    tensors = {name: tensor.numpy() for name, tensor in read.values(theirs).items()}
+    stated = dict(names.card)
+    if sampler is not None and sampler != stated.get("sampler"):
+        stated = {key: value for key, value in stated.items() if key not in ("points", "fps_start")}
+        stated["sampler"] = sampler
+    if points is not None:
+        stated["points"] = str(_arguments.whole("points", points, 1, 2**32))
+    if classes is not None:
+        _model_file.check_classes(classes, tensors)
+    elif len(names.classes) == _model_file.n_logits(tensors):
+        classes = names.classes
+    else:
+        n = _model_file.n_logits(tensors)
+        warnings.warn(f"{read.path}: {n} classes without names: the argument classes names them", stacklevel=2)
+    if classes is not None:
+        stated["classes"] = json.dumps(list(classes), ensure_ascii=False)
+    if read.accuracy is not None:
+        stated["accuracy"] = read.accuracy
+    digest = hashlib.sha256(Path(checkpoint).read_bytes()).hexdigest()
+    stated["provenance"] = f"{Path(checkpoint).name}, SHA-256 {digest}"
+    stated |= card or {}
+    _model_file.write(path, tensors, stated, calibrate=calibrate, source=read.path, their_names=theirs)
 
 
 def _folded(model: nn.Module) -> dict[str, Tensor]:
@@ -260,12 +319,3 @@ def _folded(model: nn.Module) -> dict[str, Tensor]:
             bias = (bias - norm.running_mean.double()) * scale + norm.bias.detach().double()
         folded[f"{name}.weight"], folded[f"{name}.bias"] = weight.half().cpu(), bias.half().cpu()
     return folded
-
-
-def _table(model: SetNetwork) -> str:
-    """The importer's table for `model`, whose layers have the importer's names already."""
-    layers = sorted({name.rpartition(".")[0] for name in model.state_dict()})
-    lines = [f'"{layer}" = "{layer}"' for layer in layers]
-    abstractions = json.dumps([(n, radius) for n, radius, _ in model.levels])
-    card = [f'abstractions = "{abstractions}"', 'normalization = "unit-sphere"']
-    return "\n".join(['name = "edgepuck.torch.SetNetwork"', "[layers]", *lines, "[card]", *card]) + "\n"

@@ -1,11 +1,11 @@
 //! Rust's lists as NumPy arrays, without a copy, and arrays as lists.
 
 use crate::error::{raised, warn};
-use edgepuck_program::points::PointsArgs;
-use edgepuck_segment::doubtful_axes;
+use edgepuck_segment::other_axis_up;
 use formats::Scan;
-use formats::cloud_file::judge_sweep;
 use formats::hash::Hashing;
+use formats::plausible::judge_sweep;
+use formats::points_file::PointsReader;
 use formats::scan::{Attribute, ColumnSlot};
 use formats::scan_file::{ScanFormat, write_scan};
 use numpy::ndarray::Array2;
@@ -32,9 +32,9 @@ pub fn points(array: &PyReadonlyArray2<'_, f32>) -> PyResult<Vec<[f32; 3]>> {
 pub fn sweep(py: Python<'_>, array: &PyReadonlyArray2<'_, f32>) -> PyResult<Vec<[f32; 3]>> {
     let points = points(array)?;
     let remedy = "subtract the sensor's position before rounding to 32 bits, or give metres";
-    let doubt = judge_sweep(points.iter().map(|point| point.map(f64::from)), remedy)
+    let warning = judge_sweep(points.iter().map(|point| point.map(f64::from)), remedy)
         .map_err(|(part, cause)| raised(format!("{part}: {cause}")))?;
-    warn(py, doubt.or_else(|| doubtful_axes(&points)).as_slice())?;
+    warn(py, warning.or_else(|| other_axis_up(&points)).as_slice())?;
     Ok(points)
 }
 
@@ -68,7 +68,7 @@ fn columns(py: Python<'_>, mut scan: Scan) -> PyResult<Bound<'_, PyDict>> {
     Ok(columns)
 }
 
-/// The columns of the points in a file, which [`PointsArgs::read`] reads.
+/// The columns of the points in a file, which [`PointsReader::read`] reads.
 #[pyfunction]
 pub fn read_points<'py>(
     py: Python<'py>,
@@ -81,8 +81,9 @@ pub fn read_points<'py>(
     let from = sender.map(str::parse).transpose();
     let from =
         from.map_err(|_| raised(format!("sender: expected an address, found {sender:?}")))?;
-    let read = py.detach(|| PointsArgs { format, metadata, from }.read(&path));
-    let read = read.map_err(raised)?;
+    let read = py.detach(|| PointsReader { format, metadata, from }.read(&path));
+    let (read, warnings) = read.map_err(raised)?;
+    warn(py, &warnings)?;
     if read.is_empty() {
         warn(py, &[format!("{}: holds no points", path.display())])?;
     }

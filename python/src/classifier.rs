@@ -1,6 +1,6 @@
 use crate::arrays::points;
 use crate::error::{raised, warn};
-use formats::cloud_file::{Unlike, judge_object};
+use formats::plausible::{Unlike, judge_object};
 use infer_cpu::Options;
 use infer_cpu::sampler::SamplerSpec;
 use numpy::{IntoPyArray, PyReadonlyArray2};
@@ -68,13 +68,13 @@ impl Classifier {
             classifier.classify_on_ground(&cloud, ground_z).cloned()
         });
         let found = found.map_err(raised)?;
-        let told = PyDict::new(py);
-        told.set_item("label", found.answer())?;
-        told.set_item("index", found.class)?;
-        told.set_item("is_unknown", found.is_unknown)?;
-        told.set_item("confidence", found.confidence())?;
-        told.set_item("logits", found.logits.clone().into_pyarray(py))?;
-        Ok(told)
+        let answer = PyDict::new(py);
+        answer.set_item("label", found.answer())?;
+        answer.set_item("index", found.class)?;
+        answer.set_item("is_unknown", found.is_unknown)?;
+        answer.set_item("confidence", found.confidence())?;
+        answer.set_item("logits", found.logits.clone().into_pyarray(py))?;
+        Ok(answer)
     }
 }
 

@@ -1,7 +1,8 @@
-use crate::error::{argument_error, raised, raised_with_causes, warn};
+use crate::error::{raised, raised_with_causes, warn};
 use crate::process::{self, LazyCaster};
-use edgepuck_dataset as dataset;
+use edgepuck_dataset::{self as dataset, Around, DatasetConfig, NOISE_M, SetConfig};
 use formats::Split;
+use formats::plausible::Warning;
 use formats::scan::Attribute;
 use numpy::ndarray::Array3;
 use numpy::{IntoPyArray, PyArray1, PyArray3};
@@ -20,37 +21,87 @@ pub struct Clouds {
     caster: LazyCaster,
 }
 
+/// A number, or the bounds between which one is drawn.
+type FromTo = (f64, Option<f64>);
+
+/// The settings of a dataset, as `gen-dataset` has them.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct Settings {
+    sensor: String,
+    points: u32,
+    views: u32,
+    distance: FromTo,
+    elevation: FromTo,
+    azimuth_jitter: f64,
+    seed: u64,
+    normalize: String,
+    units: Option<String>,
+    up: Option<String>,
+    min_points: u32,
+    effects: Option<PathBuf>,
+    noise: Option<f64>,
+    dropout: Option<f64>,
+}
+
+impl Settings {
+    /// Points have these `attributes` besides their positions.
+    fn config(self, attributes: &[Attribute]) -> Result<DatasetConfig, anyhow::Error> {
+        let around = Around {
+            count: Some(self.views),
+            distance_m: Some(self.distance),
+            elevation_deg: Some(self.elevation),
+            azimuth_jitter_deg: Some(self.azimuth_jitter),
+        };
+        let sets = vec![SetConfig::of(&self.sensor)?.seen_from(around)?];
+        let config = DatasetConfig {
+            seed: self.seed,
+            normalize: self.normalize.parse()?,
+            units: self.units.map_or(Ok(dataset::Unit::Metre), |unit| unit.parse())?,
+            up: self.up.map(|up| up.parse()).transpose()?,
+            attributes: attributes.iter().copied().collect(),
+            effects: match self.effects {
+                Some(file) => dataset::read_effects(&file)?,
+                None => {
+                    let noise_m = self.noise.unwrap_or(NOISE_M);
+                    dataset::noisy(noise_m, self.dropout.unwrap_or_default())?
+                }
+            },
+            packed_points: self.points,
+            min_points: self.min_points,
+            ..DatasetConfig::new(sets)
+        };
+        Ok(config.checked()?)
+    }
+}
+
 #[pymethods]
 impl Clouds {
-    /// The clouds that `gen-dataset` makes with `flags` of the meshes in a folder, of one split or
+    /// The clouds that `gen-dataset` makes with `settings` of the meshes in a folder, of one split or
     /// of both. Points have these attributes, in this order.
     #[new]
     fn new(
         py: Python<'_>,
         meshes: PathBuf,
         split: Option<&str>,
-        mut flags: Vec<String>,
+        settings: Settings,
         attributes: Vec<String>,
         cache_bytes: usize,
         adapter: &str,
     ) -> PyResult<Self> {
         let split: Option<Split> = split.map(str::parse).transpose().map_err(raised)?;
-        if !attributes.is_empty() {
-            flags.push(format!("--attributes={}", attributes.join(",")));
-        }
-        let config = edgepuck_program::gen_dataset::config(&flags);
-        let config = config.map_err(|error| raised(argument_error(&error)))?;
-        let n_points = config.packed_points as usize;
         let attributes = attributes.iter().map(|name| name.parse());
-        let attributes = attributes.collect::<Result<_, _>>().map_err(raised)?;
+        let attributes: Vec<Attribute> = attributes.collect::<Result<_, _>>().map_err(raised)?;
+        let config = settings.config(&attributes).map_err(raised_with_causes)?;
+        let n_points = config.packed_points as usize;
         let clouds = process::run(py, || {
             let listed = dataset::discover(&meshes, config.seed)?;
-            let doubts = dataset::doubts(&meshes, &listed).into_iter();
-            let doubts = doubts.map(|doubt| format!("{}: {doubt}", meshes.display())).collect();
-            Ok((doubts, dataset::Clouds::new(config, &listed, split, cache_bytes)?))
+            let warnings = edgepuck_mesh::tree::warnings(&meshes, &listed).into_iter();
+            let warnings = warnings.map(|warning| warning.of(meshes.display())).collect();
+            Ok((warnings, dataset::Clouds::new(config, &listed, split, cache_bytes)?))
         })?;
-        let (doubts, clouds): (Vec<String>, _) = clouds.map_err(raised_with_causes)?;
-        warn(py, &doubts)?;
+        let (warnings, clouds): (Vec<Warning>, _) = clouds.map_err(raised_with_causes)?;
+        warn(py, &warnings)?;
         Ok(Self { clouds, n_points, attributes, caster: LazyCaster::new(adapter) })
     }
 

@@ -17,12 +17,12 @@ pub fn raised(error: impl Display) -> PyErr {
 
 /// The exception for an error with causes.
 pub fn raised_with_causes(error: anyhow::Error) -> PyErr {
-    raised(formats::outcome::joined_causes(&error))
+    raised(program::outcome::joined_causes(&error))
 }
 
 /// The message of an error in flags, without their dashes: in Python they are arguments.
 pub fn argument_error(error: &anyhow::Error) -> String {
-    let text = formats::outcome::joined_causes(error);
+    let text = program::outcome::joined_causes(error);
     let cause = text.split("\n\n").next().unwrap_or_default();
     let cause = cause.trim_start_matches("error: ").trim_end().replace("'--", "'");
     let in_python =
@@ -31,8 +31,8 @@ pub fn argument_error(error: &anyhow::Error) -> String {
 }
 
 /// Gives each line to Python's `warnings`, for the line that called the package.
-pub fn warn<Line: AsRef<str>>(py: Python<'_>, lines: &[Line]) -> PyResult<()> {
+pub fn warn<Line: Display>(py: Python<'_>, lines: &[Line]) -> PyResult<()> {
     let category = py.get_type::<PyUserWarning>();
-    let text = |line: &Line| CString::new(line.as_ref().replace('\0', " ")).map_err(raised);
+    let text = |line: &Line| CString::new(line.to_string().replace('\0', " ")).map_err(raised);
     lines.iter().try_for_each(|line| PyErr::warn(py, &category, &text(line)?, 2))
 }

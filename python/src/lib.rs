@@ -4,6 +4,9 @@
 //! units of the libraries, and whatever takes long runs on the threads of this very process
 //! (`process.rs`), without Python's lock.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
 mod arrays;
 mod classifier;
 mod clouds;
@@ -11,6 +14,7 @@ mod detect;
 mod error;
 mod heights;
 mod mesh;
+mod models;
 mod process;
 mod scene;
 mod scenes;
@@ -34,6 +38,8 @@ mod _edgepuck {
     use super::heights::read_grey16;
     #[pymodule_export]
     use super::mesh::Mesh;
+    #[pymodule_export]
+    use super::models::{activation_ranges, read_network, write_weights};
     #[pymodule_export]
     use super::process::{adapters, main, run_command, set_num_threads};
     #[pymodule_export]

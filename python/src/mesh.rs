@@ -1,8 +1,9 @@
 use crate::error::{raised, warn};
 use crate::process;
+use edgepuck_mesh::frame::{Normalize, Unit, Up};
+use formats::plausible::mesh_size;
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use sim_gpu::internals::mesh::frame::{Normalize, Unit, Up};
 use std::path::PathBuf;
 
 /// A mesh in the world's frame, with its tree.
@@ -79,8 +80,10 @@ impl Mesh {
     }
 
     /// Why its source's unit is probably not `units`, if its size says so.
-    fn doubtful_size(&self, units: &str) -> PyResult<Option<String>> {
-        Ok(self.mesh.extent().doubtful_size(units.parse().map_err(raised)?))
+    fn odd_size(&self, units: &str) -> PyResult<Option<String>> {
+        let unit = units.parse().map_err(raised)?;
+        let warning = mesh_size(self.mesh.extent().size_m(), unit, "`units` names another unit");
+        Ok(warning.map(|warning| warning.to_string()))
     }
 
     /// What became the origin, in the source's units.

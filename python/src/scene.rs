@@ -11,7 +11,7 @@ use numpy::ndarray::{Array2, ArrayView1};
 use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use sim_gpu::internals::scene::check_object;
+use sim_gpu::scene_files::check_object;
 use sim_gpu::{Batch, Effects, Import, Moves, Pose};
 use std::collections::BTreeMap;
 use std::path::PathBuf;

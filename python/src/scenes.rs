@@ -1,7 +1,7 @@
-use crate::error::{raised, raised_with_causes, warn};
+use crate::error::{raised, warn};
 use crate::process;
 use crate::{arrays, segment};
-use edgepuck_scenes::{LabelledScene, Stage};
+use edgepuck_scenes::{LabelledScene, Recipe, SceneError, Stage};
 use edgepuck_segment::Settings;
 use numpy::IntoPyArray;
 use pyo3::prelude::*;
@@ -26,11 +26,11 @@ impl Scenes {
         seed: u64,
     ) -> PyResult<Self> {
         let stage = process::run(py, || {
-            let mut scenes = edgepuck_program::gen_scenes::read_recipe(&recipe)?;
+            let mut scenes = Recipe::resolve(&recipe)?;
             scenes.use_sensors(&sensors);
-            Ok(Stage::new(scenes, &recipe, meshes.as_deref(), seed)?)
+            Stage::new(scenes, &recipe, meshes.as_deref(), seed)
         })?;
-        let stage = stage.map_err(raised_with_causes)?;
+        let stage = stage.map_err(|error: SceneError| raised(error))?;
         warn(py, stage.warnings())?;
         Ok(Self { stage })
     }
@@ -47,16 +47,16 @@ impl Scenes {
         let settings = Settings::default();
         let drawn = process::run(py, || LabelledScene::new(&self.stage, number, &settings))?;
         let LabelledScene { scene, sweep, labels, clusters } = drawn.map_err(raised)?;
-        let told = PyDict::new(py);
-        told.set_item("sensor", self.stage.sensor(&scene).name())?;
-        told.set_item("cluster", segment::numbers(&labels).into_pyarray(py))?;
+        let found = PyDict::new(py);
+        found.set_item("sensor", self.stage.sensor(&scene).name())?;
+        found.set_item("cluster", segment::numbers(&labels).into_pyarray(py))?;
         let of_clusters = |of: &dyn Fn(&edgepuck_scenes::LabelledCluster) -> f32| {
             clusters.iter().map(of).collect::<Vec<_>>().into_pyarray(py)
         };
         let classes: Vec<i64> = clusters.iter().map(|cluster| cluster.label as i64).collect();
-        told.set_item("cluster_class", classes.into_pyarray(py))?;
-        told.set_item("cluster_truth_share", of_clusters(&|cluster| cluster.truth_share))?;
-        told.set_item("cluster_height", of_clusters(&|cluster| cluster.height_m))?;
+        found.set_item("cluster_class", classes.into_pyarray(py))?;
+        found.set_item("cluster_truth_share", of_clusters(&|cluster| cluster.truth_share))?;
+        found.set_item("cluster_height", of_clusters(&|cluster| cluster.height_m))?;
         let objects = PyList::empty(py);
         for (i, object) in scene.objects.iter().enumerate() {
             let of_object = PyDict::new(py);
@@ -66,8 +66,8 @@ impl Scenes {
             of_object.set_item("yaw_deg", object.yaw_rad.to_degrees())?;
             objects.append(of_object)?;
         }
-        told.set_item("objects", objects)?;
-        told.set_item("scan", arrays::cast(py, sweep.scan)?)?;
-        Ok(told)
+        found.set_item("objects", objects)?;
+        found.set_item("scan", arrays::cast(py, sweep.scan)?)?;
+        Ok(found)
     }
 }

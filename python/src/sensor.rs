@@ -3,7 +3,7 @@ use crate::process::LazyCaster;
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
-use sim_gpu::internals::sensor::SensorProfile;
+use sim_gpu::sensors::SensorProfile;
 
 /// A sensor, its beams, and what casts them.
 ///

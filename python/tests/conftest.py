@@ -1,5 +1,6 @@
-"""What all tests share: built-in meshes, and the program."""
+"""What all tests share: built-in meshes, the program, and readers of its files."""
 
+import json
 import subprocess
 import sys
 import tempfile
@@ -8,7 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-ASSETS = Path(__file__).parents[2] / "assets"
+ROOT = Path(__file__).parents[2]
+ASSETS = ROOT / "assets"
+# Data beside the checkout, on some machines.
+SHARED = ROOT.parent / "shared/data"
 
 
 def edgepuck(*words: object, code: int = 0) -> subprocess.CompletedProcess[str]:
@@ -17,6 +21,28 @@ def edgepuck(*words: object, code: int = 0) -> subprocess.CompletedProcess[str]:
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert done.returncode == code, done.stderr
     return done
+
+
+def logits(model: Path, files: list[Path], *flags: object) -> list[np.ndarray]:
+    """The logits that a model gives to clouds in files, as they are."""
+    words = ["--json", "--allow-untrained", "--model", model, "--normalize", "none"]
+    done = edgepuck("classify", *words, *flags, *files)
+    return [np.array(json.loads(line)["logits"]) for line in done.stdout.splitlines()]
+
+
+def read_safetensors(path: Path) -> tuple[dict[str, np.ndarray], dict[str, str]]:
+    """The tensors of a file in f32, by name, and its metadata."""
+    raw = path.read_bytes()
+    size = int.from_bytes(raw[:8], "little")
+    header, body = json.loads(raw[8 : 8 + size]), raw[8 + size :]
+    metadata = header.pop("__metadata__", {})
+    kinds = {"F32": "<f4", "F16": "<f2"}
+    values = {
+        name: np.frombuffer(body[slice(*of["data_offsets"])], kinds[of["dtype"]]).astype(np.float32)
+        for name, of in header.items()
+        if of["dtype"] in kinds
+    }
+    return {name: value.reshape(header[name]["shape"]) for name, value in values.items()}, metadata
 
 
 def all_around() -> "ep.Sensor":
@@ -36,7 +62,7 @@ def all_around() -> "ep.Sensor":
 def shapes(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder of built-in meshes, three to train with and one to test with of each class."""
     folder = tmp_path_factory.mktemp("shapes")
-    edgepuck("gen-shapes", "--out", folder, "--train", 3, "--test", 1)
+    edgepuck("gen-dataset", "--save-meshes", folder, "--train", 3, "--test", 1)
     return folder
 
 

@@ -28,7 +28,7 @@ def test_arrays_are_views_of_what_was_cast(cube: tuple) -> None:
     assert np.shares_memory(np.asarray(scan), scan.positions)
 
 
-def test_what_is_printed_of_a_scan_is_short(cube: tuple) -> None:
+def test_the_repr_of_a_scan_is_short(cube: tuple) -> None:
     scan = ep.Sensor("vlp32c").scan(ep.Mesh(*cube), attributes=["ring"])
     assert repr(scan) == f"<Scan of {len(scan)} points: positions, ring>"
 
@@ -82,7 +82,7 @@ def test_meshes_go_to_trimesh_where_scans_find_them() -> None:
     np.testing.assert_allclose(np.abs(2 * scan.positions / back.extents).max(axis=1), 1, atol=1e-6)
 
 
-def test_objects_are_pickled_by_what_they_were_made_of(cube: tuple) -> None:
+def test_objects_are_pickled_by_their_arguments(cube: tuple) -> None:
     mesh, lidar, classify = ep.Mesh(*cube), ep.Sensor("vlp32c"), ep.Classifier("edge-64")
     again = [pickle.loads(pickle.dumps(it)) for it in (mesh, lidar, classify)]
     scan = lidar.scan(mesh)
@@ -99,7 +99,7 @@ def test_a_classifier_knows_a_chair(shapes) -> None:
     assert 0 < found.confidence <= 1
 
 
-def test_a_mesh_keeps_what_it_was_given(cube: tuple) -> None:
+def test_a_mesh_keeps_its_arrays(cube: tuple) -> None:
     vertices = cube[0].copy()
     mesh = ep.Mesh(vertices, cube[1], normalize="none")
     vertices *= 0.1
@@ -122,7 +122,7 @@ def test_a_scan_around_a_mesh_is_segmented_from_its_sensor(cube: tuple, tmp_path
         np.testing.assert_array_equal(again.in_sensor_frame(), from_sensor)
 
 
-def test_clusters_are_numbered_and_ground_is_told() -> None:
+def test_clusters_are_numbered_and_ground_is_minus_1() -> None:
     scene = ep.Scenes("street", seed=2)[4]
     assert scene.cluster.max() + 1 == len(scene.cluster_class)
     assert {-1, 0} <= set(scene.cluster)
@@ -230,7 +230,7 @@ def test_a_scan_is_saved_as_its_extension_says(cube: tuple, tmp_path: Path) -> N
     np.testing.assert_array_equal(first, scan.positions[0])
 
 
-def test_points_are_read_in_the_format_that_their_name_or_the_caller_tells(tmp_path: Path) -> None:
+def test_points_are_read_in_the_format_of_the_name_or_the_argument(tmp_path: Path) -> None:
     points = np.random.default_rng(0).normal(size=(50, 5)).astype(np.float32)
     points[:, 4] = np.arange(50) % 32
     points.tofile(tmp_path / "a.bin")

@@ -126,7 +126,7 @@ def test_many_instances_move_at_once_and_stay_so_when_pickled() -> None:
         ([1, 1], np.stack([np.eye(4)] * 2), "instance: expected each instance once, found 1 twice"),
     ],
 )
-def test_of_many_instances_all_move_or_none(numbers, poses, message: str) -> None:
+def test_many_instances_all_move_or_none(numbers, poses, message: str) -> None:
     scene, _ = world()
     before = scene.cast(SENSOR, np.eye(4)[None]).ranges
     with pytest.raises(ep.Error) as caught:
@@ -147,7 +147,7 @@ def test_of_many_instances_all_move_or_none(numbers, poses, message: str) -> Non
         (np.eye(4)[None], ([5], np.eye(4)[None, None]), "one of 2 instances, found 5"),
     ],
 )
-def test_what_does_not_fit_is_named(poses, move, message: str) -> None:
+def test_wrong_arguments_are_named(poses, move, message: str) -> None:
     scene, _ = world()
     with pytest.raises(ep.Error) as caught:
         scene.cast(SENSOR, poses, move=move)

@@ -82,7 +82,7 @@ FLOOR = np.stack([*np.meshgrid(*[np.linspace(-9.0, 9.0, 90)] * 2), np.full((90, 
         (lambda: ep.Scene().scan("vlp32c"), "expected an edgepuck.Sensor, found str"),
     ],
 )
-def test_what_cannot_be_used_is_named(make, message: str) -> None:
+def test_wrong_arguments_are_named(make, message: str) -> None:
     with pytest.raises(ep.Error, match="(?s)") as caught:
         make()
     assert message in str(caught.value)
@@ -98,18 +98,18 @@ def test_what_cannot_be_used_is_named(make, message: str) -> None:
         (FLOOR[:, [0, 2, 1]], "if y does: expected the sensor's frame, z up"),
     ],
 )
-def test_a_sweep_in_another_unit_or_frame_is_told(points: np.ndarray, message: str) -> None:
+def test_a_sweep_in_another_unit_or_frame_warns(points: np.ndarray, message: str) -> None:
     with pytest.warns(UserWarning, match=message):
         ep.segment(points)
 
 
-def test_a_mesh_without_area_is_told() -> None:
-    with pytest.warns(UserWarning, match="no triangle has an area") as told:
+def test_a_mesh_without_area_warns() -> None:
+    with pytest.warns(UserWarning, match="no triangle has an area") as caught:
         ep.Mesh(SQUARE, [[0, 1, 1]])
-    assert len(told) == 1
+    assert len(caught) == 1
 
 
-def test_what_is_no_whole_object_is_told() -> None:
+def test_part_of_an_object_warns() -> None:
     scan = ep.Sensor("vlp32c").scan(ep.Mesh(*ep.box((1, 1, 1))))
     for cloud in [scan, FLOOR[:500] * 0.1 + [20, 0, 0]]:
         with pytest.warns(UserWarning, match="the cloud is a scan of one side, and edge-64 learnt"):
@@ -119,13 +119,13 @@ def test_what_is_no_whole_object_is_told() -> None:
         ep.Classifier("street-128")(sweep)
 
 
-def test_a_scan_of_nothing_is_told() -> None:
+def test_a_scan_of_nothing_warns() -> None:
     with pytest.warns(UserWarning, match="no beam returned a point"):
         scan = ep.Scene().scan(ep.Sensor("vlp16"))
     assert len(scan.positions) == 0
 
 
-def test_a_file_without_points_is_told(tmp_path: Path) -> None:
+def test_a_file_without_points_warns(tmp_path: Path) -> None:
     np.save(tmp_path / "empty.npy", np.zeros((0, 3)))
     with pytest.warns(UserWarning, match=r"empty\.npy: holds no points"):
         assert len(ep.Scan.read(tmp_path / "empty.npy")) == 0
@@ -170,7 +170,7 @@ def test_a_scan_that_cannot_be_made_is_refused(cube: tuple, wanted: dict, messag
     [
         ({"sensor": "vlp99"}, "vlp99"),
         ({"distance": (5, 2)}, "at least 5"),
-        ({"noise": -1}, "noise: expected a number"),
+        ({"noise": -1}, "noise.sigma_m: expected a number"),
         ({"split": "dev"}, "dev"),
         ({"points": 0}, "points"),
         ({"views": 0}, "views"),
@@ -178,7 +178,8 @@ def test_a_scan_that_cannot_be_made_is_refused(cube: tuple, wanted: dict, messag
         ({"views": 65536}, "views: expected at most 65535 where each scan is a file, found 65536"),
         ({"seed": -1}, "seed"),
         ({"cache_mb": -1}, "cache_mb"),
-        ({"distance": "far"}, "distance"),
+        ({"distance": "far"}, "distance: expected a number, found 'far'"),
+        ({"elevation": (1, 2, 3)}, "elevation: expected a number, or two"),
         ({"noise": 0.1, "effects": __file__}, "cannot be used with"),
         ({"min_points": 1 << 24}, "expected a view of at least 16777216 points"),
     ],
@@ -199,7 +200,7 @@ def test_a_bad_mesh_of_a_dataset_is_named_when_it_is_drawn(tmp_path: Path) -> No
         dataset[1]
 
 
-def test_what_is_no_number_of_a_cloud_is_refused(shapes: Path) -> None:
+def test_wrong_indices_are_refused(shapes: Path) -> None:
     dataset = ep.Dataset(shapes)
     for epoch in [-1, 2**32, 0.5]:
         with pytest.raises(ep.Error, match="epoch"):

@@ -1,7 +1,5 @@
 """glTF files that trimesh writes: their meshes stand where trimesh puts them."""
 
-import base64
-import json
 from pathlib import Path
 
 import numpy as np
@@ -101,57 +99,29 @@ def test_instances_have_the_bounds_of_trimesh_s_nodes(tmp_path: Path) -> None:
     assert both.sum() > 300 and np.quantile(np.abs(found[both] - wanted[both]), 0.99) < 1e-5
 
 
-def turntable(path: Path) -> None:
-    """A cube of 1 m, 3 m from an axis around which it turns once in 8 s, in steps of 45 degrees."""
-    cube = trimesh.creation.box([1, 1, 1])
-    half = np.arange(9) * np.pi / 8
-    turns = np.stack([0 * half, np.sin(half), 0 * half, np.cos(half)], axis=1)
-    arrays = [cube.vertices.astype("<f4"), cube.faces.astype("<u4").ravel(), np.arange(9, dtype="<f4"), turns.astype("<f4")]
-    data = b"".join(array.tobytes() for array in arrays)
-    starts = np.cumsum([0] + [array.nbytes for array in arrays]).tolist()
-    kinds = [(5126, "VEC3"), (5125, "SCALAR"), (5126, "SCALAR"), (5126, "VEC4")]
-    limits = {"min": cube.bounds[0].tolist(), "max": cube.bounds[1].tolist()}
-    content = {
-        "asset": {"version": "2.0"},
-        "scenes": [{"nodes": [0]}],
-        "nodes": [{"name": "table", "children": [1]}, {"name": "cube", "mesh": 0, "translation": [3, 0, 0]}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
-        "animations": [
-            {
-                "channels": [{"sampler": 0, "target": {"node": 0, "path": "rotation"}}],
-                "samplers": [{"input": 2, "output": 3}],
-            }
-        ],
-        "buffers": [{"byteLength": len(data), "uri": "data:;base64," + base64.b64encode(data).decode()}],
-        "bufferViews": [
-            {"buffer": 0, "byteOffset": at, "byteLength": array.nbytes} for at, array in zip(starts, arrays)
-        ],
-        "accessors": [
-            {"bufferView": i, "componentType": kind, "count": len(array), "type": of} | (limits if i == 0 else {})
-            for i, ((kind, of), array) in enumerate(zip(kinds, arrays))
-        ],
-    }
-    path.write_text(json.dumps(content))
-
-
-def test_a_turntable_turns_as_its_closed_form_at_ten_times(tmp_path: Path) -> None:
-    turntable(tmp_path / "turntable.gltf")
+def test_an_object_of_a_file_turns_on_its_trajectory_as_the_closed_form(tmp_path: Path) -> None:
+    """A cube of 1 m, 3 m from an axis around which it turns once in 8 s."""
+    world_ = trimesh.Scene()
+    away = trimesh.transformations.translation_matrix([3, 0, 0])
+    world_.add_geometry(trimesh.creation.box([1, 1, 1]), node_name="cube", transform=away)
+    (tmp_path / "cube.glb").write_bytes(world_.export(file_type="glb"))
     starts = [0.0, 0.5, 1.0, 1.7, 2.25, 3.3, 4.05, 5.9, 6.6, 7.8]
     sensor = '[[sensor]]\nprofile = "vlp16"\nname = "{0}"\nstart_s = {0}\nposition_m = [0, 0, 0]\nyaw_deg = 0\n'
-    scene = '[[object]]\nscene = "turntable.gltf"\n' + "".join(map(sensor.format, starts))
+    poses = ", ".join(f"{{ time_s = {i}, position_m = [0, 0, 0], yaw_deg = {45 * i} }}" for i in range(9))
+    scene = f'[[object]]\nscene = "cube.glb"\ntrajectory = [{poses}]\n' + "".join(map(sensor.format, starts))
     (tmp_path / "scene.toml").write_text('attributes = ["time", "object"]\n' + scene)
     scans = ep.scan_scene(tmp_path / "scene.toml")
     for start in starts:
         scan = scans[str(start)]
         assert len(scan) > 200
-        # Counterclockwise from above, since y points up in the file; the cube moves while the scan runs.
+        # Counterclockwise from above; the cube moves while the scan runs.
         angle = (start + scan.time) * 2 * np.pi / 8
         x, y, z = scan.positions.T.astype(np.float64)
         along, across = np.cos(angle) * x + np.sin(angle) * y, np.cos(angle) * y - np.sin(angle) * x
         # From inside of the circle, beams meet the cube's inner side, and hardly any other.
         assert np.abs(across).max() < 0.5 + 1e-6 and np.abs(z).max() < 0.5 + 1e-6
         assert np.abs(along - 2.5).max() < 2e-6
-    still = ep.Scene.read(tmp_path / "turntable.gltf")
+    still = ep.Scene.read(tmp_path / "cube.glb")
     np.testing.assert_allclose(still.bounds, [[[2.5, -0.5, -0.5], [3.5, 0.5, 0.5]]], atol=1e-6)
 
 

@@ -126,7 +126,7 @@ def test_64_environments_share_a_lidar() -> None:
         ),
     ],
 )
-def test_what_does_not_fit_is_named(make, message: str) -> None:
+def test_wrong_arguments_are_named(make, message: str) -> None:
     with pytest.raises(ep.Error) as caught:
         make(Lidar(MODEL, "lidar", SENSOR))
     assert message in str(caught.value)

@@ -97,7 +97,7 @@ def test_a_png_has_y_upwards(tmp_path: Path) -> None:
         (("bytes.png", {"cell": 1, "height": 1}), "bytes.png: expected a picture in grey with 16 bits a pixel, found"),
     ],
 )
-def test_what_is_no_terrain_is_named(tmp_path: Path, monkeypatch, arguments, message: str) -> None:
+def test_wrong_terrain_is_named(tmp_path: Path, monkeypatch, arguments, message: str) -> None:
     monkeypatch.chdir(tmp_path)
     Path("text.png").write_text("heights")
     Path("cut.png").write_bytes(png(np.full((99, 99), 7))[:60])

@@ -154,7 +154,7 @@ def test_a_state_in_a_batch_is_the_state_alone() -> None:
     assert lidar.ranges(states[0]).min() < batch[0].min() - 0.1
 
 
-def test_the_sensor_sees_what_it_is_told_to_see() -> None:
+def test_the_sensor_sees_the_geoms_of_its_groups() -> None:
     model, data = model_of(ROBOT)
     seen = lambda **settings: {model.geom(geom).name for geom in Lidar(model, "lidar", SENSOR, **settings).geoms}  # noqa: E731
     assert seen() == {"own", "floor", "visual", "ball", "hand"}
@@ -178,13 +178,13 @@ def test_each_call_has_its_own_noise_and_a_seed_repeats_it() -> None:
     assert 0.009 < np.std(one[both] - clean[both]) < 0.011
 
 
-def test_what_cannot_be_seen_is_named_once() -> None:
+def test_unseen_geoms_are_named_once() -> None:
     text = """<mujoco><worldbody><geom type="box" size="1 1 1"/><site name="eye"/>
       <flexcomp name="cloth" type="grid" count="3 3 1" spacing=".1 .1 .1" dim="2" mass="1"/></worldbody></mujoco>"""
     model = mujoco.MjModel.from_xml_string(text)
-    with pytest.warns(UserWarning) as told:
+    with pytest.warns(UserWarning) as caught:
         Lidar(model, "eye", SENSOR)
-    assert [str(warning.message) for warning in told] == ["the LiDAR does not see flex 'cloth'"]
+    assert [str(warning.message) for warning in caught] == ["the LiDAR does not see flex 'cloth'"]
 
 
 @pytest.mark.parametrize(
@@ -203,7 +203,7 @@ def test_what_cannot_be_seen_is_named_once() -> None:
         (lambda model, _: Lidar(model).scan(model_of("")[1]), "data: expected that of a model with 6 geoms"),
     ],
 )
-def test_what_does_not_fit_is_named(make, message: str) -> None:
+def test_wrong_arguments_are_named(make, message: str) -> None:
     with pytest.raises(ep.Error) as caught:
         make(*model_of(ROBOT))
     assert message in str(caught.value)

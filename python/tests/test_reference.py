@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "python/edgepuck"
 PAGE = ROOT / "docs/src/python-reference.md"
 # Modules that need another package, beside the package itself.
-OPTIONAL = ["torch", "mujoco", "gymnasium"]
+OPTIONAL = ["torch", "onnx", "mujoco", "gymnasium"]
 BEGIN = """# Python reference
 
 `import edgepuck as ep`. Lengths are in metres, angles in degrees and times in seconds; poses are matrices [4, 4]. In the
@@ -128,6 +128,6 @@ def paragraph(words: str) -> str:
     if head not in ("Args:", "Raises:"):
         return f"{words}\n"
     items = re.split(r"\n(?=\S)", textwrap.dedent(rest))
-    told = (item.partition(": ") for item in items)
-    listed = "".join(f"- `{name}`: {on_one_line(what)}\n" for name, _, what in told)
+    documented = (item.partition(": ") for item in items)
+    listed = "".join(f"- `{name}`: {on_one_line(what)}\n" for name, _, what in documented)
     return f"{'Arguments' if head == 'Args:' else 'Errors'}:\n\n{listed}"

@@ -65,17 +65,17 @@ def test_scenes_of_a_recipe_are_those_of_gen_scenes(tmp_path: Path) -> None:
 def test_a_saved_scan_is_read_by_the_program(cube: tuple, tmp_path: Path) -> None:
     scan = ep.Sensor("vlp32c").scan(ep.Mesh(*cube), attributes=["range", "return", "normal"])
     scan.save(tmp_path / "scan.npz")
-    edgepuck("preview", tmp_path / "scan.npz", "--out", tmp_path / "scan.png")
+    edgepuck("view", tmp_path / "scan.npz", "--out", tmp_path / "scan.png")
     assert (tmp_path / "scan.png").read_bytes().startswith(b"\x89PNG")
-    told = edgepuck("segment", tmp_path / "scan.npz", "--radius", 0.5, "--out", tmp_path / "cut")
-    assert f"{len(scan)} points" in told.stderr
+    printed = edgepuck("detect", tmp_path / "scan.npz", "--segment-only", "--radius", 0.5, "--out", tmp_path / "cut")
+    assert f"{len(scan)} points" in printed.stderr
 
 
 def assert_same(scan: ep.Scan, file: Path) -> None:
-    told = np.load(file)
+    columns = np.load(file)
     names = {"return": "return_number"}
-    assert set(told.files) >= {"positions"}
-    for name in told.files:
+    assert set(columns.files) >= {"positions"}
+    for name in columns.files:
         found = getattr(scan, names.get(name, name))
         # Files have a column of shape [n, 1].
-        np.testing.assert_array_equal(found, told[name].reshape(found.shape), err_msg=name)
+        np.testing.assert_array_equal(found, columns[name].reshape(found.shape), err_msg=name)

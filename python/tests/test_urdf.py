@@ -49,7 +49,7 @@ def test_links_stand_where_the_joints_put_them(robot: Path) -> None:
     assert ep.Scene.read(robot, collision=True).names == ["boom"]
 
 
-def test_what_is_wrong_is_named_with_its_joint(robot: Path) -> None:
+def test_errors_name_the_joint(robot: Path) -> None:
     with pytest.warns(UserWarning, match=r'arm.urdf: joint "turn": expected a position from -1 to 1'):
         ep.Scene.read(robot, joints={"turn": 2.0})
     with pytest.raises(ep.Error, match='arm.urdf:1: joint "wrist": expected one of lift, turn, found none'):

@@ -33,7 +33,7 @@ def test_notebooks_show_scans() -> None:
     assert shown.count('"') == 4
 
 
-def test_what_cannot_be_shown_is_named() -> None:
+def test_wrong_arguments_are_named() -> None:
     with pytest.raises(ep.Error, match=r"expected an array of shape \[n, 3\], found \[4\]"):
         ep.view(np.zeros(4))
     with pytest.raises(ep.Error, match="nowhere.npz"):

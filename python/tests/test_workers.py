@@ -113,25 +113,25 @@ def test_attributes_are_columns_behind_the_positions(shapes: Path) -> None:
             ep.Dataset(shapes, attributes=wrong)
 
 
-def test_what_is_doubtful_about_a_mesh_is_told_once(tmp_path: Path) -> None:
+def test_a_mesh_warns_once(tmp_path: Path) -> None:
     (tmp_path / "cup").mkdir()
     # A square of 150 m: the unit of its file is probably the millimetre. Its edges cross.
     corners = "v 0 0 0\nv 150 150 0\nv 150 0 0\nv 0 150 0\nv 0 0 150\n"
     for name in ["one", "two"]:
         (tmp_path / "cup" / f"{name}.obj").write_text(corners + "f 1 3 5\nf 1 2 3 4\n")
     dataset = ep.Dataset(tmp_path, normalize="none", up="z", distance=3, points=64, min_points=1)
-    with pytest.warns(UserWarning) as told:
+    with pytest.warns(UserWarning) as caught:
         for _ in range(2):
             dataset.batch(range(len(dataset)))
     for part in ["one.obj: expected a size of 1 cm to 100 m", "two.obj: expected a size", "cross", "inside"]:
-        assert sum(part in str(one.message) for one in told) == (1 if ".obj" in part else 2), part
+        assert sum(part in str(one.message) for one in caught) == (1 if ".obj" in part else 2), part
     # In millimetres it has a size of 15 cm.
     settings = {"normalize": "none", "units": "mm", "up": "z", "points": 64, "min_points": 1}
     small = ep.Dataset(tmp_path, distance=3, attributes=["range"], **settings)
     np.testing.assert_allclose(small[0][0][:, 3], 3, atol=0.3)
 
 
-def test_what_is_doubtful_about_a_folder_is_told(tmp_path: Path, shapes: Path) -> None:
+def test_a_folder_warns(tmp_path: Path, shapes: Path) -> None:
     shutil.copytree(shapes, tmp_path / "meshes")
     (tmp_path / "meshes/bus").mkdir()
     (tmp_path / "meshes/bus/a.fbx").write_bytes(b"Kaydara")

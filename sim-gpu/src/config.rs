@@ -5,10 +5,11 @@ use std::fmt;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
-use formats::foreign::read_text;
+pub use formats::InvalidValue;
+use formats::plausible::read_text;
 use serde::de::DeserializeOwned;
 
-use crate::mesh::MeshFormat;
+use edgepuck_mesh::MeshFormat;
 use mistakes::Mistakes;
 
 mod mistakes;
@@ -62,32 +63,11 @@ pub enum ConfigError {
     },
 }
 
-/// A key whose value cannot be used, and why.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{key}: {cause}")]
-pub struct InvalidValue {
-    /// The path of the key, such as `rotating.beam[3].elevation_deg`.
-    pub key: String,
-    /// The cause.
-    pub cause: String,
-}
-
-impl InvalidValue {
-    /// The error that the value of `key` cannot be used because of `cause`.
-    pub fn new(key: impl Into<String>, cause: impl Into<String>) -> Self {
-        Self { key: key.into(), cause: cause.into() }
-    }
-
-    /// The same error, with its file.
+impl ConfigError {
+    /// The error of a value in `file`.
     #[must_use]
-    pub fn in_file(self, file: &Path) -> ConfigError {
-        ConfigError::Value { file: file.to_owned(), invalid: self }
-    }
-}
-
-impl From<InvalidValue> for Vec<InvalidValue> {
-    fn from(invalid: InvalidValue) -> Self {
-        vec![invalid]
+    pub fn value(file: &Path, invalid: InvalidValue) -> Self {
+        Self::Value { file: file.to_owned(), invalid }
     }
 }
 

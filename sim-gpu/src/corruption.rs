@@ -428,7 +428,7 @@ mod tests {
     }
 
     #[test]
-    fn what_makes_no_sense_is_named() {
+    fn senseless_settings_fail() {
         for (corruption, expected) in [
             (Corruption::WetGround { film_m: f64::NAN }, "x.film_m"),
             (Corruption::BeamsMissing { share: 1.5 }, "x.share: expected a number within 0..=1"),

@@ -25,7 +25,7 @@ pub use crate::sensor::DetectionLimit;
 pub use detection::Detection;
 pub use footprint::{Footprint, ReturnMode};
 pub use motion::EvenMotion;
-pub use weather::{FogModel, Volume, Weather};
+pub use weather::{Volume, Weather};
 
 mod detection;
 mod footprint;

@@ -97,10 +97,10 @@ pub struct Cast {
 mod tests {
     use super::*;
     use crate::bvh::Builder;
-    use crate::mesh::TriangleMesh;
     use crate::pose::Pose;
     use crate::sensor::SensorProfile;
     use crate::target::Surface;
+    use edgepuck_mesh::TriangleMesh;
     use glam::{DAffine3, DVec3};
 
     #[test]

@@ -20,10 +20,10 @@
 //! [`Effects`] say what the scan models beyond ideal ranges.
 //!
 //! # Features
-//! `gpu` casts on GPUs and software Vulkan, through wgpu. `simplify` simplifies meshes, which takes
-//! a C++ compiler. `textures` reads reflectivities from images.
+//! `gpu` casts on GPUs and software Vulkan, through wgpu.
 
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+#![warn(clippy::print_stdout, clippy::print_stderr)]
 
 mod aim;
 mod api;
@@ -37,21 +37,16 @@ pub mod effects;
 mod fixed_frame;
 #[cfg(feature = "gpu")]
 mod gpu;
-mod import;
 mod job;
 mod lanes;
-mod material;
-mod mesh;
 mod motion;
-mod packets;
+pub mod packets;
 mod pose;
 mod ray;
 mod resolve;
 mod scan;
 mod scene;
 mod sensor;
-mod simplify;
-mod surface_points;
 mod target;
 mod weather;
 
@@ -61,22 +56,59 @@ pub use api::{
 };
 #[doc(hidden)]
 pub use api::{Extent, FilePlace};
+pub use edgepuck_mesh::import::Import;
+pub use edgepuck_mesh::material::Materials;
 pub use effects::Effects;
-pub use formats;
+pub use formats::plausible::Warning;
 pub use formats::scan::Attribute;
 pub use glam;
-pub use import::Import;
-pub use material::Materials;
 pub use pose::{Pose, Trajectory};
 pub use scan::{Glass, Tally};
+
+/// The columns of [`Scan::points`](Scan), and the attributes that name them.
+pub mod columns {
+    pub use formats::scan::{Attribute, AttributeSet, Column, Scan};
+}
+
+/// Profiles of sensors, as [`Sensor::read`] takes them, and the beams that they describe.
+pub mod sensors {
+    pub use crate::sensor::{
+        Beam, BeamPattern, DetectionLimit, Layout, Rotating, SensorProfile, TypicalNoise, Views,
+        builtin_names,
+    };
+}
+
+/// Files of settings in TOML: reading and checking them, with messages that name lines and keys.
+pub mod settings {
+    pub use crate::config::{all, parse, read, within};
+}
+
+/// Files of scenes and of poses, and the limits of what they hold.
+pub mod scene_files {
+    pub use crate::pose::load_poses;
+    pub use crate::scene::{SceneFile, SceneObject, SceneSensor, check_object};
+}
+
+/// The adapters of this machine.
+#[cfg(feature = "gpu")]
+pub mod adapters {
+    pub use crate::gpu::{AdapterKind, AdapterSummary, list_adapters};
+}
+
+/// What weather and faults do to scans that a real sensor recorded.
+pub mod recorded {
+    pub use crate::corruption::{Corruption, Recorded};
+    pub use crate::weather::{Air, Fates, Medium, in_weather};
+}
 
 /// The errors that [`Error`] holds.
 pub mod errors {
     pub use crate::cast_error::CastError;
     pub use crate::config::{ConfigError, InvalidValue};
-    pub use crate::material::MaterialError;
-    pub use crate::mesh::{MeshError, ParseError};
-    pub use crate::simplify::NotBuilt;
+    pub use crate::scan::ScanError;
+    pub use edgepuck_mesh::material::MaterialError;
+    pub use edgepuck_mesh::{MeshError, ParseError};
+    pub use formats::FormatError;
 }
 
 /// What Edgepuck's own crates, tests and measurements use beyond the types at the root. It is not
@@ -94,8 +126,8 @@ pub mod internals {
     }
 
     modules! {
-        bvh cast_error caster config corruption cpu import job material mesh motion packets pose ray resolve
-        scan scene sensor simplify surface_points target weather
+        bvh cast_error caster config corruption cpu job motion packets pose ray resolve
+        scan scene sensor target weather
     }
 
     #[cfg(feature = "gpu")]

@@ -47,12 +47,6 @@ pub fn revolution(sensor: &SensorProfile) -> Result<Revolution, InvalidValue> {
     if sensor.revolutions.get() != 1 {
         return Err(no_packets("revolutions", "is not 1"));
     }
-    if sensor.rings.is_some() {
-        return Err(no_packets("rings", "moves points off their beams"));
-    }
-    if sensor.sample.is_some() {
-        return Err(no_packets("sample", "draws from the beams"));
-    }
     within("range.max_m", sensor.range.max_m, 0.0..=FARTHEST_M)?;
     // At most 2^26, the limit of patterns.
     Ok(Revolution { rpm: rotating.rpm, n_beams: rotating.rays_per_revolution() as u32 })
@@ -136,7 +130,6 @@ fn check_aim(rotating: &Rotating) -> Result<(), InvalidValue> {
         Err(no_packets(key, format!("expected {}, found {}", written(expected), written(found))))
     };
     expect("rotating.beam_crossing_m", rotating.beam_crossing_m, Some(BEAM_CROSSING_M))?;
-    expect("rotating.azimuth_quantum_deg", rotating.azimuth_quantum_deg, None)?;
     let quantum_deg = rotating.sequence_quantum_deg;
     expect("rotating.sequence_quantum_deg", quantum_deg, Some(AZIMUTH_UNIT_DEG))
 }

@@ -1,12 +1,12 @@
 //! Meshes prepared for casting.
 
 use crate::bvh::{Builder, Bvh};
-use crate::mesh::TriangleMesh;
-use crate::mesh::validate::triangle_stats;
+use edgepuck_mesh::TriangleMesh;
+use edgepuck_mesh::validate::triangle_stats;
 use glam::DVec3;
 use std::sync::Arc;
 
-pub use crate::mesh::unit_frame::UnitFrame;
+pub use edgepuck_mesh::unit_frame::UnitFrame;
 
 /// The surface of a mesh in its unit frame, in f64.
 #[derive(Clone, Debug)]
@@ -74,21 +74,6 @@ impl Surface {
     #[must_use]
     pub fn corners(&self, index: u32) -> [DVec3; 3] {
         self.triangles[index as usize].map(|v| self.vertices[v as usize])
-    }
-
-    /// The barycentric coordinates in triangle `index` of `point`, which lies in its plane in the
-    /// unit frame: each from 0 to 1, in sum 1.
-    #[must_use]
-    pub fn barycentric(&self, index: u32, point: DVec3) -> DVec3 {
-        let [a, b, c] = self.corners(index);
-        let (to_b, to_c, to_point) = (b - a, c - a, point - a);
-        let normal = to_b.cross(to_c);
-        let twice_area = normal.length_squared();
-        let of_b = (to_point.cross(to_c).dot(normal) / twice_area).clamp(0.0, 1.0);
-        let of_c = (to_b.cross(to_point).dot(normal) / twice_area).clamp(0.0, 1.0 - of_b);
-        let shares = DVec3::new(1.0 - of_b - of_c, of_b, of_c);
-        // The area of a tiny triangle may underflow; any point of it will do.
-        if shares.is_finite() { shares } else { DVec3::splat(1.0 / 3.0) }
     }
 
     /// As [`corners`](Self::corners), sorted by coordinates, whatever their order in the mesh.

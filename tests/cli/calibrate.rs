@@ -6,7 +6,7 @@ use std::fs;
 use test_support::{need, shared_data};
 
 const SENSORS: [&str; 5] = ["vlp16", "vlp32c", "os1-128", "xt32", "hdl32e"];
-const TURNS: u32 = 6;
+const TURNS: u32 = 5;
 
 /// A room of 30 by 16 by 8 m that is open to the sky, with two boxes in it.
 fn room() -> String {
@@ -38,16 +38,22 @@ fn room() -> String {
 
 /// Scans the room from one place in turn after turn, and calibrates each sensor: its profile in
 /// `profiles` is `before` and the name, and the one that is written `after` and the name.
-fn calibrate(folder: &Folder, effects: &str, before: &str, after: &str, seed: u32) -> Vec<Value> {
+fn calibrate(
+    folder: &Folder,
+    sensors: &[&str],
+    effects: &str,
+    before: &str,
+    after: &str,
+) -> Vec<Value> {
     folder.write("room.off", room());
     for turn in 0..TURNS {
         let end = if before.is_empty() { "" } else { ".toml" };
         let mut scene = format!(
             "seed = {}\nattributes = [\"range\", \"ring\", \"time\", \"intensity\"]\n[effects]\n\
              intensity = true\nquantise_m = true\n{effects}\n[[object]]\nmesh = \"room.off\"\n",
-            seed + turn
+            if before.is_empty() { 1 + turn } else { 101 + turn }
         );
-        for name in SENSORS {
+        for name in sensors {
             scene += &format!(
                 "[[sensor]]\nname = \"{name}\"\nprofile = \"{before}{name}{end}\"\n\
                  position_m = [0.7, 0.3, 0.1]\nyaw_deg = 20\n"
@@ -62,7 +68,7 @@ fn calibrate(folder: &Folder, effects: &str, before: &str, after: &str, seed: u3
         let words = format!("calibrate {sweeps} --sensor {name} --json --out {after}{name}.toml");
         json(folder, &words)
     };
-    SENSORS.iter().map(figures).collect()
+    sensors.iter().map(figures).collect()
 }
 
 fn json(folder: &Folder, words: &str) -> Value {
@@ -86,7 +92,7 @@ fn assert_near(figure: &Value, expected: f64, what: &str) {
 fn five_sensors_are_found_as_they_were_simulated_and_once_more_by_their_profiles() {
     let folder = Folder::new();
     let effects = "noise = { sigma_m = 0.011 }\ndropout = { probability = 0.03 }";
-    let first = calibrate(&folder, effects, "", "a-", 1);
+    let first = calibrate(&folder, &SENSORS, effects, "", "a-");
     let quanta_m = [0.002, 0.004, 0.001, 0.004, 0.002];
     for ((name, found), quantum_m) in SENSORS.iter().zip(&first).zip(quanta_m) {
         assert_near(&found["repeatability_m"], 0.011, name);
@@ -114,8 +120,9 @@ fn five_sensors_are_found_as_they_were_simulated_and_once_more_by_their_profiles
     let dropout = first[0]["missing"]["value"].as_f64().unwrap();
     let effects =
         format!("noise = {{ sigma_m = {noise_m} }}\ndropout = {{ probability = {dropout} }}");
-    let again = calibrate(&folder, &effects, "a-", "b-", 101);
-    for (name, found) in SENSORS.iter().zip(&again) {
+    let sensors = ["vlp16", "hdl32e"];
+    let again = calibrate(&folder, &sensors, &effects, "a-", "b-");
+    for (name, found) in sensors.iter().zip(&again) {
         assert_near(&found["repeatability_m"], noise_m, name);
         assert_near(&found["missing"], dropout, name);
         assert_near(&found["rpm"], 600.0, name);
@@ -129,7 +136,7 @@ fn a_capture_is_calibrated_to_its_profile_and_motion_is_refused() {
     let quiet = vlp32c.replace("repeatability_m = 0.006", "repeatability_m = 0.015");
     assert_ne!(quiet, vlp32c);
     folder.write("known.toml", quiet);
-    let drive = "gen-drive room --seed 7 --seconds 0.85";
+    let drive = "gen-scenes room --seed 7 --drive 0.85";
     folder.succeeds(&format!("{drive} --speed 0 --sensor known.toml --out rest.pcap"));
     let first = json(&folder, "calibrate rest.pcap --json --out found.toml");
     // Furniture, whose ranges are not known between two firings, adds up to 2 %.
@@ -145,7 +152,7 @@ fn a_capture_is_calibrated_to_its_profile_and_motion_is_refused() {
     assert!(low < 1.03 * 0.015 && high > 0.015, "{again}");
 
     folder.succeeds(&format!("{drive} --speed 1 --sensor known.toml --out moves.pcap"));
-    folder.succeeds("gen-drive room --seed 7 --seconds 0.35 --speed 0 --out short.pcap");
+    folder.succeeds("gen-scenes room --seed 7 --drive 0.35 --speed 0 --out short.pcap");
     folder.write("rest.npz", folder.bytes("known.toml"));
     folder.refuses(
         1,
@@ -168,36 +175,12 @@ fn a_capture_is_calibrated_to_its_profile_and_motion_is_refused() {
         ],
     );
     assert!(!folder.at("x.toml").exists());
-}
-
-#[test]
-fn sweeps_that_do_not_fit_are_refused() {
-    let folder = Folder::new();
-    folder.write("room.off", room());
-    let scan = "scan room.off --adapter cpu --distance 1 --elevation 30";
-    folder.succeeds(&format!("{scan} --sensor vlp16 --out a.npz"));
-    folder.succeeds(&format!("{scan} --sensor vlp32c --out b.npz"));
-    folder.succeeds(&format!("{scan} --sensor vlp16 --attributes range --out plain.npz"));
-    folder.succeeds(&format!("{scan} --sensor avia --out rosette.npz"));
     let vlp16 = fs::read_to_string(crate::in_repository("assets/sensors/vlp16.toml")).unwrap();
     folder.write("twice.toml", format!("revolutions = 2\n{vlp16}"));
-    folder.succeeds(&format!("{scan} --sensor twice.toml --out twice.npz"));
-    let five = |name: &str| format!("calibrate {name} a.npz a.npz a.npz a.npz --out x.toml");
-    folder.refuses(2, &[(&five("a.npz"), "sweeps do not name their sensor: give --sensor")]);
-    for (name, part) in [
-        ("b.npz", "expected the rings of b.npz, found other elevations"),
-        ("plain.npz", "expected a sweep with rings (a column `ring`)"),
-        ("rosette.npz", "of a head that turns, found rings of many elevations"),
-        ("missing.npz", "missing.npz"),
-        ("room.off", "room.off"),
-    ] {
-        folder.refuses(1, &[(&format!("{} --sensor vlp16", five(name)), part)]);
-    }
+    folder.write("room.off", room());
+    folder.succeeds("scan room.off --adapter cpu --distance 1 --sensor twice.toml --out twice.npz");
     let twice = "calibrate twice.npz twice.npz --sensor vlp16 --out x.toml";
     folder.refuses(2, &[(twice, "found several turns in a file")]);
-    // Without noise, ranges are equal, and have no quantum.
-    let said = folder.succeeds(&format!("{} --sensor vlp16", five("a.npz")));
-    assert!(said.contains("--noise 0 --dropout 0\n"), "{said}");
 }
 
 /// What a second difference of neighbouring firings has is 5 to 7 mm: from turn to turn it is more.

@@ -1,10 +1,10 @@
-//! `gen-drive`: a drive as a capture with its ground truth, and as a sequence.
+//! `gen-scenes --drive`: a drive as a capture with its ground truth, and as a sequence.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 
 use formats::velodyne::{Decoder, Header, Model};
-use infer_cpu::live::EgoMotion;
+use infer_cpu::live::Trajectory;
 use serde_json::Value;
 
 use crate::Folder;
@@ -17,7 +17,7 @@ road_width_m = [8, 8]
 height_m = [1.5, 1.5]
 [[sensor]]
 profile = "vlp32c"
-noise_m = 0
+effects = { noise = { sigma_m = 0 } }
 [[object]]
 kind = "wall"
 class = "wall"
@@ -30,11 +30,11 @@ distance_m = [4, 30]
 fn a_drive_comes_back_from_its_packets_when_the_sensors_motion_is_undone() {
     let folder = Folder::new();
     folder.write("walls.toml", WALLS);
-    let said = folder.succeeds("gen-drive walls.toml --seconds 0.4 --speed 20 --out drives/a.pcap");
+    let said = folder.succeeds("gen-scenes walls.toml --drive 0.4 --speed 20 --out drives/a.pcap");
     assert!(said.contains("0.4 s, ") && said.contains("drives/a.pcap"), "{said}");
     let truth = folder.text("drives/a.truth.jsonl");
     let truth: Vec<Value> = truth.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
-    let motion = EgoMotion::read(&folder.at("drives/a.tum")).unwrap();
+    let motion = Trajectory::load(&folder.at("drives/a.tum")).unwrap();
     let decoder = Decoder::new(Model::Vlp32c);
     // Points of a wall, in the sensor's frame and in the world.
     let (mut n, mut n_inside, mut n_inside_as_seen) = (0u32, 0u32, 0u32);
@@ -48,10 +48,9 @@ fn a_drive_comes_back_from_its_packets_when_the_sensors_motion_is_undone() {
             .decode(&packet.payload, |found| {
                 let [x, y, z] = found.point_m.map(f64::from);
                 let at = [x, y, z].into();
-                let pose = motion.pose(start_s + found.after_us * 1e-6, 0.0);
+                let pose = motion.at(start_s + found.after_us * 1e-6);
                 // The position if the sensor had not moved since the first packet.
-                let [moved, still] =
-                    [pose, motion.pose(0.0, 0.0)].map(|p| p.to_world(at).to_array());
+                let [moved, still] = [pose, motion.at(0.0)].map(|p| p.to_world(at).to_array());
                 if moved[2] > 0.3 {
                     n += 1;
                     n_inside += u32::from(truth.iter().any(|wall| holds(wall, moved, 0.03)));
@@ -93,7 +92,7 @@ tilt_deg = [2, 2]
 sway_deg = [1, 1]
 [[sensor]]
 profile = "vlp32c"
-noise_m = 0
+effects = { noise = { sigma_m = 0 } }
 [[object]]
 kind = "car"
 class = "car"
@@ -115,10 +114,10 @@ speed_m_s = [8, 9]
 fn points_of_a_sequence_lie_on_their_objects_when_its_poses_move_them() {
     let folder = Folder::new();
     folder.write("cars.toml", CARS);
-    let drive = "gen-drive cars.toml --seconds 0.65 --speed 15";
+    let drive = "gen-scenes cars.toml --drive 0.65 --speed 15";
     folder.succeeds(&format!("{drive} --out a.pcap"));
     folder.succeeds(&format!("{drive} --layout semantickitti --out sequences/04"));
-    let motion = EgoMotion::read(&folder.at("a.tum")).unwrap();
+    let motion = Trajectory::load(&folder.at("a.tum")).unwrap();
     let truth = folder.text("a.truth.jsonl");
     let truth = truth.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
     let key = |seen: &Value| ["turn", "object"].map(|key| seen[key].as_u64().unwrap());
@@ -130,7 +129,7 @@ fn points_of_a_sequence_lie_on_their_objects_when_its_poses_move_them() {
     let poses = text("poses.txt");
     assert!(poses.starts_with("1 0 0 0 0 1 0 0 0 0 1 0\n"), "{poses}");
     // The middle of a turn is a time of the poses of the capture, which are written to a micrometre.
-    let first = motion.pose(946_684_800.05, 0.0);
+    let first = motion.at(946_684_800.05);
     let (mut n, mut classes) = (0, BTreeSet::new());
     for (turn, pose) in poses.lines().enumerate() {
         let pose: Vec<f64> = pose.split(' ').map(|word| word.parse().unwrap()).collect();
@@ -164,7 +163,7 @@ fn points_of_a_sequence_lie_on_their_objects_when_its_poses_move_them() {
     let said = folder.exits(2, &format!("{drive} --layout semantickitti --out sequences/04"));
     assert!(said.contains("sequences/04: it exists already: --overwrite replaces it"), "{said}");
     // Another sensor, of which no packets are written; its sequence is the same every time.
-    let other = "gen-drive cars.toml --sensor hdl64e --seconds 0.2 --layout semantickitti --out";
+    let other = "gen-scenes cars.toml --sensor hdl64e --drive 0.2 --layout semantickitti --out";
     for out in ["sequences/04 --overwrite", "sequences/05"] {
         folder.succeeds(&format!("{other} {out}"));
     }
@@ -187,9 +186,9 @@ fn points_of_a_sequence_lie_on_their_objects_when_its_poses_move_them() {
 #[test]
 fn points_in_the_air_are_of_no_object_of_a_sequence() {
     let folder = Folder::new();
-    let rain = "noise_m = 0\neffects = { weather = { rain_mm_h = 50 } }";
-    folder.write("rain.toml", CARS.replace("noise_m = 0", rain));
-    folder.succeeds("gen-drive rain.toml --seconds 0.1 --layout semantickitti --out sequences/04");
+    let rain = "effects = { noise = { sigma_m = 0 }, weather = { rain_mm_h = 50 } }";
+    folder.write("rain.toml", CARS.replace("effects = { noise = { sigma_m = 0 } }", rain));
+    folder.succeeds("gen-scenes rain.toml --drive 0.1 --layout semantickitti --out sequences/04");
     let labels: Vec<[f32; 1]> = rows(&folder, "labels/000000.label");
     let outliers = labels.iter().filter(|[label]| label.to_bits() == 1).count();
     assert!((10..labels.len() / 2).contains(&outliers), "{outliers} of {}", labels.len());
@@ -200,41 +199,4 @@ fn rows<const N: usize>(folder: &Folder, file: &str) -> Vec<[f32; N]> {
     let bytes = folder.bytes(&format!("sequences/04/{file}"));
     let numbers = bytes.as_chunks::<4>().0.iter().map(|x| f32::from_le_bytes(*x));
     numbers.collect::<Vec<_>>().as_chunks::<N>().0.to_vec()
-}
-
-#[test]
-fn a_drive_that_cannot_be_made_is_refused_and_leaves_nothing() {
-    let folder = Folder::new();
-    folder.write("walls.toml", WALLS);
-    folder.write("vlp16.toml", WALLS.replace("vlp32c", "vlp16"));
-    let refused = |words: &str, code: i32, expected: &str| {
-        let said = folder.exits(code, &format!("gen-drive {words}"));
-        assert!(said.contains(expected), "{said}");
-    };
-    refused("walls.toml --seconds 0 --out a.pcap", 2, "expected a number above 0 and up to 86400");
-    refused("walls.toml --seconds nan --out a.pcap", 2, "expected a number above 0");
-    refused("walls.toml --speed -1 --out a.pcap", 2, "expected a number from 0 to 100");
-    refused("walls.toml --out a.npz", 2, "expected a name with .pcap, found a.npz");
-    refused(
-        "walls.toml --sensor vlp16 --out a.pcap",
-        1,
-        "VLP-32C only; --layout semantickitti writes none",
-    );
-    refused("absent.toml --out a.pcap", 1, "absent.toml");
-    let sequence = "walls.toml --layout semantickitti --out a.pcap";
-    refused(
-        &format!("{sequence} --seconds 0.05"),
-        2,
-        "--seconds: expected at least 0.1, found 0.05",
-    );
-    refused(&format!("{sequence} --sensor mid70"), 1, "rotating: expected a head that turns");
-    refused("walls.toml --layout kitti --out a.pcap", 2, "possible values: semantickitti");
-    folder.write("taken.pcap/file", "");
-    for flag in ["", "--overwrite"] {
-        let words = format!("walls.toml --seconds 0.1 --out taken.pcap {flag}");
-        refused(&words, 2, "taken.pcap: expected a file to write, found a folder: name another");
-    }
-    for name in ["a.pcap", "a.tum", "a.truth.jsonl", "taken.tum"] {
-        assert!(!folder.at(name).exists(), "{name}");
-    }
 }

@@ -2,31 +2,22 @@
 
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on should stop")]
 
-mod advise;
-mod bad_input;
 mod calibrate;
 mod cards;
-mod checkpoints;
-mod clusters;
 mod corrupt;
 mod datasets;
 mod detectors;
 mod drives;
 mod end_to_end;
-mod export_onnx;
 mod golden;
-mod import_weights;
 mod interrupted;
 mod meanings;
 mod mesh_scans;
 mod meshes;
 mod packets;
-mod reference;
+mod said;
 mod scenes;
 mod sensors;
-#[cfg(feature = "simplify")]
-mod simplified;
-mod surfaces;
 mod sweeps;
 mod tars;
 mod training;

@@ -6,17 +6,6 @@ use formats::velodyne::count_returns;
 const DATASET: &str =
     "gen-dataset meshes --sensor vlp32c --views 2 --format pcap --returns dual --adapter cpu";
 
-fn scene(profile: &str) -> Folder {
-    let folder = Folder::new();
-    folder.write("torus.off", meshes::off(40, 0.3));
-    let text = format!(
-        "[[object]]\nmesh = \"torus.off\"\n[[sensor]]\nprofile = \"{profile}\"\n\
-         position_m = [3, 0, 0.2]\nlook_at_m = [0, 0, 0]\n"
-    );
-    folder.write("scene.toml", text);
-    folder
-}
-
 #[test]
 fn a_dataset_has_packets_beside_its_points_and_is_verified() {
     let folder = Folder::with_meshes();
@@ -34,7 +23,7 @@ fn a_dataset_has_packets_beside_its_points_and_is_verified() {
 
     folder.succeeds(&format!("{DATASET} --out shards/1 --shard 1/2"));
     folder.succeeds(&format!("{DATASET} --out shards/2 --shard 2/2"));
-    folder.succeeds("merge-dataset shards/1 shards/2 --out merged");
+    folder.succeeds("merge-dataset shards/2/manifest.json shards/1 --out merged");
     folder.assert_same_tree("out", "merged");
 
     let whole = folder.bytes(&capture);
@@ -49,27 +38,15 @@ fn a_dataset_has_packets_beside_its_points_and_is_verified() {
 
 #[test]
 fn a_scene_is_written_as_packets() {
-    let folder = scene("vlp32c");
+    let folder = Folder::new();
+    folder.write("torus.off", meshes::off(40, 0.3));
+    let text = "[[object]]\nmesh = \"torus.off\"\n[[sensor]]\nprofile = \"vlp32c\"\n\
+                position_m = [3, 0, 0.2]\nlook_at_m = [0, 0, 0]\n";
+    folder.write("scene.toml", text);
     for returns in ["strongest", "last", "dual"] {
         let file = format!("{returns}.pcap");
         let said = folder.succeeds(&format!("scan scene.toml --out {file} --returns {returns}"));
         let n = count_returns(&folder.at(&file)).unwrap();
         assert!(n > 500 && said.contains(&format!("{n} points")), "{said}");
-    }
-    let words = "scan scene.toml --out scan.npz --returns dual";
-    folder.refuses(2, &[(words, "--returns applies to packets only")]);
-    assert!(!folder.at("scan.npz").exists());
-}
-
-#[test]
-fn what_packets_cannot_tell_is_refused_before_it_is_cast() {
-    for profile in ["vlp16", "kinect-v2", "blainder-ultrapuck", "modelnet40c-lidar"] {
-        let folder = scene(profile);
-        let said = folder.exits(1, "scan scene.toml --out scan.pcap");
-        for part in ["scene.toml", "sensor[0]", profile, "VLP-32C only"] {
-            assert!(said.contains(part), "{part} in {said}");
-        }
-        assert!(!said.contains("Casting"), "{said}");
-        assert!(!folder.at("scan.pcap").exists());
     }
 }

@@ -1,4 +1,4 @@
-//! `scan` and `preview`.
+//! `scan` and `view`.
 
 use crate::{Folder, in_repository, meshes};
 
@@ -63,18 +63,10 @@ fn the_scene_that_ships_is_scanned_and_drawn() {
         let said = folder.succeeds(&format!("scan {} --out {scene}.npz", file.display()));
         assert!(said.contains("points"), "{said}");
         assert!(folder.scan(&format!("{scene}.npz")).len() > 100);
-        folder.succeeds(&format!("preview {scene}.npz --out {scene}.png"));
+        folder.succeeds(&format!("view {scene}.npz --out {scene}.png"));
         let png = folder.bytes(&format!("{scene}.png"));
         assert!(png.starts_with(b"\x89PNG") && png.len() > 5_000);
     }
     let plain = folder.scan("plain.npz");
     assert_eq!(plain.columns().count(), 0, "what was not asked for is not there");
-}
-
-#[test]
-fn without_a_scene_the_default_one_is_written_and_scanned() {
-    let folder = Folder::new();
-    let said = folder.succeeds("scan --adapter cpu --out scan.npz");
-    assert!(folder.at("data/default-scene/scenes/two_chairs.toml").is_file());
-    assert!(!said.contains(" 0 points") && folder.at("scan.npz").is_file(), "{said}");
 }

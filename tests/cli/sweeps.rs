@@ -1,23 +1,20 @@
-//! `gen-scenes`, `segment` and `detect`.
+//! `gen-scenes` and `detect`.
 
 use crate::{Folder, in_repository};
+use edgepuck_segment::{Label, Sweep};
 use formats::cloud_file::write_cloud;
 use formats::labelled::read_labelled;
+use infer_cpu::Options;
+use infer_cpu::detect::Detector;
 use serde_json::Value;
 use test_support::{need, shared_data};
 
 #[test]
-fn scenes_are_scanned_cut_labelled_and_packed_alike_every_time() {
+fn scenes_are_scanned_cut_labelled_and_packed() {
     let folder = Folder::new();
-    for out in ["one", "other"] {
-        let said = folder
-            .succeeds(&format!("gen-scenes yard --adapter cpu --sweeps 10 --save 2 --out {out}"));
-        assert!(said.contains("10 sweeps"), "{said}");
-    }
-    for file in ["packed/train.npz", "packed/test.npz", "sweeps/000001.npz", "preview.png"] {
-        let [one, other] = ["one", "other"].map(|out| folder.bytes(&format!("{out}/{file}")));
-        assert!(one == other, "{file} differs");
-    }
+    let said = folder.succeeds("gen-scenes yard --adapter cpu --sweeps 10 --save 2 --out one");
+    assert!(said.contains("10 sweeps"), "{said}");
+    assert!(folder.at("one/packed/test.npz").exists());
     let set = read_labelled(&folder.at("one/packed/train.npz")).unwrap();
     let classes = set.classes.clone().unwrap();
     assert!(classes.is_sorted() && classes.contains(&"other".to_owned()), "{classes:?}");
@@ -62,7 +59,7 @@ fn a_sweep_is_cut_and_its_clusters_are_named() {
     }
     assert!(folder.at("scenes/packed/train.npz").exists());
     let sweep = "scenes/sweeps/000000.npz";
-    let said = folder.succeeds(&format!("segment {sweep} --out clusters"));
+    let said = folder.succeeds(&format!("detect {sweep} --segment-only --out clusters"));
     assert!(said.contains("clusters, "), "{said}");
     assert!(folder.bytes("clusters/sweep.ply").starts_with(b"ply\n"));
     assert!(folder.bytes("clusters/cluster-0000.npy").starts_with(b"\x93NUMPY"));
@@ -79,6 +76,9 @@ fn a_sweep_is_cut_and_its_clusters_are_named() {
         assert!(object["points"].as_u64().unwrap() >= 20);
         assert!((0.0..=1.0).contains(&object["confidence"].as_f64().unwrap()));
         let size: Vec<f64> = serde_json::from_value(object["box"]["size_m"].clone()).unwrap();
+        let centre: Vec<f64> = serde_json::from_value(object["box"]["centre_m"].clone()).unwrap();
+        let range_m = object["range_m"].as_f64().unwrap();
+        assert!((range_m - centre[0].hypot(centre[1])).abs() < 1e-4, "{object}");
         assert!(size[0] >= size[1] && size[0] < 30.0, "{object}");
         let whole: Vec<f64> =
             serde_json::from_value(object["whole_box"]["size_m"].clone()).unwrap();
@@ -93,6 +93,17 @@ fn a_sweep_is_cut_and_its_clusters_are_named() {
         assert!(whole[0] >= size[1] && whole[0] * whole[1] >= size[0] * size[1], "{object}");
     }
     assert!(folder.bytes("objects.png").starts_with(b"\x89PNG"));
+    // Each object has the points of the cluster that it names, whatever unknown ones stand before it.
+    let (scan, model) =
+        (folder.scan(sweep), in_repository("assets/weights/street-128.safetensors"));
+    let mut detector = Detector::open(&model, &Options::default(), 20).unwrap();
+    let sweep_of = Sweep { points: &scan.positions, rings: scan.ring.as_deref() };
+    let found = detector.detect(&sweep_of).unwrap();
+    assert!(found.n_other > 0 && !found.objects.is_empty());
+    for object in &found.objects {
+        let own = |label: &&Label| **label == Label::Cluster(object.cluster);
+        assert_eq!(found.labels.iter().filter(own).count(), object.n_points);
+    }
 
     let confident = objects.iter().filter(|one| one["confidence"].as_f64().unwrap() >= 0.9);
     let said = folder.succeeds(&format!("detect {sweep} --min-confidence 0.9 --out labels.txt"));
@@ -113,93 +124,62 @@ fn a_sweep_is_cut_and_its_clusters_are_named() {
     assert!(said.contains("warning: edge-64: expected a model of clusters in metres"), "{said}");
 }
 
-/// SemanticKITTI's label (semantic-kitti.yaml) and the ASPRS's code (LAS 1.4, table 17) of a kind.
-fn codes(kind: &str) -> (u16, u8) {
+/// SemanticKITTI's class (semantic-kitti.yaml) of a kind.
+fn semantic_class(kind: &str) -> u32 {
     match kind {
-        "air" => (1, 7),
-        "ground" => (49, 2),
-        "car" => (10, 1),
-        "bicycle" => (11, 1),
-        "truck" => (18, 1),
-        "person" => (30, 1),
-        "house-front" => (50, 6),
-        "wall" | "fence" | "barrier" => (51, 1),
-        "bush" | "hedge" => (70, 4),
-        "tree" => (70, 5),
-        "trunk" => (71, 5),
-        "pole" => (80, 1),
-        "traffic-cone" | "bin" | "clutter" => (99, 1),
+        "air" => 1,
+        "ground" => 49,
+        "car" => 10,
+        "bicycle" => 11,
+        "truck" => 18,
+        "person" => 30,
+        "house-front" => 50,
+        "wall" | "fence" | "barrier" => 51,
+        "bush" | "hedge" | "tree" => 70,
+        "trunk" => 71,
+        "pole" => 80,
+        "traffic-cone" | "bin" | "clutter" => 99,
         _ => panic!("{kind}"),
     }
 }
 
-/// A yard in the rain. Points are compared whole, by the layouts of KITTI (four f32), of PCD's
-/// fields, and of LAS 1.2 (point format 0; scales and offsets from byte 131).
+/// A yard in the rain, beside the scan and the description of `--save`.
 #[test]
-fn sweeps_name_the_class_and_the_object_of_each_point() {
+fn labels_have_the_class_and_the_object_of_each_point() {
     let folder = Folder::new();
     let yard = std::fs::read_to_string(in_repository("assets/scenes/yard.toml")).unwrap();
-    let rain = "[[sensor]]\neffects = { weather = { rain_mm_h = 50 } }";
-    folder.write("rain.toml", yard.replace("[[sensor]]", rain));
-    let scenes = "gen-scenes rain.toml --adapter cpu --seed 3 --sweeps 1 --save 1 --out";
-    for format in ["npz", "semantickitti", "pcd", "las"] {
-        folder.succeeds(&format!("{scenes} {format} --format {format}"));
-    }
-    let scan = folder.scan("npz/sweeps/000000.npz");
-    let said: Value = serde_json::from_slice(&folder.bytes("las/sweeps/000000.json")).unwrap();
-    let classes: Vec<String> = serde_json::from_value(said["classes"].clone()).unwrap();
-    assert_eq!(classes[..2], ["air", "ground"]);
-    let [bin, label, pcd, las] = [
-        "semantickitti/sweeps/velodyne/000000.bin",
-        "semantickitti/sweeps/labels/000000.label",
-        "pcd/sweeps/000000.pcd",
-        "las/sweeps/000000.las",
-    ]
-    .map(|file| folder.bytes(file));
+    let rain = "effects = { weather = { rain_mm_h = 50 }, noise";
+    folder.write("rain.toml", yard.replace("effects = { noise", rain));
+    let scenes = "gen-scenes rain.toml --adapter cpu --seed 3 --sweeps 1 --save 1 --out yard";
+    folder.succeeds(&format!("{scenes} --layout semantickitti"));
+    let scan = folder.scan("yard/sweeps/000000.npz");
+    let described: Value =
+        serde_json::from_slice(&folder.bytes("yard/sweeps/000000.json")).unwrap();
+    let sweep = "yard/semantickitti/sequences/00/velodyne/000000.bin";
+    let [bin, label] =
+        [sweep.to_owned(), sweep.replace("velodyne", "labels").replace("bin", "label")]
+            .map(|file| folder.bytes(&file));
     let n = scan.len();
     assert_eq!([bin.len(), label.len()], [16 * n, 4 * n]);
-    let header = String::from_utf8_lossy(&pcd[..pcd.len() - 26 * n]);
-    assert!(header.contains("\nFIELDS x y z intensity ring label instance\nSIZE 4 4 4 4 2 4 4\n"));
-    assert!(header.contains("\nTYPE F F F F U U U\nCOUNT 1 1 1 1 1 1 1\n"), "{header}");
-    assert!(header.ends_with(&format!("POINTS {n}\nDATA binary\n")), "{header}");
-    let at_f64 = |at: usize| f64::from_le_bytes(las[at..at + 8].try_into().unwrap());
-    let las_at = u32::from_le_bytes(las[96..100].try_into().unwrap()) as usize;
-    assert_eq!(las.len() - las_at, 20 * n);
-    let objects = said["objects"].as_array().unwrap();
-    let (mut kinds, rings) = (std::collections::BTreeSet::new(), scan.ring.as_ref().unwrap());
+    let objects = described["objects"].as_array().unwrap();
+    let mut kinds = std::collections::BTreeSet::new();
     for i in 0..n {
         let intensity = scan.intensity.as_ref().unwrap()[i];
-        let [x, y, z] = scan.positions[i];
-        let row: Vec<u8> = [x, y, z, intensity].iter().flat_map(|x| x.to_le_bytes()).collect();
-        assert_eq!([&bin[16 * i..][..16], &pcd[pcd.len() - 26 * (n - i)..][..16]], [&row; 2]);
-
-        let object = scan.object.as_ref().unwrap()[i] as usize;
-        let named = |key| objects.get(object - 1).map_or("air", |of| of[key].as_str().unwrap());
-        let [kind, class] = if object == 0 { ["ground"; 2] } else { ["kind", "class"].map(named) };
-        let object = if kind == "air" { 0 } else { object as u32 };
+        assert_eq!(bin[16 * i + 12..][..4], intensity.to_le_bytes());
+        let object = scan.object.as_ref().unwrap()[i];
+        let kind = objects.get((object as usize).wrapping_sub(1));
+        let (object, kind) = match (object, kind) {
+            (0, _) => (0, "ground"),
+            (_, None) => (0, "air"),
+            (_, Some(of)) => (object, of["kind"].as_str().unwrap()),
+        };
         kinds.insert(kind);
-        let class = classes.iter().position(|known| known == class).unwrap() as u32;
-        let (code, las_code) = codes(kind);
-        assert_eq!(label[4 * i..][..4], (object << 16 | u32::from(code)).to_le_bytes(), "{kind}");
-        let row = [&rings[i].to_le_bytes()[..], &class.to_le_bytes(), &object.to_le_bytes()];
-        assert_eq!(pcd[pcd.len() - 26 * (n - i) + 16..][..10], row.concat(), "{kind}");
-        let point = &las[las_at + 20 * i..][..20];
-        for (axis, &expected) in scan.positions[i].iter().enumerate() {
-            let [scale, offset] = [131, 155].map(|at| at_f64(at + 8 * axis));
-            let found = i32::from_le_bytes(point[4 * axis..][..4].try_into().unwrap());
-            let wrong = f64::from(found) * scale + offset - f64::from(expected);
-            assert!(wrong.abs() <= 0.5 * scale + 1e-9, "{wrong} m of {scale} m");
-        }
-        let brightness = (65535.0 * intensity).round() as u16;
-        assert_eq!(point[12..14], brightness.to_le_bytes());
-        assert_eq!([point[15], point[17]], [las_code, class as u8], "{kind}");
-        assert_eq!(point[18..20], (object as u16).to_le_bytes());
+        let expected = object << 16 | semantic_class(kind);
+        assert_eq!(label[4 * i..][..4], expected.to_le_bytes(), "{kind}");
     }
     assert!(kinds.is_superset(&["air", "ground", "car"].into()), "{kinds:?}");
-    for name in ["semantickitti/sweeps/velodyne/000000.bin", "pcd/sweeps/000000.pcd"] {
-        let said = folder.succeeds(&format!("preview {name} --overwrite"));
-        assert!(said.contains(&format!("{n} points")), "{said}");
-    }
+    let said = folder.succeeds(&format!("view {sweep} --out scan.png"));
+    assert!(said.contains(&format!("{n} points")), "{said}");
 }
 
 #[test]
@@ -210,21 +190,23 @@ fn every_command_reads_points_of_every_format() {
         |n: i32| (-n..=n).flat_map(move |i| (-n..=n).map(move |k| [f64::from(i), f64::from(k)]));
     let mut points: Vec<_> = grid(40).map(|[x, y]| [x * 0.25, y * 0.25, -1.5]).collect();
     points.extend(grid(5).map(|[y, z]| [5.0, y * 0.125, z * 0.125 - 0.25]));
-    let names = ["a.npz", "a.ply", "a.npy", "a.pcd", "a.xyz", "a.pts", "a.csv", "a.las", "a.bin"];
+    let names = ["a.npz", "a.ply", "a.npy", "a.pcd", "a.xyz", "a.pts", "a.csv", "a.bin"];
+    let four =
+        points.iter().flat_map(|&[x, y, z]| [x, y, z, 0.0].map(|x| (x as f32).to_le_bytes()));
+    folder.write("a.bin", four.flatten().collect::<Vec<u8>>());
     for name in names {
-        write_cloud(&folder.at(name), &points).unwrap();
-        let said =
-            folder.succeeds(&format!("segment {name} --overwrite --out clusters --radius 0.3"));
-        assert!(said.contains(" 2 clusters"), "{name}: {said}");
-        folder.succeeds(&format!("detect {name} --overwrite --out objects.json"));
-        let weather = "--fog 100 --reflectivity 0.5 --overwrite --out fog.npz";
-        folder.succeeds(&format!("weather {name} {weather}"));
-        folder.succeeds(&format!(
-            "corrupt {name} --only crosstalk --severity 1 --overwrite --out corrupted"
-        ));
-        let said = folder.succeeds(&format!("preview {name} --overwrite"));
+        if name != "a.bin" {
+            write_cloud(&folder.at(name), &points).unwrap();
+        }
+        let said = folder.succeeds(&format!("view {name} --overwrite --out scan.png"));
         assert!(said.contains(&format!("{} points: scan.png", points.len())), "{said}");
+        folder.succeeds(&format!("detect {name} --overwrite --out objects.json"));
     }
+    // Each command by another format.
+    let said = folder.succeeds("detect a.pcd --segment-only --out clusters --radius 0.3");
+    assert!(said.contains(" 2 clusters"), "{said}");
+    folder.succeeds("corrupt a.csv --fog 100 --reflectivity 0.5 --out fog.npz");
+    folder.succeeds("corrupt a.bin --only crosstalk --severity 1 --out corrupted");
     let five: Vec<u8> = (0..)
         .zip(&points)
         .flat_map(|(i, &[x, y, z])| [x, y, z, 0.0, f64::from(i % 32)])
@@ -236,52 +218,37 @@ fn every_command_reads_points_of_every_format() {
         1,
         &[
             (
-                "segment five.bin --out out",
-                "look like rings of nuScenes: name the format by --format",
+                "detect five.bin --segment-only --out out",
+                "look like rings of nuScenes: name the format by --input-format",
             ),
             ("detect five.bin --out out.json", "five.bin: format: the fifth numbers"),
-            ("preview five --out out.png", "five: extension: unknown cloud format ``"),
-            ("preview - --out out.png", "-: name: expected a file, found standard input, which"),
+            ("view five --out out.png", "five: extension: unknown cloud format ``"),
+            ("view - --out out.png", "-: name: expected a file, found standard input, which"),
             #[cfg(unix)]
             ("detect /dev/null --out out.json", "expected a file, found a pipe or device, which"),
         ],
     );
     for file in ["five.bin", "five"] {
         folder.succeeds(&format!(
-            "segment {file} --overwrite --format nuscenes --out clusters --radius 0.3"
+            "detect {file} --segment-only --overwrite --input-format nuscenes --out clusters --radius 0.3"
         ));
     }
 
     // UTM: in f32 the box would be in steps of half a metre.
     let [east, north] = [691_000.0, 5_334_000.0];
     let far: Vec<_> = points.iter().map(|[x, y, z]| [x + east, y + north, *z]).collect();
-    write_cloud(&folder.at("utm.las"), &far).unwrap();
-    let segment = "segment utm.las --overwrite --out clusters --radius 0.3";
-    folder.refuses(1, &[(segment, "give the sensor's position by --sensor")]);
-    let said = folder.succeeds(&format!("{segment} --sensor {east} {north} 0"));
+    write_cloud(&folder.at("utm.npy"), &far).unwrap();
+    let segment = "detect utm.npy --segment-only --overwrite --out clusters --radius 0.3";
+    folder.refuses(1, &[(segment, "give the sensor's position by --origin")]);
+    let said = folder.succeeds(&format!("{segment} --origin {east} {north} 0"));
     assert!(said.contains(" 2 clusters"), "{said}");
     assert!(!said.contains("numbers of 32 bits"), "{said}");
     let rounded: Vec<_> = far.iter().map(|point| point.map(|x| f64::from(x as f32))).collect();
     write_cloud(&folder.at("rounded.npy"), &rounded).unwrap();
-    let segment = "segment rounded.npy --overwrite --out clusters --radius 0.3";
-    let said = folder.succeeds(&format!("{segment} --sensor {east} {north} 0"));
+    let segment = "detect rounded.npy --segment-only --overwrite --out clusters --radius 0.3";
+    let said = folder.succeeds(&format!("{segment} --origin {east} {north} 0"));
     assert!(said.contains("32 bits, which are 0.5 m apart at 533401"), "{said}");
-    folder.succeeds("preview utm.las --out out.png");
-    folder.write("objects.json", "mine");
-    folder.refuses(
-        2,
-        &[
-            (
-                "segment a.ply --out clusters",
-                "clusters: it exists already: --overwrite replaces it",
-            ),
-            ("detect a.ply --out objects.json", "objects.json: it exists already"),
-            ("weather a.ply --rain 1 --reflectivity 1 --out fog.npz", "fog.npz: it exists already"),
-            ("corrupt a.ply --reflectivity 1 --out corrupted", "corrupted: it exists already"),
-            ("preview a.ply", "scan.png: it exists already"),
-        ],
-    );
-    assert_eq!(folder.text("objects.json"), "mine");
+    folder.succeeds("view utm.npy --out out.png");
 }
 
 #[test]
@@ -289,89 +256,18 @@ fn captures_of_several_senders_and_interfaces_are_read() {
     let inputs = need!(shared_data("bug_inputs"));
     let folder = Folder::new();
     let file = |name: &str| inputs.join(name).display().to_string();
-    let said = folder.succeeds(&format!("segment {} --out clusters", file("two_senders.pcap")));
+    let said = folder
+        .succeeds(&format!("detect {} --segment-only --out clusters", file("two_senders.pcap")));
     assert!(
         said.contains("warning: ") && said.contains("--from ") && said.contains(" chooses another"),
         "{said}"
     );
     let chosen = |address| {
-        folder
-            .succeeds(&format!("preview {} --overwrite --from {address}", file("two_senders.pcap")))
+        folder.succeeds(&format!(
+            "view {} --overwrite --out scan.png --from {address}",
+            file("two_senders.pcap")
+        ))
     };
     assert_ne!(chosen("192.168.1.201"), chosen("192.168.1.202"));
     folder.succeeds(&format!("detect {} --out a.json", file("linux_cooked.pcap")));
-}
-
-#[test]
-fn what_cannot_be_used_is_named_and_nothing_is_written() {
-    let folder = Folder::new();
-    folder.write("recipe.toml", "mount = { height_m = [1, 2] }\n[[sensor]]\nprofile = \"vlp99\"\n");
-    folder.write(
-        "own.toml",
-        "mount = { height_m = [1, 2] }\n[[sensor]]\nprofile = \"vlp16\"\n[[object]]\nkind = \"mesh\"\n\
-         class = \"chair\"\ncount = [1, 1]\nplace = \"anywhere\"\ndistance_m = [2, 3]\n\
-         meshes = \"chairs\"\nheight_m = [1, 1]\n",
-    );
-    let flat = "v 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\n";
-    folder.write("flat/chairs/flat.obj", flat);
-    folder.write("not_a_cloud.npz", "nothing");
-    folder.write("no_capture.PCAP", "nothing");
-    folder.refuses(
-        1,
-        &[
-            ("gen-scenes missing.toml --out out", "missing.toml"),
-            ("gen-scenes recipe.toml --out out", "object: expected at least one [[object]]"),
-            ("gen-scenes street --sensor vlp99 --out out", "vlp99"),
-            (
-                "gen-scenes own.toml --out out",
-                "chairs: expected a folder with OBJ, OFF, PLY, STL or glTF files",
-            ),
-            ("gen-scenes own.toml --meshes . --out out", "chairs: expected a folder with OBJ"),
-            (
-                "gen-scenes own.toml --meshes flat --out out",
-                "flat.obj: expected a mesh with a height, found all of it at one height",
-            ),
-            ("segment missing.npz --out out", "missing.npz"),
-            ("segment not_a_cloud.npz --out out", "not_a_cloud.npz"),
-            ("segment no_capture.PCAP --out out", "no_capture.PCAP: header: expected a capture"),
-            ("segment no_capture.PCAP --metadata missing.json --out out", "missing.json"),
-            (
-                "segment no_capture.PCAP --metadata recipe.toml --out out",
-                "recipe.toml: metadata: expected JSON: expected value at",
-            ),
-            ("detect missing.npz --model nothing.safetensors --out out.json", "missing.npz"),
-            (
-                "detect missing.npz --out out.txt --calib flat/chairs/flat.obj",
-                "flat.obj: R0_rect: expected this line of the calibration of KITTI's object",
-            ),
-        ],
-    );
-    folder.refuses(
-        2,
-        &[
-            (
-                "detect missing.npz --out out.png",
-                "--out: expected a name with .json or .txt, found out.png",
-            ),
-            (
-                "detect missing.npz --out out.json --calib calib.txt",
-                "--calib applies to KITTI's labels",
-            ),
-            (
-                "detect missing.npz --out out.json --min-confidence 2",
-                "expected a number from 0 to 1",
-            ),
-            (
-                "preview missing.npz --out out.html",
-                "--out: expected a name with .png, found out.html",
-            ),
-        ],
-    );
-    folder.write(
-        "empty.ply",
-        "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\n\
-         property float y\nproperty float z\nend_header\n",
-    );
-    folder.refuses(3, &[("preview empty.ply --out out.png", "empty.ply: expected points, meshes")]);
-    assert!(!folder.at("out").exists(), "something was written");
 }

@@ -39,32 +39,6 @@ fn parts_that_are_killed_and_gone_on_with_are_the_whole() {
 }
 
 #[test]
-fn what_is_there_is_refused_unless_it_is_gone_on_with() {
-    let folder = Folder::with_meshes();
-    folder.succeeds(&format!("{WORDS} --out out"));
-    let other = format!("{WORDS} --out out --seed 1");
-    folder.refuses(
-        1,
-        &[
-            (&format!("{WORDS} --out out"), "holds tars already"),
-            (&format!("{other} --resume"), "was begun with other settings"),
-        ],
-    );
-    folder.succeeds(&format!("{other} --overwrite"));
-    folder.refuses(
-        1,
-        &[
-            ("gen-dataset meshes --out x --layout webdataset", "name it with --sensor"),
-            (
-                "gen-dataset meshes --out x --views 70000",
-                "expected at most 65535 where each scan is a file",
-            ),
-            (&format!("{WORDS} --out x --layout webdataset,yanx27"), "it writes tars alone"),
-        ],
-    );
-}
-
-#[test]
 fn one_part_leaves_the_others_alone() {
     let folder = Folder::with_meshes();
     for part in [1, 2] {
@@ -83,7 +57,7 @@ fn one_part_leaves_the_others_alone() {
 }
 
 #[test]
-fn what_is_missing_is_made_again_and_what_is_torn_is_found() {
+fn missing_tars_are_made_again_and_torn_ones_found() {
     let folder = Folder::with_meshes();
     let words = format!("{WORDS} --out out --hash none");
     folder.succeeds(&words);
@@ -170,17 +144,8 @@ fn a_scan_of_a_tar_is_that_of_its_class_mesh_and_view() {
 }
 
 #[test]
-fn a_mesh_that_cannot_be_read_is_left_out_and_named() {
-    let folder = Folder::with_meshes();
-    folder.write("meshes/ring/train/broken.off", "OFF\n1 1 0\n");
-    let said = folder.exits(3, &format!("{WORDS} --out out"));
-    assert!(said.contains("failed: ring/train/broken.off"), "{said}");
-    folder.succeeds("gen-dataset --verify out");
-}
-
-#[test]
 #[cfg(unix)]
-fn a_run_that_is_told_to_end_leaves_no_half_of_a_tar() {
+fn a_terminated_run_leaves_no_half_of_a_tar() {
     let folder = Folder::with_meshes();
     let words = format!("{WORDS} --out out --resume --shard 1/2");
     let words = words.replace("--views 3", "--views 900").replace("clouds 4", "clouds 1500");
@@ -206,25 +171,10 @@ fn a_run_that_is_told_to_end_leaves_no_half_of_a_tar() {
     folder.succeeds(&words);
 }
 
-/// A billion views of nine meshes: one part in a hundred million is made like any other.
-#[test]
-fn a_task_of_a_very_large_dataset_does_its_part_alone() {
-    let folder = Folder::with_meshes();
-    let words = WORDS
-        .replace("--views 3", "--views 4000000000")
-        .replace("--tar-clouds 4", "--tar-clouds 64");
-    let too_many = format!("{words} --out out --shard 7/1000000");
-    folder.refuses(1, &[(&too_many, "clouds_per_tar: expected at most 1000000 tars of a split")]);
-    let words = words.replace("4000000000", "4000000");
-    folder.succeeds(&format!("{words} --out out --shard 7/900000"));
-    let part = folder.text("out/part-0006-of-900000.json");
-    assert!(part.contains("train-000006.tar"), "{part}");
-}
-
 /// The signal of a scheduler also ends the command. The task has not failed, and can resume.
 #[test]
 #[cfg(unix)]
-fn a_run_that_is_told_to_end_while_a_tar_is_handed_over_is_interrupted() {
+fn a_run_terminated_during_a_hand_over_is_interrupted() {
     let folder = Folder::with_meshes();
     let run = |command: &str| {
         let words = format!("{WORDS} --out out --resume --tar-clouds 1000 --on-shard");

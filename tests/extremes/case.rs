@@ -8,7 +8,6 @@ use serde::Deserialize;
 
 use crate::classify::Classify;
 use crate::effect::InCube;
-use crate::sample::Sample;
 use crate::scan::Scan;
 use crate::scene::ManyObjects;
 use crate::sweep::Sweep;
@@ -24,7 +23,6 @@ struct File {
     scan: Option<Scan>,
     classify: Option<Classify>,
     effect: Option<InCube>,
-    sample: Option<Sample>,
     scene: Option<ManyObjects>,
     sweep: Option<Sweep>,
 }
@@ -33,7 +31,7 @@ type Check = Box<dyn FnOnce() + Send>;
 
 pub fn trials() -> Vec<Trial> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("extremes/cases");
-    let mut trials = vec![Trial::test("what_is_misspelt_is_named", what_is_misspelt_is_named)];
+    let mut trials = vec![Trial::test("misspelt_keys_are_named", misspelt_keys_are_named)];
     for (path, content) in tests::tree::files(&root) {
         let name = path.with_extension("").to_string_lossy().replace('\\', "/");
         let test = parse(&String::from_utf8_lossy(&content), &path)
@@ -57,19 +55,16 @@ fn parse(text: &str, path: &Path) -> Result<(bool, Check), String> {
     if file.derivation.trim().is_empty() {
         return Err("`derivation` is empty".to_owned());
     }
-    let kinds: [(&str, Option<Check>); 6] = [
+    let kinds: [(&str, Option<Check>); 5] = [
         ("scan", file.scan.map(|case| Box::new(move || case.check()) as Check)),
         ("classify", file.classify.map(|case| Box::new(move || case.check()) as Check)),
         ("effect", file.effect.map(|case| Box::new(move || case.check()) as Check)),
-        ("sample", file.sample.map(|case| Box::new(move || case.check()) as Check)),
         ("scene", file.scene.map(|case| Box::new(move || case.check()) as Check)),
         ("sweep", file.sweep.map(|case| Box::new(move || case.check()) as Check)),
     ];
     let mut named = kinds.into_iter().filter_map(|(kind, check)| Some((kind, check?)));
     let (Some((kind, check)), None) = (named.next(), named.next()) else {
-        return Err(
-            "a case is one table: scan, classify, effect, sample, scene or sweep".to_owned()
-        );
+        return Err("a case is one table: scan, classify, effect, scene or sweep".to_owned());
     };
     match path.parent().and_then(Path::file_name) {
         Some(folder) if folder == kind => Ok((file.heavy, check)),
@@ -77,21 +72,20 @@ fn parse(text: &str, path: &Path) -> Result<(bool, Check), String> {
     }
 }
 
-fn what_is_misspelt_is_named() -> Result<(), libtest_mimic::Failed> {
-    let sample = "[sample]\npoints = [[0, 0, 0]]\nsampler = \"voxel\"\nvoxel_size = 1\n";
-    let whole = format!("derivation = \"one\"\n{sample}kept = [0]\n");
+fn misspelt_keys_are_named() -> Result<(), libtest_mimic::Failed> {
+    let sweep = "[sweep]\nground = 0\nclusters = []\nsmall = 0\n";
+    let whole = format!("derivation = \"one\"\n{sweep}invalid = 0\n");
     let message = |text: &str, name: &str| parse(text, Path::new(name)).err().unwrap_or_default();
-    assert_eq!(message(&whole, "sample/a.toml"), "");
+    assert_eq!(message(&whole, "sweep/a.toml"), "");
     for (text, name, expected) in [
-        (whole.replace("kept", "keeps"), "sample/a.toml", "unknown field `keeps`"),
-        (whole.replace("derivation", "derived"), "sample/a.toml", "unknown field `derived`"),
-        (whole.replace("[sample]", "[samples]"), "sample/a.toml", "unknown field `samples`"),
-        (whole.replace("voxel\"", "voxels\""), "sample/a.toml", "unknown variant `voxels`"),
-        (whole.replace("\"one\"", "\" \""), "sample/a.toml", "`derivation` is empty"),
-        ("derivation = \"one\"".to_owned(), "sample/a.toml", "a case is one table"),
-        (sample.to_owned() + "kept = [0]", "sample/a.toml", "missing field `derivation`"),
-        (whole.clone(), "scan/a.toml", "belongs into the folder sample"),
-        (whole.clone(), "sample/a.tml", "ends in .toml"),
+        (whole.replace("small", "tiny"), "sweep/a.toml", "unknown field `tiny`"),
+        (whole.replace("derivation", "derived"), "sweep/a.toml", "unknown field `derived`"),
+        (whole.replace("[sweep]", "[sweeps]"), "sweep/a.toml", "unknown field `sweeps`"),
+        (whole.replace("\"one\"", "\" \""), "sweep/a.toml", "`derivation` is empty"),
+        ("derivation = \"one\"".to_owned(), "sweep/a.toml", "a case is one table"),
+        (sweep.to_owned() + "invalid = 0", "sweep/a.toml", "missing field `derivation`"),
+        (whole.clone(), "scan/a.toml", "belongs into the folder sweep"),
+        (whole.clone(), "sweep/a.tml", "ends in .toml"),
     ] {
         let found = message(&text, name);
         assert!(found.contains(expected), "{expected}: {found}");

@@ -1,7 +1,5 @@
 use serde::Deserialize;
 
-use crate::stream;
-
 #[derive(Clone, Deserialize)]
 #[serde(tag = "rule", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Cloud {
@@ -13,9 +11,6 @@ pub enum Cloud {
     Strip { n: usize, outlier: Option<[f64; 3]> },
     /// n points on the surface of an upright vase with a round foot, a belly and a neck.
     Vase { n: usize },
-    /// n points, uniform in a cube, which are read from a stream of bytes and never stored on a
-    /// disk.
-    Streamed { n: usize },
 }
 
 impl Cloud {
@@ -25,7 +20,6 @@ impl Cloud {
             Self::Repeated { point, n } => vec![*point; *n],
             Self::Strip { n, outlier } => (0..*n).map(|i| strip(i, *n)).chain(*outlier).collect(),
             Self::Vase { n } => (0..*n).map(|i| vase(i, *n)).collect(),
-            Self::Streamed { n } => stream::read(*n),
         }
     }
 }

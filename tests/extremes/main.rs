@@ -19,11 +19,9 @@ mod cloud;
 mod effect;
 mod model;
 mod rules;
-mod sample;
 mod scan;
 mod scene;
 mod shape;
-mod stream;
 mod sweep;
 #[path = "../../infer-cpu/tests/support/tiny_model.rs"]
 mod tiny_model;

@@ -1,5 +1,7 @@
 //! Relations between several scans, which the table of one case cannot express.
 
+use edgepuck_mesh::TriangleMesh;
+use edgepuck_mesh::validate::triangle_stats;
 use glam::{DAffine3, DMat3, DVec3, dvec3};
 use libtest_mimic::Trial;
 use sim_gpu::effects::Effects;
@@ -7,8 +9,6 @@ use sim_gpu::internals::bvh::Builder;
 use sim_gpu::internals::caster::OpenCaster;
 use sim_gpu::internals::cpu::oracle;
 use sim_gpu::internals::job::Culling;
-use sim_gpu::internals::mesh::TriangleMesh;
-use sim_gpu::internals::mesh::validate::triangle_stats;
 use sim_gpu::internals::pose::Pose;
 use sim_gpu::internals::ray::MISS;
 use sim_gpu::internals::resolve::Hits;
@@ -35,7 +35,7 @@ pub fn trials() -> Vec<Trial> {
     trials![
         a_sensor_on_a_surface_is_blind_or_looks_past_it,
         an_empty_object_in_a_batch_has_no_hits,
-        of_coincident_triangles_the_lowest_index_is_hit,
+        lowest_index_of_coincident_triangles_is_hit,
         a_squeezed_object_is_seen_as_its_squeezed_mesh,
         an_object_flattened_to_nothing_is_not_seen,
         a_chair_far_away_and_noisy_is_classified_as_at_the_origin,
@@ -117,7 +117,7 @@ fn unsurveyed(mesh: TriangleMesh) -> Target {
 }
 
 /// Coincident triangles, both so near that f64 decides and so far that f32 decides.
-fn of_coincident_triangles_the_lowest_index_is_hit() {
+fn lowest_index_of_coincident_triangles_is_hit() {
     let single = soup(50, 1.0);
     let copies = |order: [[usize; 3]; 3]| {
         let turn = |p: [usize; 3]| {

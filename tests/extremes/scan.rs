@@ -1,6 +1,7 @@
 //! Cases of one mesh and one sensor. The hits of all casters, with and without culling, are
 //! compared with the f64 oracle and with the expected output.
 
+use edgepuck_mesh::TriangleMesh;
 use glam::{DQuat, DVec3};
 use serde::Deserialize;
 use sim_gpu::effects::Effects;
@@ -8,7 +9,6 @@ use sim_gpu::internals::bvh::{Builder, assert_well_formed};
 use sim_gpu::internals::caster::OpenCaster;
 use sim_gpu::internals::cpu::oracle;
 use sim_gpu::internals::job::{CastJob, Culling};
-use sim_gpu::internals::mesh::TriangleMesh;
 use sim_gpu::internals::pose::Pose;
 use sim_gpu::internals::resolve::{Hits, resolve};
 use sim_gpu::internals::sensor::BeamPattern;
@@ -172,8 +172,8 @@ impl Scan {
         let mut random = Random::new("aims");
         let (pattern, aims) = self.beams.pattern(&mesh, pose.position_m, &mut random);
         let ranges = self.expect.ranges.as_ref().map(|ranges| {
-            let told = ranges.of(pose.position_m, &pattern, aims.as_deref());
-            told.into_iter().map(|range| range.map(|range| range * setting.scale())).collect()
+            let found = ranges.of(pose.position_m, &pattern, aims.as_deref());
+            found.into_iter().map(|range| range.map(|range| range * setting.scale())).collect()
         });
         let target = target_by(builder, &mapped(&mesh, |v| setting.moved(v)));
         assert_well_formed(&target.bvh);

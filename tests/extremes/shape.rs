@@ -1,6 +1,6 @@
+use edgepuck_mesh::TriangleMesh;
 use glam::{DQuat, DVec3, dvec3};
 use serde::Deserialize;
-use sim_gpu::internals::mesh::TriangleMesh;
 use tests::meshes;
 
 #[derive(Clone, Deserialize)]

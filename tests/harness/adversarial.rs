@@ -2,11 +2,11 @@
 
 use std::collections::BTreeSet;
 
+use edgepuck_mesh::TriangleMesh;
 use glam::{DVec3, Vec3};
 use sim_gpu::internals::cast_error::CastError;
 use sim_gpu::internals::caster::OpenCaster;
 use sim_gpu::internals::job::CastJob;
-use sim_gpu::internals::mesh::TriangleMesh;
 use sim_gpu::internals::ray::MISS;
 use sim_gpu::internals::resolve::resolve;
 use sim_gpu::internals::sensor::BeamPattern;

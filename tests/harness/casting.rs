@@ -1,12 +1,12 @@
 //! From a mesh and a sensor to hits, in one call.
 
+use edgepuck_mesh::TriangleMesh;
+use edgepuck_mesh::validate::triangle_stats;
 use formats::rng::StreamKey;
 use glam::{DAffine3, DQuat, DVec3};
 use sim_gpu::internals::bvh::{Builder, Bvh, TwoWide};
 use sim_gpu::internals::caster::OpenCaster;
 use sim_gpu::internals::job::{Cast, CastJob, Culling};
-use sim_gpu::internals::mesh::TriangleMesh;
-use sim_gpu::internals::mesh::validate::triangle_stats;
 use sim_gpu::internals::pose::Pose;
 use sim_gpu::internals::ray::RayFrame;
 use sim_gpu::internals::resolve::{Hits, resolve};

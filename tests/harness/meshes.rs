@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 
+use edgepuck_mesh::TriangleMesh;
 use glam::{DVec3, dvec3};
-use sim_gpu::internals::mesh::TriangleMesh;
 
 use crate::random::Random;
 

@@ -1,18 +1,18 @@
 //! Datasets whose scans were never cast: finishing, verifying and merging need only files and
 //! records that agree.
 
-use edgepuck_dataset::internals::{Journal, Terms, layout};
+use edgepuck_dataset::internals::Terms;
 use edgepuck_dataset::{
-    DatasetConfig, Entry, FileRecord, Layout, MeshFailure, MeshRecord, ScanRecord, SetConfig,
-    Variant, VariantRecord, Viewpoints,
+    DatasetConfig, DatasetFolder, Entry, FileRecord, MeshFailure, MeshRecord, ScanRecord,
+    SetConfig, Variant, VariantRecord, Viewpoints,
 };
+use edgepuck_mesh::frame::Up;
+use edgepuck_mesh::validate::MeshDefects;
 use formats::Split;
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, Scan};
 use formats::scan_file::{ScanFormat, write_scan};
 use sim_gpu::Sensor;
-use sim_gpu::internals::mesh::frame::Up;
-use sim_gpu::internals::mesh::validate::MeshDefects;
 use sim_gpu::internals::scan::Tally;
 use sim_gpu::internals::sensor::Views;
 use std::path::Path;
@@ -37,7 +37,7 @@ pub fn config() -> DatasetConfig {
         variants: vec![Variant::Clean, Variant::Noisy],
         packed_points: PACKED_POINTS,
         min_points: MIN_POINTS,
-        layouts: vec![Layout::Yanx27],
+        layouts: Vec::new(),
         ..DatasetConfig::new(vec![
             set("rotational", "vlp32c", Views { count: 2, ..Views::ROTATING }),
             set("static", "kinect-v2", Views { azimuth_jitter_deg: 10.0, ..Views::STATIC }),
@@ -68,7 +68,7 @@ pub fn failure(class: &str, split: Split, name: &str) -> MeshFailure {
 
 /// Begins a dataset in `out` and writes the scans of `entries`, as a run that was killed leaves it.
 pub fn write(out: &Path, terms: &Terms, entries: &[Entry]) -> Vec<MeshRecord> {
-    Journal::at(out).begin(terms).expect("a journal");
+    DatasetFolder(out).write_terms(terms).expect("a journal");
     entries.iter().map(|entry| write_mesh(out, &terms.config, entry)).collect()
 }
 
@@ -93,7 +93,6 @@ fn write_mesh(out: &Path, config: &DatasetConfig, entry: &Entry) -> MeshRecord {
         triangles: 12,
         dropped_faces: 0,
         defects: MeshDefects::default(),
-        simplified: None,
         scans,
         warnings: Vec::new(),
     }
@@ -110,7 +109,7 @@ fn write_variant(
     let name = format!("{}/{}/{}/{}", set.name, variant.name(), entry.id(), entry.split);
     let scan = scan(StreamKey::new(config.seed, &name, view));
     let write = |&format: &ScanFormat| {
-        let path = layout::scan(out, &set.name, variant, entry, view, format);
+        let path = out.join(entry.scan_file(&set.name, variant, view, format));
         FileRecord { format, hash: write_scan(&path, format, config.hash, &scan).expect("a scan") }
     };
     VariantRecord {

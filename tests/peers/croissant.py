@@ -1,4 +1,4 @@
-"""What `edgepuck card` writes, read by mlcroissant and by Hugging Face's datasets.
+"""What `edgepuck gen-dataset --card` writes, read by mlcroissant and by Hugging Face's datasets.
 
 mlcroissant finds nothing amiss and reads the classes and the list of files; datasets finds the tars by
 the card. Run by `cargo xtask test`; see xtask/src/test/peers.rs.
@@ -8,7 +8,7 @@ import json
 import os
 from importlib.metadata import version
 
-from peer import OUT, edgepuck, run, skipped_if_missing
+from peer import OUT, edgepuck, run, save_shapes, skipped_if_missing
 
 # Nothing is asked of the Hub.
 os.environ["HF_HUB_OFFLINE"] = "1"
@@ -24,7 +24,7 @@ PUBLICATION = ["--name", "Some shapes", "--license", "MIT", "--url", "https://ex
 def described(folder, *words):
     """A dataset and what mlcroissant says of it."""
     edgepuck("gen-dataset", OUT / "shapes", "--out", folder, *FLAGS, *words)
-    edgepuck("card", folder, *PUBLICATION)
+    edgepuck("gen-dataset", "--card", folder, *PUBLICATION)
     dataset = mlcroissant.Dataset(jsonld=folder / "croissant.json")
     issues = dataset.metadata.ctx.issues
     assert not issues.errors and not issues.warnings, issues.report()
@@ -51,7 +51,7 @@ def tars(sample):
     return shapes
 
 
-edgepuck("gen-shapes", "--out", OUT / "shapes", "--train", 3, "--test", 1)
+save_shapes(3, 1)
 assert tars("clouds")["clouds/points"] == "-1,128,3"
 assert tars("scan")["scan/normal"] == "-1,3"
 files, shapes = described(OUT / "files")

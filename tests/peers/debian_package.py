@@ -171,7 +171,7 @@ def serve(root):
 def send():
     """Sends the packets of half a second of a drive at their times; gives their number."""
     capture = OUT / "drive.pcap"
-    edgepuck("gen-drive", "--seconds", "0.5", "--out", capture)
+    edgepuck("gen-scenes", "--drive", "0.5", "--out", capture)
     content, at, n_packets = capture.read_bytes(), 24, 0
     start = time.monotonic()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:

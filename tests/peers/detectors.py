@@ -1,6 +1,6 @@
 """pykitti on our sequences, and nuscenes-devkit on the boxes that test the laboratory's precision.
 
-pykitti reads a drive that `gen-drive --layout semantickitti` wrote. Its points on objects that stand
+pykitti reads a drive that `gen-scenes --drive S --layout semantickitti` wrote. Its points on objects that stand
 still must coincide over all sweeps once its poses have moved them into the first camera's frame, but
 for the noise. nuscenes-devkit's average precision of the
 boxes in xtask/lab/src/study/frames/precision.json must be what that file says, which the test of
@@ -35,7 +35,7 @@ tilt_deg = [2, 2]
 sway_deg = [1, 1]
 [[sensor]]
 profile = "hdl64e"
-noise_m = {NOISE_M}
+effects = {{ noise = {{ sigma_m = {NOISE_M} }} }}
 [[object]]
 kind = "mesh"
 class = "wall"
@@ -61,8 +61,8 @@ def sequence():
     lines = ["OFF", "8 6 0", *(" ".join(map(str, at)) for at in corners), *("4 " + f for f in faces)]
     (OUT / "meshes/walls/wall.off").write_text("\n".join(lines) + "\n")
     folder = OUT / "kitti/sequences/00"
-    edgepuck("gen-drive", OUT / "walls.toml", "--meshes", OUT / "meshes", "--sensor", "hdl64e",
-             "--seconds", N_TURNS * PERIOD_S, "--speed", SPEED_M_S, "--layout", "semantickitti",
+    edgepuck("gen-scenes", OUT / "walls.toml", "--meshes", OUT / "meshes", "--sensor", "hdl64e",
+             "--drive", N_TURNS * PERIOD_S, "--speed", SPEED_M_S, "--layout", "semantickitti",
              "--out", folder)
     # pykitti expects them where KITTI's odometry benchmark has them.
     (OUT / "kitti/poses").mkdir()

@@ -7,7 +7,7 @@ xtask/src/test/peers.rs.
 
 import shutil
 
-from peer import EDGEPUCK, OUT, edgepuck, run, skipped_if_missing
+from peer import EDGEPUCK, OUT, edgepuck, job_file, run, save_shapes, skipped_if_missing, tars
 
 with skipped_if_missing():
     import hyperqueue
@@ -19,9 +19,9 @@ WORDS = ["gen-dataset", str(OUT / "shapes"), "--layout", "webdataset", "--sensor
          "4", "--points", "128", "--adapter", "cpu", "--tar-clouds", "30", "--resume"]
 
 
-def tars(folder):
+def verified(folder):
     edgepuck("gen-dataset", "--verify", OUT / folder)
-    return {tar.name: tar.read_bytes() for tar in (OUT / folder).glob("*.tar")}
+    return tars(folder)
 
 
 def killed_once(task, scheduler):
@@ -35,7 +35,10 @@ def killed(scheduler):
 
 
 def by_hyperqueue():
-    words = ["--shard", f"auto/{PARTS}", "--out", str(OUT / "hyperqueue"), "--on-shard"]
+    task = f"'{killed_once('$((HQ_TASK_ID + 1))', 'hq')}'"
+    words = [*WORDS[1:-1], "--out", OUT / "hyperqueue", "--on-shard", task]
+    script = OUT / "task.sh"
+    script.write_text(job_file("task.sh", PARTS, words).replace("edgepuck gen-dataset", f"{EDGEPUCK} gen-dataset", 1))
     with LocalCluster() as cluster:
         cluster.start_worker(WorkerConfig(cores=2))
         client = cluster.client()
@@ -44,7 +47,7 @@ def by_hyperqueue():
             # What tasks print lies there.
             job = Job(default_workdir=OUT)
             for _ in range(PARTS):
-                job.program([EDGEPUCK, *WORDS, *words, killed_once("$((HQ_TASK_ID + 1))", "hq")])
+                job.program(["sh", str(script)])
             return client.submit(job)
 
         assert not client.wait_for_jobs([submitted()], raise_on_error=False)
@@ -59,15 +62,15 @@ def by_parallel():
     assert killed("parallel") == 2
 
 
-edgepuck("gen-shapes", "--out", OUT / "shapes", "--train", 4, "--test", 1)
+save_shapes(4, 1)
 edgepuck(*WORDS, "--out", OUT / "alone")
-alone = tars("alone")
+alone = verified("alone")
 assert len(alone) > PARTS
 by_hyperqueue()
-assert tars("hyperqueue") == alone
+assert verified("hyperqueue") == alone
 said = f"HyperQueue {hyperqueue.__version__ if hasattr(hyperqueue, '__version__') else ''}".strip()
 if shutil.which("parallel"):
     by_parallel()
-    assert tars("parallel") == alone
+    assert verified("parallel") == alone
     said += " and GNU parallel"
 print(f"{said}: {len(alone)} tars of {PARTS} tasks, two of which were killed, are those of one run")

@@ -70,7 +70,7 @@ def drive(capture, speed_m_s):
     recipe, n = re.subn(r"(?m)^roughness_m = .*$", rough, recipe)
     assert n == 1, "the recipe has another form"
     (OUT / "rough.toml").write_text(recipe)
-    edgepuck("gen-drive", OUT / "rough.toml", "--seconds", SECONDS, "--speed", speed_m_s,
+    edgepuck("gen-scenes", OUT / "rough.toml", "--drive", SECONDS, "--speed", speed_m_s,
              "--seed", SEED, "--out", capture)
 
 

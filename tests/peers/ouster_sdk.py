@@ -1,6 +1,6 @@
 """ouster-sdk, Ouster's own programs, on packets that it writes and on real ones.
 
-`segment` reads the first whole frame of a capture to the points that ouster-sdk makes of it.
+`detect --segment-only` reads the first whole frame of a capture to the points that ouster-sdk makes of it.
 Beams of our profiles, and of metadata taken for a profile, lie where it puts them.
 Run by `cargo xtask test`; see xtask/src/test/peers.rs.
 """
@@ -81,10 +81,10 @@ def points(frame, info):
 
 
 def compare(name, capture, text, expected):
-    """That `segment` reads `expected` from a capture, by the metadata `text`."""
+    """That `detect --segment-only` reads `expected` from a capture, by the metadata `text`."""
     told = OUT / "metadata.json"
     told.write_text(text)
-    edgepuck("segment", capture, "--metadata", told, "--overwrite", "--out", OUT / "clusters")
+    edgepuck("detect", capture, "--segment-only", "--metadata", told, "--overwrite", "--out", OUT / "clusters")
     vertices = plyfile.PlyData.read(str(OUT / "clusters/sweep.ply"))["vertex"]
     ours = numpy.stack([vertices[axis] for axis in "xyz"], 1).astype(float)
     assert ours.shape == expected.shape, f"{name}: {len(ours)} points of {len(expected)}"

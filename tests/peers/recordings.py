@@ -40,7 +40,7 @@ ROUNDING = 0.0005 + 1e-12
 
 def main():
     capture, recording = OUT / "drive.pcap", OUT / "run.mcap"
-    edgepuck("gen-drive", "street", "--seconds", SECONDS, "--out", capture)
+    edgepuck("gen-scenes", "street", "--drive", SECONDS, "--out", capture)
     live = infer("live", "--pcap", capture, "--poses", capture.with_suffix(".tum"), "--json", "--mcap",
                  recording, "--model", ROOT / "assets/weights/street-128.safetensors")
     objects = [json.loads(line) for line in live.stdout.splitlines()]

@@ -46,7 +46,7 @@ TOPICS = {
 
 
 def main():
-    edgepuck("gen-drive", "street", "--seconds", SECONDS, "--out", OUT / "drive.pcap")
+    edgepuck("gen-scenes", "street", "--drive", SECONDS, "--out", OUT / "drive.pcap")
     lines = run(*LIVE, "--json", "--mcap", OUT / "run.mcap").stdout
     with AnyReader([OUT / "run.mcap"]) as reader:
         connections = {connection.topic: connection for connection in reader.connections}

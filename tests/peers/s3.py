@@ -12,7 +12,7 @@ import subprocess
 import sys
 import time
 
-from peer import EDGEPUCK, OUT, edgepuck, skipped_if_missing
+from peer import EDGEPUCK, OUT, edgepuck, save_shapes, skipped_if_missing, tars
 
 with skipped_if_missing():
     import boto3
@@ -47,7 +47,7 @@ upload = shlex.join([sys.executable, str(OUT / "upload.py"), endpoint])
 words = ["gen-dataset", OUT / "shapes", "--layout", "webdataset", "--sensor", "vlp32c", "--views", "6",
          "--points", "256", "--adapter", "cpu", "--tar-clouds", "60", "--out", OUT / "out", "--resume",
          "--on-shard", upload + " {} {name}"]
-edgepuck("gen-shapes", "--out", OUT / "shapes", "--train", 4, "--test", 1)
+save_shapes(4, 1)
 run = subprocess.Popen([EDGEPUCK, *words], stderr=subprocess.DEVNULL, start_new_session=True)
 while not stored() and run.poll() is None:
     time.sleep(0.02)
@@ -56,8 +56,8 @@ os.killpg(run.pid, signal.SIGKILL)
 assert run.wait() != 0, "the run ended before it was killed"
 before = stored()
 edgepuck(*words)
-tars = {tar.name: tar.read_bytes() for tar in (OUT / "out").glob("*.tar")}
-assert 0 < len(before) < len(tars)
-assert stored() == tars
+written = tars("out")
+assert 0 < len(before) < len(written)
+assert stored() == written
 server.stop()
-print(f"moto {moto.__version__}: {len(tars)} tars, {len(before)} of them before the run was killed")
+print(f"moto {moto.__version__}: {len(written)} tars, {len(before)} of them before the run was killed")

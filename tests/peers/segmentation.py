@@ -1,4 +1,4 @@
-"""Open3D's DBSCAN, PCL's Euclidean clusters and Patchwork++, against `segment`.
+"""Open3D's DBSCAN, PCL's Euclidean clusters and Patchwork++, against `detect --segment-only`.
 
 Every point of a simulated street sweep carries the number of the object that it lies on, 0 for
 the ground, so that grounds and clusters are judged by the truth. Labelled sweeps of real sensors,
@@ -21,12 +21,12 @@ with skipped_if_missing("(Debian: apt-get install libusb-1.0-0 libgomp1; Python 
 
 N_SWEEPS = 12
 RADII_M = [0.2, 0.5, 1.0]
-# `segment` writes clusters of at least so many points.
+# `detect --segment-only` writes clusters of at least this many points.
 MIN_POINTS = 10
 COLOURS = json.loads((ROOT / "assets/view/colours.json").read_text())
 GROUND = list(bytes.fromhex(COLOURS["classes"]["ground"].removeprefix("#")))
 # Both count what is lower for ground, whatever it is part of: Patchwork++ 0.125 m (th_dist),
-# `segment` 0.2 m.
+# `detect --segment-only` 0.2 m.
 CLEARANCE_M = 0.3
 # Farther away a VLP-32C sees hardly any ground; Patchwork++'s own benchmark ends at 80 m.
 MAX_RANGE_M = 60.0
@@ -63,7 +63,7 @@ def main():
 def compare_components(sweep, radius):
     """Both find the same sets of points."""
     folder = OUT / f"components-{radius}"
-    edgepuck("segment", sweep, "--radius", radius, "--overwrite", "--out", folder)
+    edgepuck("detect", sweep, "--segment-only", "--radius", radius, "--overwrite", "--out", folder)
     ours = {as_set(numpy.load(file)) for file in folder.glob("cluster-*.npy")}
     loaded = numpy.load(sweep)
     points = (loaded if sweep.suffix == ".npy" else loaded["positions"]).astype(numpy.float64)
@@ -105,7 +105,7 @@ def compare_ground(sweeps):
 
 def our_ground(sweep):
     folder = OUT / "clusters"
-    said = edgepuck("segment", sweep, "--overwrite", "--out", folder).stderr
+    said = edgepuck("detect", sweep, "--segment-only", "--overwrite", "--out", folder).stderr
     vertices = plyfile.PlyData.read(str(folder / "sweep.ply"))["vertex"]
     colours = numpy.stack([vertices[name] for name in ("red", "green", "blue")], 1)
     return (colours == GROUND).all(1), float(re.search(r"([0-9.]+) ms", said)[1])
@@ -188,7 +188,7 @@ def our_labels(points):
 
 
 def large(labels):
-    """Labels without those of clusters that `segment` would not write."""
+    """Labels without those of clusters that `detect --segment-only` would not write."""
     counts = numpy.bincount(labels[labels >= 0])
     return numpy.where((labels >= 0) & (counts[labels] >= MIN_POINTS), labels, -1)
 

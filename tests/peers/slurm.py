@@ -15,7 +15,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from peer import EDGEPUCK, OUT, edgepuck, run, skip
+from peer import OUT, edgepuck, job_file, program_on_path, run, save_shapes, skip, tars
 
 PARTS = 8
 # /usr/sbin may not be on the path.
@@ -104,17 +104,12 @@ def stop(daemons):
 def array():
     """Submits the job file, kills two tasks midway, and waits for all."""
     shared = OUT / "shared"
-    file = edgepuck("cluster", "slurm", "--parts", PARTS, "--cpus", 1, "--memory", 1, "--", *WORDS,
-                    "--out", shared).stdout
-    bin_folder = OUT / "bin"
-    bin_folder.mkdir()
-    (bin_folder / "edgepuck").symlink_to(EDGEPUCK)
+    file = job_file("job.sh", PARTS, [*WORDS, "--out", shared]).replace("per-task=4", "per-task=1")
     # Of this machine's memory nothing is told to Slurm.
     file = "\n".join(line for line in file.splitlines() if "--mem=" not in line) + "\n"
     (OUT / "job.sh").write_text(file)
-    env = {**os.environ, "PATH": f"{bin_folder}:{os.environ['PATH']}"}
-    told = run("sbatch", "--parsable", OUT / "job.sh", env=env, cwd=OUT).stdout
-    job = told.strip().split(";")[0]
+    said = run("sbatch", "--parsable", OUT / "job.sh", env=program_on_path(), cwd=OUT).stdout
+    job = said.strip().split(";")[0]
     killed = set()
 
     def queue():
@@ -147,15 +142,14 @@ def array():
     return killed
 
 
-edgepuck("gen-shapes", "--out", OUT / "shapes", "--train", 16, "--test", 4)
+save_shapes(16, 4)
 edgepuck("gen-dataset", *WORDS, "--out", OUT / "alone")
 daemons = start()
 try:
     killed = array()
 finally:
     stop(daemons)
-alone = {tar.name: tar.read_bytes() for tar in (OUT / "alone").glob("*.tar")}
-shared = {tar.name: tar.read_bytes() for tar in (OUT / "shared").glob("*.tar")}
+alone, shared = tars("alone"), tars("shared")
 assert len(alone) > PARTS and alone == shared, (sorted(alone), sorted(shared))
 edgepuck("gen-dataset", "--verify", OUT / "shared")
 version = run("sinfo", "--version").stdout.strip()

@@ -49,7 +49,7 @@ def main():
 def drive(seed):
     """HOTA of `live` and of the Hungarian method on the drive of this seed."""
     capture = OUT / f"drive-{seed}.pcap"
-    edgepuck("gen-drive", "street", "--seconds", SECONDS, "--seed", seed, "--out", capture)
+    edgepuck("gen-scenes", "street", "--drive", SECONDS, "--seed", seed, "--out", capture)
     live = infer("live", "--pcap", capture, "--poses", capture.with_suffix(".tum"), "--model",
                  ROOT / "assets/weights/street-128.safetensors")
     found = [json.loads(line) for line in live.stdout.splitlines()]

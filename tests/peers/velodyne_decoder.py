@@ -1,6 +1,6 @@
 """velodyne-decoder, a driver of real sensors, on packets that we write and read.
 
-It decodes `--format pcap` to the points of the NPZ of the same scan, and what `segment` reads
+It decodes `--format pcap` to the points of the NPZ of the same scan, and what `detect --segment-only` reads
 of a capture, also of a real VLP-16's, to the same points. Run by
 `cargo xtask test`; see xtask/src/test/peers.rs.
 """
@@ -231,7 +231,7 @@ READ_AZIMUTH_DEG = 0.02
 
 
 def reading():
-    """`segment` reads the first turn of a capture as the decoder does."""
+    """`detect --segment-only` reads the first turn of a capture as the decoder does."""
     captures = [OUT / f"room-{rpm}.pcap" for rpm in (300, 600, 1200)]
     packets = ROOT.parent / "shared/data/real_scans/vlp16_packets_1206B.bin"
     if packets.is_file():
@@ -240,7 +240,7 @@ def reading():
         print("a real VLP-16's packets are not here")
     config = velodyne_decoder.Config(timestamp_first_packet=True, min_range=0, max_range=1000)
     for pcap in captures:
-        edgepuck("segment", pcap, "--overwrite", "--out", OUT / "clusters")
+        edgepuck("detect", pcap, "--segment-only", "--overwrite", "--out", OUT / "clusters")
         vertices = plyfile.PlyData.read(str(OUT / "clusters/sweep.ply"))["vertex"]
         ours = numpy.stack([vertices[axis] for axis in "xyz"], 1).astype(float)
         scans = [points for _, points in velodyne_decoder.read_pcap(str(pcap), config)]

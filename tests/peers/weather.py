@@ -1,9 +1,8 @@
-"""LISA's rain and snow and Hahner et al.'s fog, against `edgepuck weather` on the same clouds.
+"""LISA's rain and snow against `edgepuck corrupt --rain` on the same clouds.
 
-Both are programs that others may run but that we may not ship (GPL-3; CC BY-NC 4.0). Clone
-https://github.com/velatkilic/LISA and https://github.com/MartinHahner/LiDAR_fog_sim, and name
-their folders in EDGEPUCK_LISA and EDGEPUCK_FOG_SIM. LISA's packages are old: the script makes an
-environment for them beside its output. Run by `cargo xtask test`; see xtask/src/test/peers.rs.
+LISA is a program that others may run but that we may not ship (GPL-3). Clone
+https://github.com/velatkilic/LISA, and name its folder in EDGEPUCK_LISA. Its packages are old: the script
+makes an environment for them beside its output. Run by `cargo xtask test`; see xtask/src/test/peers.rs.
 """
 
 import json
@@ -18,9 +17,9 @@ from peer import OUT, edgepuck, run, skip, skipped_if_missing
 with skipped_if_missing():
     import numpy
 
-LISA, FOG_SIM = (os.environ.get(name) for name in ("EDGEPUCK_LISA", "EDGEPUCK_FOG_SIM"))
-if not (LISA or FOG_SIM):
-    skip("neither EDGEPUCK_LISA nor EDGEPUCK_FOG_SIM names a clone (see the script)")
+LISA = os.environ.get("EDGEPUCK_LISA")
+if not LISA:
+    skip("EDGEPUCK_LISA names no clone (see the script)")
 
 LISA_PACKAGES = ["numpy==1.26.4", "scipy==1.13.1", "PyMieScatt==1.8.1.1"]
 # 3 mrad; 90 % at 200 m; from 1.5 m: LISA's defaults.
@@ -38,8 +37,6 @@ elevation_to_deg = 1.0
 elevation_steps = 2
 rpm = 600.0
 """
-# Hahner et al. lose no point.
-ALL_SEEING = LISA_SENSOR.replace("reflectivity = 0.9, range_m = 200.0", "reflectivity = 1e-9, range_m = 1e9")
 
 # Runs in LISA's own environment.
 ASK_LISA = """
@@ -65,7 +62,7 @@ def edgepuck_weather(cloud, flags, sensor):
     (OUT / "sensor.toml").write_text(sensor)
     numpy.savez(OUT / "clear.npz", positions=cloud[:, :3].astype(numpy.float32),
                 intensity=cloud[:, 3:].astype(numpy.float32))
-    edgepuck("weather", OUT / "clear.npz", "--overwrite", "--out", OUT / "weather.npz", "--profile", OUT / "sensor.toml", *flags)
+    edgepuck("corrupt", OUT / "clear.npz", "--overwrite", "--out", OUT / "weather.npz", "--sensor", OUT / "sensor.toml", *flags)
     told = numpy.load(OUT / "weather.npz")
     return told["positions"].astype(float), told["intensity"][:, 0].astype(float), told["medium"][:, 0]
 
@@ -94,38 +91,4 @@ def lisa():
                 assert abs(p - q) <= 4 * sigma + 2e-4
 
 
-def fog():
-    """Every point is as far and as bright as Hahner et al. say."""
-    sys.path.insert(0, FOG_SIM)
-    import fog_simulation
-
-    ranges_m = numpy.concatenate([[5, 10, 20, 30, 50, 100], numpy.arange(5.05, 150, 0.37)])
-    cloud = numpy.zeros((len(ranges_m), 4))
-    cloud[:, 0], cloud[:, 3] = ranges_m, 30
-    for alpha in [0.005, 0.02, 0.06, 0.2]:
-        visibility_m = math.log(20) / alpha
-        # Left to themselves they keep the backscatter of alpha = 0.06 for every alpha.
-        fog = fog_simulation.ParameterSet(alpha=alpha, mor=visibility_m, beta=0.046 / visibility_m)
-        theirs, _, _ = fog_simulation.simulate_fog(fog, cloud, 0)
-        flags = ["--fog", repr(visibility_m), "--fog-model", "hahner", "--white", 255]
-        positions, intensities, media = edgepuck_weather(cloud, flags, ALL_SEEING)
-        assert len(positions) == len(cloud)
-        is_fog = theirs[:, 0] < 4.9
-        # They round the intensity of surfaces before they compare.
-        surface = 30 * numpy.exp(-2 * alpha * ranges_m)
-        same = (media == 3) == is_fog
-        of_fog = numpy.where(media == 3, intensities, theirs[:, 3])
-        assert (same | (abs(of_fog - surface) <= 0.5)).all(), f"{alpha}"
-        assert same.mean() > 0.95
-        # Their table of ranges has steps of 0.1 m.
-        assert (abs(positions[same, 0] - theirs[same, 0]) <= 0.1).all(), f"{alpha}"
-        expected = numpy.where(is_fog, theirs[:, 3], surface)[same]
-        assert numpy.allclose(intensities[same], expected, rtol=1e-3, atol=1e-4), f"{alpha}"
-        assert (numpy.round(surface)[~is_fog] == theirs[~is_fog, 3]).all()
-        print(f"fog of {visibility_m:.1f} m: {len(cloud)} points, {is_fog.sum()} of fog; {(~same).sum()} differ by rounding")
-
-
-if LISA:
-    lisa()
-if FOG_SIM:
-    fog()
+lisa()

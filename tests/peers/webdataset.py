@@ -8,7 +8,7 @@ import io
 import json
 import os
 
-from peer import OUT, edgepuck, skipped_if_missing
+from peer import OUT, edgepuck, save_shapes, skipped_if_missing
 
 # Nothing is asked of the Hub.
 os.environ["HF_HUB_OFFLINE"] = "1"
@@ -61,7 +61,7 @@ def scans(folder, classes):
     return n
 
 
-edgepuck("gen-shapes", "--out", OUT / "shapes", "--train", 5, "--test", 1)
+save_shapes(5, 1)
 n_classes = len(list((OUT / "shapes").iterdir()))
 n = n_classes * 5 * 8
 assert clouds(OUT / "clouds", -(-n // 100), n_classes) == n

@@ -1,14 +1,11 @@
-//! The results of an evaluation as a line of text, as CSV and as a drawing.
+//! The results of an evaluation as a line of text and as CSV.
 
 use std::path::Path;
 
 use formats::interval::wilson;
 use infer_cpu::Evaluation;
 
-use crate::svg::{self, text};
-
 /// The accuracies and their intervals in one line, for data with `n_classes` classes.
-#[must_use]
 pub fn summary(found: &Evaluation, n_classes: usize, data: &Path) -> String {
     let (n, correct) = (found.total(), found.correct());
     let (low, high) = wilson(correct, n);
@@ -31,47 +28,21 @@ pub fn summary(found: &Evaluation, n_classes: usize, data: &Path) -> String {
 }
 
 /// The confusion matrix as CSV, with a row for each true class and a column for each answer.
-#[must_use]
 pub fn to_csv(found: &Evaluation, classes: &[String]) -> Vec<u8> {
-    let mut csv = csv::Writer::from_writer(Vec::new());
-    let header = std::iter::once("class").chain(classes.iter().map(String::as_str));
-    let mut write = |record: &mut dyn Iterator<Item = String>| {
-        csv.write_record(record).expect("invariant: memory takes all, rows are equally long");
+    let header = std::iter::once("class".to_owned()).chain(classes.iter().cloned()).collect();
+    let row = |(class, answers): (&String, &Vec<usize>)| -> Vec<String> {
+        std::iter::once(class.clone()).chain(answers.iter().map(ToString::to_string)).collect()
     };
-    write(&mut header.map(str::to_owned));
-    for (class, answers) in classes.iter().zip(&found.confusion) {
-        let answers = answers.iter().map(ToString::to_string);
-        write(&mut std::iter::once(class.clone()).chain(answers));
-    }
-    csv.into_inner().expect("invariant: memory takes all")
+    csv_of(std::iter::once(header).chain(classes.iter().zip(&found.confusion).map(row)))
 }
 
-/// Draws the confusion matrix as SVG. A darker cell is a larger share of a true class's clouds.
-#[must_use]
-pub fn drawing(found: &Evaluation, classes: &[String]) -> String {
-    const CELL: f64 = 16.0;
-    const MARGIN: f64 = 110.0;
-    let side = MARGIN + classes.len() as f64 * CELL + 10.0;
-    let mut parts = String::new();
-    for (row, (class, answers)) in classes.iter().zip(&found.confusion).enumerate() {
-        let y = MARGIN + row as f64 * CELL;
-        let [line, edge] = [y + 12.0, MARGIN - 6.0];
-        parts += &text(class, edge, line, 10, "text-anchor='end'");
-        let turned = format!("transform='translate({line} {edge}) rotate(-60)'");
-        parts += &text(class, 0.0, 0.0, 10, &turned);
-        let total: usize = answers.iter().sum();
-        for (column, &count) in answers.iter().enumerate().filter(|(_, count)| **count > 0) {
-            let x = MARGIN + column as f64 * CELL;
-            let colour = if row == column { "#06c" } else { "#c30" };
-            // The root makes rare confusions visible.
-            let opacity = (count as f64 / total as f64).sqrt();
-            parts += &format!(
-                "<rect x='{x}' y='{y}' width='{CELL}' height='{CELL}' fill='{colour}' \
-                 fill-opacity='{opacity:.3}'/>\n"
-            );
-        }
+/// Records of equal length as CSV.
+pub fn csv_of(records: impl Iterator<Item = impl IntoIterator<Item = String>>) -> Vec<u8> {
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    for record in records {
+        csv.write_record(record).expect("invariant: memory takes all, rows are equally long");
     }
-    svg::drawing(side, side, &parts)
+    csv.into_inner().expect("invariant: memory takes all")
 }
 
 #[cfg(test)]
@@ -92,19 +63,9 @@ mod tests {
     #[test]
     fn a_matrix_has_a_row_for_each_true_class() {
         let found = Evaluation { confusion: vec![vec![3, 1], vec![0, 2]] };
-        let classes = ["cup".to_owned(), "vase".to_owned()];
-        assert_eq!(to_csv(&found, &classes), b"class,cup,vase\ncup,3,1\nvase,0,2\n");
-        assert_eq!(drawing(&found, &classes).matches("<rect").count(), 4);
-    }
-
-    #[test]
-    fn a_class_with_a_comma_or_a_quote_is_one_field() {
-        let found = Evaluation { confusion: vec![vec![3, 1], vec![0, 2]] };
-        let classes = ["cup, small".to_owned(), "a \"vase\"".to_owned()];
-        let csv = to_csv(&found, &classes);
-        let mut reader = csv::Reader::from_reader(&csv[..]);
-        assert_eq!(reader.headers().unwrap(), vec!["class", "cup, small", "a \"vase\""]);
-        let names = reader.records().map(|row| row.unwrap()[0].to_owned());
-        assert_eq!(names.collect::<Vec<_>>(), classes);
+        let classes = ["cup, small", "a \"vase\""].map(str::to_owned);
+        let expected =
+            "class,\"cup, small\",\"a \"\"vase\"\"\"\n\"cup, small\",3,1\n\"a \"\"vase\"\"\",0,2\n";
+        assert_eq!(to_csv(&found, &classes), expected.as_bytes());
     }
 }

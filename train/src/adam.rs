@@ -2,7 +2,6 @@
 //! algorithm 1).
 
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use crate::layer::Module;
 use crate::parameter::Parameter;
@@ -14,68 +13,49 @@ const CHUNK: usize = 1 << 14;
 /// the L2 term moves shrinks by a factor in each step until it is subnormal, and arithmetic of
 /// subnormal numbers takes a hundred times as long. An output is a sum of some 1e-2 or more, rounded
 /// to 1e-9; such a weight adds 1e-12 times an activation of about 1. In the update,
-/// [`Adam::epsilon`], which is 1e-12 or more, outweighs the root of such a square, 1e-15.
+/// [`EPSILON`] outweighs the root of such a square, 1e-15.
 const LEAST_WEIGHT: f32 = 1e-12;
 const LEAST_MEAN: f32 = 1e-20;
 const LEAST_SQUARE: f32 = 1e-30;
 
-/// Adam's constants.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct Adam {
-    /// Learning rate before any schedule.
-    pub rate: f64,
-    /// Decay of the running mean of gradients.
-    pub beta1: f64,
-    /// Decay of the running mean of their squares.
-    pub beta2: f64,
-    /// Added to the root of the mean square.
-    pub epsilon: f64,
-    /// Share of each weight added to its gradient.
-    pub l2: f64,
+/// The baseline's decays of the running means of gradients and of their squares, the number that is
+/// added to the root of the mean square, and the share of each weight that is added to its gradient
+/// (yanx27, `train_classification.py`).
+const BETAS: [f64; 2] = [0.9, 0.999];
+const EPSILON: f32 = 1e-8;
+const L2: f32 = 1e-4;
+
+/// Updates all parameters of `network` in step number `step`, counted from 1, with learning rate
+/// `rate`.
+pub fn step(network: &mut dyn Module, step: u64, rate: f64) {
+    network.parameters().into_iter().for_each(|p| update(p, step, rate));
 }
 
-impl Default for Adam {
-    /// The baseline's constants (yanx27, `train_classification.py`).
-    fn default() -> Self {
-        Self { rate: 1e-3, beta1: 0.9, beta2: 0.999, epsilon: 1e-8, l2: 1e-4 }
-    }
-}
-
-impl Adam {
-    /// Updates all parameters in step number `step`, counted from 1, with learning rate `rate`.
-    pub fn step(&self, network: &mut dyn Module, step: u64, rate: f64) {
-        network.parameters().into_iter().for_each(|p| self.update(p, step, rate));
-    }
-
-    fn update(&self, parameter: &mut Parameter, step: u64, rate: f64) {
-        let Self { beta1, beta2, epsilon, l2, .. } = *self;
-        let correction = |beta: f64| 1.0 - libm::pow(beta, step as f64);
-        let size = (rate / correction(beta1)) as f32;
-        let root = (1.0 / correction(beta2).sqrt()) as f32;
-        let [beta1, beta2, epsilon, l2] = [beta1, beta2, epsilon, l2].map(|x| x as f32);
-        let Parameter { value, gradient, mean, square, .. } = parameter;
-        value
-            .par_chunks_mut(CHUNK)
-            .zip(gradient.par_chunks(CHUNK))
-            .zip(mean.par_chunks_mut(CHUNK).zip(square.par_chunks_mut(CHUNK)))
-            .for_each(|((value, gradient), (mean, square))| {
-                let moments = mean.iter_mut().zip(square);
-                for ((value, gradient), (mean, square)) in
-                    value.iter_mut().zip(gradient).zip(moments)
-                {
-                    let g = gradient + l2 * *value;
-                    *mean = or_zero(*mean + (1.0 - beta1) * (g - *mean), LEAST_MEAN);
-                    *square = or_zero(beta2 * *square + (1.0 - beta2) * g * g, LEAST_SQUARE);
-                    let moved = size * *mean / (square.sqrt() * root + epsilon);
-                    *value = or_zero(*value - moved, LEAST_WEIGHT);
-                }
-            });
-    }
+fn update(parameter: &mut Parameter, step: u64, rate: f64) {
+    let [beta1, beta2] = BETAS;
+    let correction = |beta: f64| 1.0 - libm::pow(beta, step as f64);
+    let size = (rate / correction(beta1)) as f32;
+    let root = (1.0 / correction(beta2).sqrt()) as f32;
+    let [beta1, beta2] = BETAS.map(|beta| beta as f32);
+    let Parameter { value, gradient, mean, square, .. } = parameter;
+    value
+        .par_chunks_mut(CHUNK)
+        .zip(gradient.par_chunks(CHUNK))
+        .zip(mean.par_chunks_mut(CHUNK).zip(square.par_chunks_mut(CHUNK)))
+        .for_each(|((value, gradient), (mean, square))| {
+            let moments = mean.iter_mut().zip(square);
+            for ((value, gradient), (mean, square)) in value.iter_mut().zip(gradient).zip(moments) {
+                let g = gradient + L2 * *value;
+                *mean = or_zero(*mean + (1.0 - beta1) * (g - *mean), LEAST_MEAN);
+                *square = or_zero(beta2 * *square + (1.0 - beta2) * g * g, LEAST_SQUARE);
+                let moved = size * *mean / (square.sqrt() * root + EPSILON);
+                *value = or_zero(*value - moved, LEAST_WEIGHT);
+            }
+        });
 }
 
 /// `x`, or 0 if it is closer to 0 than `least`.
-pub(crate) fn or_zero(x: f32, least: f32) -> f32 {
+fn or_zero(x: f32, least: f32) -> f32 {
     if x.abs() < least { 0.0 } else { x }
 }
 
@@ -86,15 +66,12 @@ mod tests {
     #[test]
     fn a_weight_that_only_the_l2_term_moves_ends_at_0_and_is_never_subnormal() {
         let mut weight = Parameter::new("w".to_owned(), vec![2], vec![0.1, -1e-19]);
-        let adam = Adam::default();
         for step in 1..=100_000 {
-            adam.update(&mut weight, step, adam.rate);
+            update(&mut weight, step, 1e-3);
             let all = [&weight.value, &weight.mean, &weight.square].into_iter().flatten();
             assert!(all.into_iter().all(|x| !x.is_subnormal()), "step {step}: {weight:?}");
         }
-        assert_eq!(
-            (weight.value, weight.mean, weight.square),
-            (vec![0.0; 2], vec![0.0; 2], vec![0.0; 2])
-        );
+        let all = [weight.value, weight.mean, weight.square].concat();
+        assert!(all.iter().all(|x| *x == 0.0), "{all:?}");
     }
 }

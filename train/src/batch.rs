@@ -1,9 +1,8 @@
-//! A batch of clouds.
+//! A batch of clouds, and the rows of its points.
 
-use ndarray::ArrayView2;
+use ndarray::{ArrayView2, ArrayViewMut2, Axis};
 
 use crate::matrix::Matrix;
-use crate::rows::Rows;
 
 /// Clouds and their targets.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -14,39 +13,20 @@ pub struct Batch {
     pub weights: Vec<f32>,
     /// The first row of each cloud, and the end of the last cloud.
     pub starts: Vec<usize>,
-    /// All points of the clouds, among which EdgeConv layers search for neighbors. Empty if the
+    /// All points of each cloud, among which EdgeConv layers search for neighbors. Empty if the
     /// network has no such layer.
-    pub neighborhood: Vec<[f32; 3]>,
-    /// The index in `neighborhood` of each cloud's first point, and the end of the last cloud.
-    pub neighborhood_starts: Vec<usize>,
+    pub neighborhoods: Vec<Vec<[f32; 3]>>,
     /// The target share of each class, `[clouds, classes]`.
     pub targets: Matrix,
 }
 
 impl Batch {
     /// The number of clouds.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.starts.len().saturating_sub(1)
     }
 
-    /// Whether the batch has no cloud.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// The points among which cloud `cloud` searches for neighbors.
-    #[must_use]
-    pub fn neighborhood_of(&self, cloud: usize) -> &[[f32; 3]] {
-        match self.neighborhood_starts.get(cloud..cloud + 2) {
-            Some(&[first, last]) => &self.neighborhood[first..last],
-            _ => &[],
-        }
-    }
-
     /// The points as a matrix.
-    #[must_use]
     pub fn points(&self) -> ArrayView2<'_, f32> {
         let flat = self.coordinates.as_flattened();
         ArrayView2::from_shape((self.coordinates.len(), 3), flat)
@@ -54,8 +34,42 @@ impl Batch {
     }
 
     /// The rows of the points, with their weights.
-    #[must_use]
     pub fn rows(&self) -> Rows<'_> {
         Rows::new(&self.weights, &self.starts)
     }
+}
+
+/// The points of a batch, with weights.
+#[derive(Clone, Copy, Debug)]
+pub struct Rows<'a> {
+    /// The weight of each row in statistics.
+    pub weights: &'a [f32],
+    /// The first row of each cloud, and the end of the last cloud.
+    pub starts: &'a [usize],
+    /// The sum of all weights.
+    pub total: f32,
+}
+
+impl<'a> Rows<'a> {
+    /// Rows of these weights, in clouds that begin at `starts`.
+    pub fn new(weights: &'a [f32], starts: &'a [usize]) -> Self {
+        let total = weights.iter().map(|&w| f64::from(w)).sum::<f64>() as f32;
+        Self { weights, starts, total }
+    }
+
+    /// The number of clouds.
+    pub fn n_clouds(&self) -> usize {
+        self.starts.len() - 1
+    }
+}
+
+pub(crate) fn by_cloud<'a>(matrix: &'a mut Matrix, rows: Rows<'_>) -> Vec<ArrayViewMut2<'a, f32>> {
+    let mut clouds = Vec::with_capacity(rows.n_clouds());
+    let mut rest = matrix.view_mut();
+    for pair in rows.starts.windows(2) {
+        let (cloud, after) = rest.split_at(Axis(0), pair[1] - pair[0]);
+        clouds.push(cloud);
+        rest = after;
+    }
+    clouds
 }

@@ -17,14 +17,8 @@ use crate::recipe::Recipe;
 const AHEAD: usize = 3;
 
 /// The number of complete batches in an epoch of a set of `n` clouds.
-#[must_use]
 pub fn count(n: usize, recipe: &Recipe) -> usize {
-    size(n, recipe) / recipe.batch
-}
-
-/// The number of clouds drawn for an epoch of a set of `n` clouds.
-fn size(n: usize, recipe: &Recipe) -> usize {
-    recipe.clouds_per_epoch.unwrap_or(n)
+    recipe.clouds_per_epoch.unwrap_or(n) / recipe.batch
 }
 
 /// Starts preparing the batches of `epoch`, in an order that depends on the seed and the epoch.
@@ -40,7 +34,7 @@ pub fn start<'s>(
         for some in order.chunks_exact(recipe.batch) {
             let draw = |&(i, turn): &(usize, u32)| augment(clouds, i, (epoch, turn), recipe);
             let drawn: Vec<TrainingCloud> = some.par_iter().map(draw).collect();
-            if sender.send(joined(&drawn)).is_err() {
+            if sender.send(joined(drawn)).is_err() {
                 // The receiver has stopped after an error.
                 break;
             }
@@ -62,7 +56,7 @@ fn order(labels: &[usize], n_classes: usize, epoch: u32, recipe: &Recipe) -> Vec
     };
     let weight = |group: &Vec<usize>| libm::pow(group.len() as f64, 1.0 - recipe.balance);
     let total: f64 = groups.iter().map(weight).sum();
-    let size = size(labels.len(), recipe);
+    let size = recipe.clouds_per_epoch.unwrap_or(labels.len());
     let mut order = Vec::with_capacity(size);
     let mut weighed = 0.0;
     for (number, group) in groups.iter().enumerate() {
@@ -89,21 +83,19 @@ fn shuffle<T>(values: &mut [T], stream: StreamKey) {
 }
 
 /// Joins clouds to one batch.
-#[must_use]
-pub fn joined(drawn: &[TrainingCloud]) -> Batch {
+pub fn joined(drawn: Vec<TrainingCloud>) -> Batch {
     let n_classes = drawn.first().map_or(0, |cloud| cloud.target.len());
-    let mut batch = Batch { starts: vec![0], neighborhood_starts: vec![0], ..Batch::default() };
+    let targets = drawn.iter().flat_map(|cloud| cloud.target.iter().copied()).collect();
+    let targets = Matrix::from_shape_vec((drawn.len(), n_classes), targets)
+        .expect("invariant: every target has all classes");
+    let mut batch = Batch { starts: vec![0], targets, ..Batch::default() };
     for cloud in drawn {
         batch.coordinates.extend(&cloud.points);
         batch.weights.push(cloud.first_weight);
         batch.weights.resize(batch.coordinates.len(), 1.0);
         batch.starts.push(batch.coordinates.len());
-        batch.neighborhood.extend(&cloud.neighborhood);
-        batch.neighborhood_starts.push(batch.neighborhood.len());
+        batch.neighborhoods.push(cloud.neighborhood);
     }
-    let targets = drawn.iter().flat_map(|cloud| cloud.target.iter().copied()).collect();
-    batch.targets = Matrix::from_shape_vec((drawn.len(), n_classes), targets)
-        .expect("invariant: every target has all classes");
     batch
 }
 
@@ -131,22 +123,16 @@ mod tests {
     }
 
     #[test]
-    fn an_epoch_has_each_cloud_once() {
-        let mut drawn = order(&[0; 30], 1, 0, &Recipe::default());
-        assert!(!drawn.is_sorted());
-        assert_ne!(drawn, order(&[0; 30], 1, 1, &Recipe::default()));
-        drawn.sort_unstable();
-        assert_eq!(drawn, (0..30).map(|i| (i, 0)).collect::<Vec<_>>());
-    }
-
-    #[test]
-    fn short_epochs_take_other_clouds_each() {
-        let recipe = Recipe { clouds_per_epoch: Some(11), ..Recipe::default() };
-        let [first, second] = [0, 1].map(|epoch| {
-            let mut drawn = order(&[0; 40], 1, epoch, &recipe);
+    fn an_epoch_has_each_cloud_once_and_a_short_one_others_each_time() {
+        let drawn = |clouds_per_epoch, epoch| {
+            let recipe = Recipe { clouds_per_epoch, ..Recipe::default() };
+            let mut drawn = order(&[0; 30], 1, epoch, &recipe);
+            assert!(!drawn.is_sorted());
             drawn.sort_unstable();
             drawn
-        });
+        };
+        assert_eq!(drawn(None, 0), (0..30).map(|i| (i, 0)).collect::<Vec<_>>());
+        let [first, second] = [0, 1].map(|epoch| drawn(Some(11), epoch));
         assert_eq!((first.len(), second.len()), (11, 11));
         assert_ne!(first, second);
     }

@@ -1,7 +1,4 @@
-//! The calibration of a network on validation clouds: the temperature of its confidences, and the
-//! energy above which it answers `unknown`.
-
-use infer_cpu::energy;
+//! The temperature of a network's confidences, fitted to validation clouds.
 
 /// The range of temperatures that is searched.
 const TEMPERATURES: [f64; 2] = [0.05, 20.0];
@@ -14,16 +11,18 @@ const STEPS: usize = 40;
 ///
 /// This mean is convex in the inverse of the temperature, so that a golden-section search over the
 /// logarithm finds its only minimum. Without clouds the temperature is 1.
-#[must_use]
 pub fn temperature(logits: &[Vec<f32>], labels: &[usize]) -> f64 {
     if logits.is_empty() {
         return 1.0;
     }
     let cost = |log: f64| {
         let t = libm::exp(log);
-        // -ln p = -logit / t - energy / t.
+        // -ln p = ln(sum of exp(other / t)) - logit / t, from the largest logit, so that nothing overflows.
         let loss = |(logits, &label): (&Vec<f32>, &usize)| {
-            -f64::from(logits[label]) / t - energy(logits, t) / t
+            let largest = f64::from(logits.iter().copied().fold(f32::NEG_INFINITY, f32::max));
+            let shifted = |&logit: &f32| libm::exp((f64::from(logit) - largest) / t);
+            let energy = -largest - t * libm::log(logits.iter().map(shifted).sum::<f64>());
+            -f64::from(logits[label]) / t - energy / t
         };
         logits.iter().zip(labels).map(loss).sum::<f64>()
     };
@@ -34,14 +33,6 @@ pub fn temperature(logits: &[Vec<f32>], labels: &[usize]) -> f64 {
         if cost(left) < cost(right) { high = right } else { low = left }
     }
     libm::exp(low.midpoint(high))
-}
-
-/// The smallest of `energies` that `share` of them do not exceed. `None` if there are no energies.
-#[must_use]
-pub fn quantile(mut energies: Vec<f64>, share: f64) -> Option<f64> {
-    energies.sort_by(f64::total_cmp);
-    let rank = (share * energies.len() as f64).ceil() as usize;
-    energies.get(rank.max(1) - 1).copied()
 }
 
 #[cfg(test)]
@@ -59,14 +50,5 @@ mod tests {
         assert_eq!(temperature(&[], &[]), 1.0);
         // Always right: so sure that rounding hides what is left of 1 - p.
         assert!(temperature(&logits, &[0; 100]) < 0.3);
-    }
-
-    #[test]
-    fn a_quantile_is_one_of_the_values_and_enough_are_not_above_it() {
-        let energies = || (0..20).rev().map(f64::from).collect::<Vec<_>>();
-        assert_eq!(quantile(energies(), 0.95), Some(18.0));
-        assert_eq!(quantile(energies(), 1.0), Some(19.0));
-        assert_eq!(quantile(energies(), 0.01), Some(0.0));
-        assert_eq!(quantile(vec![], 0.95), None);
     }
 }

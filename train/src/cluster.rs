@@ -6,11 +6,23 @@
 //! include the sensor's errors. Only a rotation about the up axis may follow, since it commutes
 //! with the centring.
 
-use infer_cpu::sampler::OutlierFilter;
-
-use crate::cluster_variation::ClusterVariation;
 use crate::draws::Draws;
-use crate::recipe::{Augment, Recipe};
+use crate::recipe::{Augment, ClusterVariation, Recipe};
+
+/// Largest number of strays.
+const STRAYS: usize = 5;
+
+/// Largest distance of strays from a cluster's box, metres.
+const STRAY_REACH: f64 = 0.5;
+
+/// Largest distance of strips of ground from a cluster's box, metres.
+const GROUND_REACH: f64 = 0.3;
+
+/// Share of clusters for which the height of the ground is taken as unknown, if strips are added.
+const GROUND_UNKNOWN: f64 = 0.3;
+
+/// Limit to which jitter is clipped.
+pub(crate) const JITTER_CLIP: f64 = 0.05;
 
 /// A cut must leave this share of a cluster; otherwise it would remove the object and not only its
 /// foot.
@@ -26,32 +38,13 @@ pub(crate) fn varied(
     let cut = cut(cluster, variation.cut * draws.unit());
     let thinned = thinned(&cut, variation, draws);
     let mut points = noisy(&thinned, &recipe.augment, draws);
-    add_strays(&mut points, variation, 0.0, draws);
-    let ground_z = ground_z.map(f64::from).filter(|_| draws.unit() >= variation.ground_unknown);
+    add_strays(&mut points, variation, draws);
+    let unknown = if variation.ground_share > 0.0 { GROUND_UNKNOWN } else { 0.0 };
+    let ground_z = ground_z.map(f64::from).filter(|_| draws.unit() >= unknown);
     add_ground(&mut points, ground_z, variation, draws);
     let mut centred = Vec::new();
     infer_cpu::normalize(recipe.normalization, &points, ground_z, &mut centred);
     centred
-}
-
-/// Varies `cloud`, a whole object in the unit sphere: thins it and adds strays. Then drops outliers
-/// and normalises to the unit sphere, as infer-cpu does.
-pub(crate) fn varied_object(
-    cloud: &[[f32; 3]],
-    recipe: &Recipe,
-    draws: &mut Draws,
-) -> Vec<[f32; 3]> {
-    let variation = &recipe.clusters;
-    let mut points: Vec<[f64; 3]> =
-        thinned(cloud, variation, draws).iter().map(|point| point.map(f64::from)).collect();
-    add_strays(&mut points, variation, variation.stray_reach, draws);
-    let mut normalized = Vec::new();
-    infer_cpu::to_unit_sphere(&points, &mut normalized);
-    if recipe.outlier_filter && OutlierFilter::default().drop_outliers(&mut points, &normalized) > 0
-    {
-        infer_cpu::to_unit_sphere(&points, &mut normalized);
-    }
-    normalized
 }
 
 /// `cluster` without the points that are less than `height` above its lowest point, because a
@@ -66,11 +59,10 @@ fn cut(cluster: &[[f32; 3]], height: f64) -> Vec<[f32; 3]> {
 
 /// A random subset of the points of `cluster`, for another sensor or distance.
 fn thinned(cluster: &[[f32; 3]], variation: &ClusterVariation, draws: &mut Draws) -> Vec<[f32; 3]> {
-    let Some([least, most]) = variation.density else { return cluster.to_vec() };
-    let most = most.min(cluster.len());
-    if most <= least {
+    let density = variation.density.map(|[least, most]| [least, most.min(cluster.len())]);
+    let Some([least, most]) = density.filter(|[least, most]| least < most) else {
         return cluster.to_vec();
-    }
+    };
     let n =
         libm::exp(draws.between(libm::log(least as f64), libm::log(most as f64 + 1.0))) as usize;
     let n = n.clamp(least, most);
@@ -81,7 +73,7 @@ fn thinned(cluster: &[[f32; 3]], variation: &ClusterVariation, draws: &mut Draws
 
 /// `points` with a sensor's error along its rays, and jitter.
 fn noisy(points: &[[f32; 3]], augment: &Augment, draws: &mut Draws) -> Vec<[f64; 3]> {
-    let Augment { sensor_noise, jitter, jitter_clip, .. } = *augment;
+    let Augment { sensor_noise, jitter, .. } = *augment;
     let moved = |point: &[f32; 3]| {
         let mut p = point.map(f64::from);
         if sensor_noise > 0.0 {
@@ -90,7 +82,7 @@ fn noisy(points: &[[f32; 3]], augment: &Augment, draws: &mut Draws) -> Vec<[f64;
             p = p.map(|x| x * factor);
         }
         if jitter > 0.0 {
-            p = p.map(|x| x + (jitter * draws.normal()).clamp(-jitter_clip, jitter_clip));
+            p = p.map(|x| x + (jitter * draws.normal()).clamp(-JITTER_CLIP, JITTER_CLIP));
         }
         p
     };
@@ -114,8 +106,8 @@ fn add_ground(
     variation: &ClusterVariation,
     draws: &mut Draws,
 ) {
-    let ClusterVariation { ground_share, ground_reach, .. } = *variation;
-    if ground_share <= 0.0 || draws.unit() >= ground_share {
+    let share = variation.ground_share;
+    if share <= 0.0 || draws.unit() >= share {
         return;
     }
     let n = points.len() as f64;
@@ -124,21 +116,18 @@ fn add_ground(
     let sight = middle.map(|x| x / range);
     // Along the line of sight, and to its left.
     let turned = |x: f64, y: f64| [sight[0] * x + sight[1] * y, sight[0] * y - sight[1] * x];
-    let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-    for &[x, y, _] in points.iter() {
-        let place = turned(x - middle[0], y - middle[1]);
-        for axis in 0..2 {
-            low[axis] = low[axis].min(place[axis] - ground_reach);
-            high[axis] = high[axis].max(place[axis] + ground_reach);
-        }
-    }
-    let lowest = points.iter().fold(f64::INFINITY, |lowest, point| lowest.min(point[2]));
+    let [along, across] = [0, 1].map(|axis| {
+        let places = points.iter().map(|&[x, y, _]| turned(x - middle[0], y - middle[1])[axis]);
+        let (low, high) = span(places);
+        (low - GROUND_REACH, high + GROUND_REACH)
+    });
+    let (lowest, _) = span(points.iter().map(|point| point[2]));
     let height = ground_z.unwrap_or(lowest - draws.between(0.0, GROUND_BELOW));
     let n_strips = 1 + draws.below(STRIPS);
     let each = (draws.between(0.0, GROUND_POINTS) * n / n_strips as f64).ceil() as usize;
     for _ in 0..n_strips {
-        let along = draws.between(low[0], high[0]);
-        let ends = [(); 2].map(|()| draws.between(low[1], high[1]));
+        let along = draws.between(along.0, along.1);
+        let ends = [(); 2].map(|()| draws.between(across.0, across.1));
         for _ in 0..each {
             let across = draws.between(ends[0], ends[1]);
             let x = middle[0] + sight[0] * along - sight[1] * across;
@@ -149,27 +138,24 @@ fn add_ground(
 }
 
 /// Adds points of other things to a share of clusters. They are uniform in the cluster's box,
-/// enlarged by `stray_reach` to the sides and upwards, and by `reach_below` downwards, which is 0
-/// if a segmentation has removed the ground.
-fn add_strays(
-    points: &mut Vec<[f64; 3]>,
-    variation: &ClusterVariation,
-    reach_below: f64,
-    draws: &mut Draws,
-) {
-    let ClusterVariation { stray_share, strays, stray_reach, .. } = *variation;
-    if stray_share <= 0.0 || draws.unit() >= stray_share {
+/// enlarged by [`STRAY_REACH`] to the sides and upwards; below it is the ground, which a segmentation
+/// has removed.
+fn add_strays(points: &mut Vec<[f64; 3]>, variation: &ClusterVariation, draws: &mut Draws) {
+    let share = variation.stray_share;
+    if share <= 0.0 || draws.unit() >= share {
         return;
     }
-    let bounds = [0, 1, 2].map(|axis| {
-        let along = points.iter().map(|point| point[axis]);
-        along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
-    });
-    let below = [stray_reach, stray_reach, reach_below];
-    for _ in 0..=draws.below(strays) {
+    let bounds = [0, 1, 2].map(|axis| span(points.iter().map(|point| point[axis])));
+    let below = [STRAY_REACH, STRAY_REACH, 0.0];
+    for _ in 0..=draws.below(STRAYS) {
         points.push([0, 1, 2].map(|axis| {
             let (low, high) = bounds[axis];
-            draws.between(low - below[axis], high + stray_reach)
+            draws.between(low - below[axis], high + STRAY_REACH)
         }));
     }
+}
+
+/// The least and the greatest of `values`.
+fn span(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
 }

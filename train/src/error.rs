@@ -11,7 +11,7 @@ pub enum Error {
     /// A file that cannot be read or written, or is malformed.
     #[error(transparent)]
     Format(#[from] FormatError),
-    /// Data that cannot be used for training.
+    /// Data that cannot be used for training, or the run of other data.
     #[error("{}: {cause}", path.display())]
     Data {
         /// The file or folder.
@@ -30,7 +30,7 @@ pub enum Error {
     /// A loss that is not finite.
     #[error(
         "expected a finite loss, found {loss} at step {step} of epoch {epoch}; {layer} is the first \
-         layer whose output is not finite. Lower `adam.rate`, or look for extreme clouds in that \
+         layer whose output is not finite. Lower `rate`, or look for extreme clouds in that \
          batch"
     )]
     NotFinite {
@@ -43,24 +43,13 @@ pub enum Error {
         /// The first layer whose output is not finite.
         layer: String,
     },
-    /// A checkpoint of another run.
-    #[error("{}: expected a checkpoint of this run: {cause}", path.display())]
-    OtherRun {
-        /// The checkpoint.
-        path: PathBuf,
-        /// The difference.
-        cause: String,
-    },
-    /// A run's folder in which another process trains.
-    #[error(
-        "{}: expected the folder of a run that no other process trains, found another `train` in it: \
-         wait until that ends, or choose another --out", path.display()
-    )]
-    Busy {
-        /// The folder.
-        path: PathBuf,
-    },
     /// A model or a cloud that infer-cpu refuses.
     #[error(transparent)]
     Infer(#[from] infer_cpu::Error),
+}
+
+impl Error {
+    pub(crate) fn data(path: impl Into<PathBuf>, cause: impl Into<String>) -> Self {
+        Self::Data { path: path.into(), cause: cause.into() }
+    }
 }

@@ -1,9 +1,8 @@
 //! Classification of clouds by a model file, with infer-cpu.
 
-use std::ops::Range;
 use std::path::Path;
 
-use infer_cpu::{Classifier, Evaluation, Options, Prediction, evaluate_some};
+use infer_cpu::{Classifier, Evaluation, Options, Prediction};
 use rayon::prelude::*;
 
 use crate::clouds::Clouds;
@@ -12,20 +11,22 @@ use crate::error::Error;
 /// Number of clouds that one task classifies.
 const CHUNK: usize = 128;
 
-/// The confusion matrix of the model at `path` on `clouds`.
-pub fn confusion(path: &Path, clouds: &Clouds, options: &Options) -> Result<Evaluation, Error> {
+/// The answers of the model at `path` to `clouds`, whose classes must be the model's: how many clouds of
+/// each true class it gives each class.
+pub fn evaluate(path: &Path, clouds: &Clouds, options: &Options) -> Result<Evaluation, Error> {
     let n = clouds.classes.len();
-    let parts = in_chunks(path, clouds, options, |classifier, some| {
-        let found = classifier.classes().len();
+    let mut confusion = vec![vec![0; n]; n];
+    for (answer, &label) in predictions(path, clouds, options)?.iter().zip(&clouds.set.labels) {
+        let found = answer.logits.len();
         if found != n {
-            let cause = format!("expected a model of {n} classes, found {found}");
-            return Err(Error::Data { path: path.to_path_buf(), cause });
+            return Err(Error::data(
+                path,
+                format!("expected a model of {n} classes, found {found}"),
+            ));
         }
-        Ok(evaluate_some(classifier, &clouds.set, some)?)
-    })?;
-    let mut whole = Evaluation { confusion: vec![vec![0; n]; n] };
-    parts.iter().for_each(|part| whole.merge(part));
-    Ok(whole)
+        confusion[label][answer.class] += 1;
+    }
+    Ok(Evaluation { confusion })
 }
 
 /// The predictions of the model at `path` for `clouds`, whose classes may differ from the model's.
@@ -34,26 +35,15 @@ pub fn predictions(
     clouds: &Clouds,
     options: &Options,
 ) -> Result<Vec<Prediction>, Error> {
-    let parts = in_chunks(path, clouds, options, |classifier, some| {
-        let classify = |i| -> Result<Prediction, Error> {
-            Ok(classifier.classify_on_ground(clouds.set.cloud(i), clouds.set.ground_z(i))?.clone())
+    let chunk = |chunk| -> Result<Vec<Prediction>, Error> {
+        let mut classifier = Classifier::load(path, options)?;
+        let some = chunk * CHUNK..clouds.len().min((chunk + 1) * CHUNK);
+        let classify = |i| {
+            let (cloud, ground_z) = (clouds.set.cloud(i), clouds.set.ground_z(i));
+            Ok(classifier.classify_on_ground(cloud, ground_z)?.clone())
         };
-        some.map(classify).collect::<Result<Vec<_>, _>>()
-    })?;
-    Ok(parts.into_iter().flatten().collect())
-}
-
-/// The results of `take` for each chunk of the clouds, in order. The chunks run in parallel.
-fn in_chunks<T: Send>(
-    path: &Path,
-    clouds: &Clouds,
-    options: &Options,
-    take: impl Fn(&mut Classifier, Range<usize>) -> Result<T, Error> + Sync,
-) -> Result<Vec<T>, Error> {
-    let chunk = |chunk| {
-        let first = chunk * CHUNK;
-        let some = first..clouds.len().min(first + CHUNK);
-        take(&mut Classifier::load(path, options)?, some)
+        some.map(classify).collect()
     };
-    (0..clouds.len().div_ceil(CHUNK)).into_par_iter().map(chunk).collect()
+    let parts = (0..clouds.len().div_ceil(CHUNK)).into_par_iter().map(chunk);
+    Ok(parts.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect())
 }

@@ -1,13 +1,11 @@
 //! A drawing of an explained cloud.
 
 use crate::lime::Explanation;
-use crate::svg::{drawing, text};
 
 /// Pixels of a view.
 const SIDE: f64 = 360.0;
 
 /// Draws the cloud twice, as SVG: coloured by LIME-3D, and with its critical points.
-#[must_use]
 pub fn draw(points: &[[f32; 3]], found: &Explanation, critical: &[usize]) -> String {
     let most = found.attribution.iter().fold(f64::MIN_POSITIVE, |most, a| most.max(a.abs()));
     let mut parts = String::new();
@@ -18,9 +16,18 @@ pub fn draw(points: &[[f32; 3]], found: &Explanation, critical: &[usize]) -> Str
     }
     parts.extend(points.iter().map(|point| dot(point, SIDE, 1.5, "#999", 0.6)));
     parts.extend(critical.iter().map(|&i| dot(&points[i], SIDE, 3.5, "#c30", 1.0)));
-    parts += &text("LIME-3D: red speaks for the class, blue against", 10.0, 18.0, 12, "");
-    parts += &text("critical points", SIDE + 10.0, 18.0, 12, "");
-    drawing(2.0 * SIDE, SIDE, &parts)
+    for (x, label) in
+        [(10.0, "LIME-3D: red for the class, blue against"), (SIDE, "critical points")]
+    {
+        parts += &format!(
+            "<text x='{x}' y='18' font-family='sans-serif' font-size='12'>{label}</text>\n"
+        );
+    }
+    let width = 2.0 * SIDE;
+    format!(
+        "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 {width} {SIDE}'>\n\
+         <rect width='{width}' height='{SIDE}' fill='white'/>\n{parts}</svg>\n"
+    )
 }
 
 /// A point as seen from an azimuth of 30 degrees and an elevation of 20 degrees.

@@ -8,29 +8,15 @@ use formats::streams::Stream;
 use infer_cpu::Classifier;
 use infer_cpu::kernel;
 use infer_cpu::sampler::{FarthestPoints, FpsStart};
-use nalgebra::{DMatrix, DVector};
 
+use crate::draws::Draws;
 use crate::error::Error;
 
-/// The settings of an explanation.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Lime {
-    /// Number of parts of the cloud.
-    pub clusters: usize,
-    /// Number of clouds with parts removed, including the whole cloud.
-    pub samples: usize,
-    /// Width of the kernel that weights these clouds.
-    pub sigma: f64,
-    /// Seed of all random numbers.
-    pub seed: u64,
-}
+/// Number of clouds with parts removed, including the whole cloud: LIME's default.
+const SAMPLES: usize = 1000;
 
-impl Default for Lime {
-    /// The authors' settings (`lime_3d`), with LIME's default number of samples.
-    fn default() -> Self {
-        Self { clusters: 20, samples: 1000, sigma: 0.25, seed: 0 }
-    }
-}
+/// Width of the kernel that weights these clouds: the authors' (`lime_3d`).
+const SIGMA: f64 = 0.25;
 
 /// Rounds of k-means.
 const ROUNDS: usize = 10;
@@ -38,11 +24,9 @@ const ROUNDS: usize = 10;
 /// Weight of the ridge.
 const ALPHA: f64 = 1.0;
 
-/// The contribution of each part of a cloud to a prediction.
+/// The contribution of each part of a cloud to the most probable class.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Explanation {
-    /// The explained class: the most probable class of the whole cloud.
-    pub class: usize,
     /// The part of each point.
     pub cluster: Vec<usize>,
     /// The contribution of each part to the log-probability of the class.
@@ -51,37 +35,25 @@ pub struct Explanation {
     pub r_squared: f64,
 }
 
-impl Explanation {
-    /// The `n` points in the parts with the largest contributions, in descending order.
-    #[must_use]
-    pub fn strongest(&self, n: usize) -> Vec<usize> {
-        let mut order: Vec<usize> = (0..self.cluster.len()).collect();
-        let worth = |i: usize| self.attribution[self.cluster[i]];
-        order.sort_by(|&a, &b| worth(b).total_cmp(&worth(a)).then(a.cmp(&b)));
-        order.truncate(n);
-        order
-    }
-}
-
-/// Explains the answer of `classifier` to `points`.
+/// Explains the answer of `classifier` to `points` by `n_parts` parts of them.
 pub fn explain(
     classifier: &mut Classifier,
     points: &[[f32; 3]],
-    lime: &Lime,
+    n_parts: usize,
 ) -> Result<Explanation, Error> {
     let class = classifier.classify(points)?.class;
-    let cluster = clusters(points, lime.clusters);
+    let cluster = clusters(points, n_parts);
     let k = cluster.iter().max().map_or(0, |last| last + 1);
-    let masks = masks(k, lime);
+    let masks = masks(k, SAMPLES);
     let mut answers = Vec::with_capacity(masks.len());
     for mask in &masks {
         let left = points.iter().zip(&cluster).filter(|(_, part)| mask[**part]);
         let left: Vec<[f32; 3]> = left.map(|(point, _)| *point).collect();
         answers.push(classifier.classify(&left)?.log_probability(class));
     }
-    let weights: Vec<f64> = masks.iter().map(|mask| weight(mask, lime.sigma)).collect();
+    let weights: Vec<f64> = masks.iter().map(|mask| weight(mask, SIGMA)).collect();
     let (attribution, r_squared) = ridge(&masks, &answers, &weights);
-    Ok(Explanation { class, cluster, attribution, r_squared })
+    Ok(Explanation { cluster, attribution, r_squared })
 }
 
 /// k-means whose centres are points of the cloud. The first centres are the farthest points; in
@@ -95,13 +67,10 @@ fn clusters(points: &[[f32; 3]], k: usize) -> Vec<usize> {
     for _ in 0..ROUNDS {
         for (part, centre) in centres.iter_mut().enumerate() {
             let own = || points.iter().zip(&cluster).filter(|(_, c)| **c == part).map(|(p, _)| p);
-            let n = own().count();
-            if n == 0 {
-                continue;
-            }
-            let mean = [0, 1, 2].map(|k| own().map(|p| p[k]).sum::<f32>() / n as f32);
+            let n = own().count() as f32;
+            let mean = [0, 1, 2].map(|k| own().map(|p| p[k]).sum::<f32>() / n);
             let medoid = own().min_by(|a, b| squared(a, &mean).total_cmp(&squared(b, &mean)));
-            *centre = *medoid.expect("invariant: it has points");
+            *centre = *medoid.unwrap_or(centre);
         }
         cluster = nearest(points, &centres);
     }
@@ -122,17 +91,11 @@ fn squared(a: &[f32; 3], b: &[f32; 3]) -> f32 {
 
 /// The parts that remain in each sample. All parts remain in the first sample, and each part
 /// remains in another sample with a probability of one half. A sample without parts is drawn again.
-fn masks(k: usize, lime: &Lime) -> Vec<Vec<bool>> {
-    let stream = Stream::Lime {}.key(lime.seed);
-    let mut n = 0;
+fn masks(k: usize, n: usize) -> Vec<Vec<bool>> {
+    let mut draws = Draws::new(Stream::Lime {}.key(0));
     let mut masks = vec![vec![true; k]];
-    while masks.len() < lime.samples {
-        let mask: Vec<bool> = (0..k)
-            .map(|_| {
-                n += 1;
-                stream.unit(n) < 0.5
-            })
-            .collect();
+    while masks.len() < n {
+        let mask: Vec<bool> = (0..k).map(|_| draws.unit() < 0.5).collect();
         if mask.contains(&true) || k == 0 {
             masks.push(mask);
         }
@@ -152,20 +115,41 @@ fn weight(mask: &[bool], sigma: f64) -> f64 {
 fn ridge(masks: &[Vec<bool>], answers: &[f64], weights: &[f64]) -> (Vec<f64>, f64) {
     let k = masks[0].len();
     let total: f64 = weights.iter().sum();
-    let mean_of = |value: &dyn Fn(usize) -> f64| {
-        weights.iter().enumerate().map(|(i, w)| w * value(i)).sum::<f64>() / total
+    // The parts and the answer of each sample. Centred columns need no intercept.
+    let row = |(mask, answer): (&Vec<bool>, &f64)| {
+        mask.iter().map(|&remains| f64::from(u8::from(remains))).chain([*answer]).collect()
     };
-    let part = |i: usize, c: usize| f64::from(u8::from(masks[i][c]));
-    let centre: Vec<f64> = (0..k).map(|c| mean_of(&|i| part(i, c))).collect();
-    let level = mean_of(&|i| answers[i]);
-    let x = DMatrix::from_fn(masks.len(), k, |i, c| (part(i, c) - centre[c]) * weights[i].sqrt());
-    let y = DVector::from_fn(masks.len(), |i, _| (answers[i] - level) * weights[i].sqrt());
-    let normal = x.tr_mul(&x) + DMatrix::identity(k, k) * ALPHA;
-    let solved = normal.cholesky().map(|factor| factor.solve(&x.tr_mul(&y)));
-    let coefficients = solved.expect("invariant: a ridge makes it positive definite");
-    let rest = (&y - &x * &coefficients).norm_squared();
-    let r_squared = 1.0 - rest / y.norm_squared().max(f64::MIN_POSITIVE);
-    (coefficients.iter().copied().collect(), r_squared)
+    let mut rows: Vec<Vec<f64>> = masks.iter().zip(answers).map(row).collect();
+    for c in 0..=k {
+        let mean = rows.iter().zip(weights).map(|(row, w)| w * row[c]).sum::<f64>() / total;
+        rows.iter_mut().zip(weights).for_each(|(row, w)| row[c] = (row[c] - mean) * w.sqrt());
+    }
+    let mut normal = vec![vec![0.0; k + 1]; k];
+    for row in &rows {
+        for (normal, x) in normal.iter_mut().zip(row) {
+            normal.iter_mut().zip(row).for_each(|(sum, other)| *sum += x * other);
+        }
+    }
+    (0..k).for_each(|c| normal[c][c] += ALPHA);
+    let coefficients = solve(normal);
+    let modelled = |row: &[f64]| row.iter().zip(&coefficients).map(|(x, c)| x * c).sum::<f64>();
+    let rest = rows.iter().map(|row| (row[k] - modelled(&row[..k])).powi(2)).sum::<f64>();
+    let spread = rows.iter().map(|row| row[k].powi(2)).sum::<f64>();
+    (coefficients, 1.0 - rest / spread.max(f64::MIN_POSITIVE))
+}
+
+/// The x with A x = b for `[A | b]` with a symmetric positive definite A, which needs no pivoting
+/// (Gauss and Jordan).
+fn solve(mut rows: Vec<Vec<f64>>) -> Vec<f64> {
+    let n = rows.len();
+    for i in 0..n {
+        let pivot = rows[i].clone();
+        for (_, row) in rows.iter_mut().enumerate().filter(|(j, _)| *j != i) {
+            let factor = row[i] / pivot[i];
+            row.iter_mut().zip(&pivot).for_each(|(x, pivot)| *x -= factor * pivot);
+        }
+    }
+    rows.iter().enumerate().map(|(i, row)| row[n] / row[i]).collect()
 }
 
 #[cfg(test)]
@@ -174,15 +158,12 @@ mod tests {
 
     #[test]
     fn a_linear_answer_is_explained_by_its_own_coefficients() {
-        let lime = Lime { samples: 4000, ..Lime::default() };
-        let masks = masks(6, &lime);
+        let masks = masks(6, 4000);
         let truth = [3.0, -2.0, 0.0, 1.0, 0.5, -0.25];
-        let answers: Vec<f64> = masks
-            .iter()
-            .map(|mask| {
-                7.0 + mask.iter().zip(truth).map(|(&m, t)| f64::from(u8::from(m)) * t).sum::<f64>()
-            })
-            .collect();
+        let remaining = |mask: &Vec<bool>| {
+            mask.iter().zip(truth).filter(|(remains, _)| **remains).map(|(_, t)| t).sum::<f64>()
+        };
+        let answers: Vec<f64> = masks.iter().map(|mask| 7.0 + remaining(mask)).collect();
         let weights: Vec<f64> = masks.iter().map(|mask| weight(mask, 10.0)).collect();
         let (found, r_squared) = ridge(&masks, &answers, &weights);
         for (found, truth) in found.iter().zip(truth) {
@@ -200,15 +181,13 @@ mod tests {
             points.push([corner, f32::from(i) * 0.01, -corner]);
         }
         let cluster = clusters(&points, 3);
-        for (i, part) in cluster.iter().enumerate() {
-            assert_eq!(*part, cluster[i % 3]);
-        }
+        assert!((0..90).all(|i| cluster[i] == cluster[i % 3]));
         assert_eq!(clusters(&points[..2], 20).len(), 2);
     }
 
     #[test]
     fn whole_clouds_weigh_most_and_none_is_empty() {
-        let masks = masks(3, &Lime::default());
+        let masks = masks(3, 1000);
         assert_eq!(masks.len(), 1000);
         assert!(masks.iter().all(|mask| mask.contains(&true)));
         assert_eq!(weight(&[true; 4], 0.25), 1.0);

@@ -9,15 +9,12 @@ use crate::matrix::Matrix;
 pub struct Loss {
     /// The minimised sum.
     pub total: f64,
-    /// The mean of ‖T Tᵀ - 1‖ over feature transforms, without its weight.
-    pub orthogonality: f64,
     /// The number of clouds whose most probable class has the largest share of the target.
     pub correct: usize,
 }
 
 /// The mean cross entropy of `logits` `[clouds, classes]` and `targets`, whose rows sum to 1, with
 /// its gradient, which reuses the memory of the logits.
-#[must_use]
 pub fn cross_entropy(mut logits: Matrix, targets: &Matrix) -> (Loss, Matrix) {
     let n = logits.nrows() as f64;
     let rows: Vec<(f64, bool)> = logits
@@ -42,7 +39,7 @@ pub fn cross_entropy(mut logits: Matrix, targets: &Matrix) -> (Loss, Matrix) {
         .collect();
     let total = rows.iter().map(|(cost, _)| cost).sum::<f64>() / n;
     let correct = rows.iter().filter(|(_, right)| *right).count();
-    (Loss { total, correct, ..Loss::default() }, logits)
+    (Loss { total, correct }, logits)
 }
 
 /// The index of the largest of `values`; of equal values, the first.

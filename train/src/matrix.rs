@@ -16,7 +16,6 @@ pub const ROWS: usize = 192;
 const COLUMNS: usize = 64;
 
 /// `x` times `right`.
-#[must_use]
 pub fn product(x: ArrayView2<'_, f32>, right: ArrayView2<'_, f32>) -> Matrix {
     let mut out = Matrix::zeros((x.nrows(), right.ncols()));
     out.axis_chunks_iter_mut(Axis(0), ROWS)
@@ -40,7 +39,6 @@ pub fn gradient(dz: ArrayView2<'_, f32>, x: ArrayView2<'_, f32>, out: &mut [f32]
 }
 
 /// The transpose of `left` `[n, k]` times `right` `[n, k]`, `[k, k]`.
-#[must_use]
 pub fn square(left: ArrayView2<'_, f32>, right: ArrayView2<'_, f32>) -> Matrix {
     let k = right.ncols();
     let mut out = vec![0.0; k * k];

@@ -2,40 +2,33 @@
 
 use ndarray::ArrayView2;
 
+use crate::batch::Rows;
 use crate::layer::{HiddenLayer, LayerMut, Linear, Module, PooledLayer};
 use crate::matrix::Matrix;
-use crate::rows::Rows;
 
 /// Hidden layers in sequence.
 #[derive(Clone, Debug)]
-pub struct Stack(Vec<HiddenLayer>);
+struct Stack(Vec<HiddenLayer>);
 
 impl Stack {
-    /// Layers of these `widths`, beginning with the inputs. Their numbers begin with `first`.
-    pub fn new(prefix: &str, widths: &[usize], first: usize, seed: u64) -> Self {
+    /// Layers of these `widths`, beginning with the inputs, whose linear parts are named `linear`
+    /// and the number of the layer, and whose norms `norm` and the number.
+    fn new([linear, norm]: [&str; 2], widths: &[usize], seed: u64) -> Self {
         let layer = |(pair, i): (&[usize], usize)| {
-            let [linear, norm] = ["conv", "bn"].map(|part| format!("{prefix}{part}{i}"));
+            let [linear, norm] = [linear, norm].map(|part| format!("{part}{i}"));
             HiddenLayer::new(&linear, &norm, (pair[0], pair[1]), seed)
         };
-        Self(widths.windows(2).zip(first..).map(layer).collect())
+        Self(widths.windows(2).zip(1..).map(layer).collect())
     }
 
-    /// The output of the last layer in the last forward pass.
-    ///
-    /// # Panics
-    /// If there is no layer.
-    pub fn output(&self) -> ArrayView2<'_, f32> {
-        self.0[self.0.len() - 1].base.output()
-    }
-
-    /// The input of layer `i`; that of the first layer is `x`.
-    fn input<'a>(&'a self, i: usize, x: ArrayView2<'a, f32>) -> ArrayView2<'a, f32> {
-        if i == 0 { x } else { self.0[i - 1].base.output() }
+    /// The output of the last layer; without layers, `x`.
+    fn output<'a>(&'a self, x: ArrayView2<'a, f32>) -> ArrayView2<'a, f32> {
+        self.0.last().map_or(x, |layer| layer.base.output())
     }
 
     /// Applies all layers to `x` and returns the output of the last. `kept` is the dropout mask of
     /// the last layer.
-    pub fn forward<'a>(
+    fn forward<'a>(
         &'a mut self,
         x: ArrayView2<'a, f32>,
         rows: Rows<'_>,
@@ -48,11 +41,11 @@ impl Stack {
             let x = before.last().map_or(x, |layer| layer.base.output());
             layer[0].forward(x, rows, kept.take_if(|_| i + 1 == n), momentum);
         }
-        self.input(n, x)
+        self.output(x)
     }
 
     /// Propagates the gradient of the output. Returns the gradient of `x` if `wants_input`.
-    pub fn backward(
+    fn backward(
         &mut self,
         x: ArrayView2<'_, f32>,
         mut dy: Matrix,
@@ -71,7 +64,7 @@ impl Stack {
         Some(dy)
     }
 
-    pub fn layers(&mut self) -> impl Iterator<Item = LayerMut<'_>> {
+    fn layers(&mut self) -> impl Iterator<Item = LayerMut<'_>> {
         self.0.iter_mut().map(|layer| layer.base.layer())
     }
 }
@@ -84,14 +77,14 @@ pub struct SharedMlp {
 }
 
 impl SharedMlp {
-    /// Layers of these `widths`, beginning with the inputs. Their numbers begin with `first`.
-    pub fn new(prefix: &str, widths: &[usize], first: usize, relu: bool, seed: u64) -> Self {
+    /// Layers of these `widths`, beginning with the inputs.
+    pub fn new(prefix: &str, widths: &[usize], relu: bool, seed: u64) -> Self {
         let n = widths.len() - 1;
-        let [linear, norm] = ["conv", "bn"].map(|part| format!("{prefix}{part}{}", first + n - 1));
-        Self {
-            hidden: Stack::new(prefix, &widths[..n], first, seed),
-            pooled: PooledLayer::new(&linear, &norm, (widths[n - 1], widths[n]), relu, seed),
-        }
+        let [linear, norm] = ["conv", "bn"].map(|part| format!("{prefix}{part}"));
+        let hidden = Stack::new([&linear, &norm], &widths[..n], seed);
+        let [linear, norm] = [linear, norm].map(|part| format!("{part}{n}"));
+        let size = (widths[n - 1], widths[n]);
+        Self { hidden, pooled: PooledLayer::new(&linear, &norm, size, relu, seed) }
     }
 
     pub fn forward(&mut self, x: ArrayView2<'_, f32>, rows: Rows<'_>, momentum: f32) {
@@ -106,9 +99,8 @@ impl SharedMlp {
         rows: Rows<'_>,
         wants_input: bool,
     ) -> Option<Matrix> {
-        let n = self.hidden.0.len();
-        let input = self.hidden.input(n, x);
-        let dy = self.pooled.backward(dy, input, rows, wants_input || n > 0)?;
+        let wants_hidden = wants_input || !self.hidden.0.is_empty();
+        let dy = self.pooled.backward(dy, self.hidden.output(x), rows, wants_hidden)?;
         self.hidden.backward(x, dy, rows, wants_input)
     }
 }
@@ -126,16 +118,11 @@ pub struct DenseHead {
 }
 
 impl DenseHead {
-    /// Layers of these `widths`, from the inputs to the outputs. The numbers of the batch norms
-    /// follow those of `n_points` point-wise layers.
-    pub fn new(prefix: &str, widths: &[usize], n_points: usize, seed: u64) -> Self {
+    /// Layers of these `widths`, from the inputs to the outputs.
+    pub fn new(widths: &[usize], seed: u64) -> Self {
         let n = widths.len() - 1;
-        let hidden = widths.windows(2).take(n - 1).zip(1..).map(|(pair, i)| {
-            let (linear, norm) = (format!("{prefix}fc{i}"), format!("{prefix}bn{}", n_points + i));
-            HiddenLayer::new(&linear, &norm, (pair[0], pair[1]), seed)
-        });
-        let last = Linear::new(&format!("{prefix}fc{n}"), widths[n - 1], widths[n], seed);
-        Self { hidden: Stack(hidden.collect()), last }
+        let last = Linear::new(&format!("fc{n}"), widths[n - 1], widths[n], seed);
+        Self { hidden: Stack::new(["fc", "bn"], &widths[..n], seed), last }
     }
 
     /// Applies all layers to `x`. `kept` is the dropout mask of the last hidden layer.
@@ -151,18 +138,15 @@ impl DenseHead {
 
     pub fn backward(&mut self, x: ArrayView2<'_, f32>, dz: ArrayView2<'_, f32>) -> Matrix {
         let ones = vec![1.0; x.nrows()];
-        let dy = self.last.backward(self.hidden.input(self.hidden.0.len(), x), dz);
+        let dy = self.last.backward(self.hidden.output(x), dz);
         let dx = self.hidden.backward(x, dy, Rows::new(&ones, &[]), true);
         dx.expect("invariant: `wants_input` is true")
-    }
-
-    pub fn hidden_width(&self) -> Option<usize> {
-        self.hidden.0.last().map(|layer| layer.base.output.ncols())
     }
 }
 
 impl Module for DenseHead {
     fn layers(&mut self) -> Vec<LayerMut<'_>> {
-        self.hidden.layers().chain([self.last.layer()]).collect()
+        let last = LayerMut { linear: &mut self.last, norm: None, output: None };
+        self.hidden.layers().chain([last]).collect()
     }
 }

@@ -21,7 +21,6 @@ pub struct Parameter {
 
 impl Parameter {
     /// A parameter with this `value`.
-    #[must_use]
     pub fn new(name: String, shape: Vec<usize>, value: Vec<f32>) -> Self {
         let zeros = vec![0.0; value.len()];
         let (gradient, mean, square) = (zeros.clone(), zeros.clone(), zeros);
@@ -29,7 +28,6 @@ impl Parameter {
     }
 
     /// The weights as a matrix, `[outputs, inputs]`.
-    #[must_use]
     pub fn matrix(&self) -> ArrayView2<'_, f32> {
         let (outputs, inputs) = (self.shape[0], self.shape[1]);
         ArrayView2::from_shape((outputs, inputs), &self.value)

@@ -7,12 +7,13 @@
 //! points that won channels, which are the critical points, which the code of infer-cpu ranks. A
 //! trained encoder can also serve alone, as a sampler.
 
+use infer_cpu::sampler::CriticalPoints;
+
 use crate::batch::Batch;
-use crate::cpl::Cpl;
-use crate::critical_points::critical_points;
-use crate::layer::{LayerMut, Linear, Module};
+use crate::layer::{LayerMut, Linear, Module, PooledLayer};
 use crate::loss;
 use crate::mlp::SharedMlp;
+use crate::recipe::Cpl;
 
 /// The prefix of the parameters that only training needs. Model files leave them out.
 pub const TRAINING_ONLY: &str = "cpl.classes";
@@ -28,12 +29,11 @@ pub struct PointEncoder {
 
 impl PointEncoder {
     /// A point encoder with random weights.
-    #[must_use]
     pub fn new(cpl: &Cpl, n_classes: usize, seed: u64) -> Self {
         let widths = [&[3], &cpl.front[..]].concat();
         let pooled = widths[widths.len() - 1];
         Self {
-            mlp: SharedMlp::new("cpl.", &widths, 1, true, seed),
+            mlp: SharedMlp::new("cpl.", &widths, true, seed),
             classes: Linear::new(TRAINING_ONLY, pooled, n_classes, seed),
             keep: cpl.keep,
             weight: cpl.weight as f32,
@@ -60,6 +60,47 @@ impl PointEncoder {
 
 impl Module for PointEncoder {
     fn layers(&mut self) -> Vec<LayerMut<'_>> {
-        self.mlp.layers().into_iter().chain([self.classes.layer()]).collect()
+        let classes = LayerMut { linear: &mut self.classes, norm: None, output: None };
+        self.mlp.layers().into_iter().chain([classes]).collect()
+    }
+}
+
+/// The points of `batch` that win channels of `pooled`, the pooling of all points: the `keep` of each
+/// cloud that win most, or fewer.
+fn critical_points(pooled: &PooledLayer, batch: &Batch, keep: usize) -> Batch {
+    let mut chosen =
+        Batch { coordinates: Vec::new(), weights: Vec::new(), starts: vec![0], ..batch.clone() };
+    let mut critical = CriticalPoints::default();
+    for (cloud, maxima) in pooled.base.output().rows().into_iter().enumerate() {
+        let maxima = maxima.to_slice().expect("invariant: rows are contiguous");
+        let first = batch.starts[cloud] as u32;
+        // Numbered within the cloud, because a ranking without critical points falls back to row 0.
+        let winners: Vec<u32> = pooled.winners(cloud).iter().map(|row| row - first).collect();
+        critical.rank(maxima, &winners);
+        let mut rows: Vec<u32> = critical.rows.iter().copied().take(keep).collect();
+        rows.sort_unstable();
+        let points = rows.into_iter().map(|row| batch.coordinates[(row + first) as usize]);
+        chosen.coordinates.extend(points);
+        chosen.starts.push(chosen.coordinates.len());
+    }
+    chosen.weights = vec![1.0; chosen.coordinates.len()];
+    chosen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cloud_without_critical_points_keeps_one_of_its_own() {
+        // With a shift far below 0, the output of the ReLU is 0.
+        let mut pooled = PooledLayer::new("a", "b", (3, 4), true, 1);
+        pooled.base.norm.shift.value.fill(-100.0);
+        let coordinates = vec![[0.1, 0.2, 0.3], [0.5, 0.1, 0.0], [0.9, 0.8, 0.7], [0.2, 0.9, 0.4]];
+        let batch =
+            Batch { coordinates, weights: vec![1.0; 4], starts: vec![0, 2, 4], ..Batch::default() };
+        pooled.forward(batch.points(), batch.rows(), 0.1);
+        let chosen = critical_points(&pooled, &batch, 64);
+        assert_eq!(chosen.coordinates, [batch.coordinates[0], batch.coordinates[2]]);
     }
 }

@@ -3,12 +3,15 @@
 //! A [`Simulator`] has a subject (a mesh, or a street), a network, and what casts: WebGPU or the CPU. It
 //! runs natively too, with which tests compare the browser.
 
+#![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
 mod settings;
 mod subject;
 
 use infer_cpu::{Classifier, Options};
 use settings::Settings;
-use sim_gpu::formats::scan::Attribute;
+use sim_gpu::columns::Attribute;
 use sim_gpu::internals::resolve::resolve;
 use sim_gpu::internals::scan::{ScanRequest, aim_all};
 use sim_gpu::{Caster, Effects, Mesh, Sensor};
@@ -107,8 +110,8 @@ impl Simulator {
         Ok(())
     }
 
-    /// Makes the mesh in a file of this name and content the subject, and returns what is doubtful
-    /// about it.
+    /// Makes the mesh in a file of this name and content the subject, and returns what is
+    /// probably wrong with it.
     ///
     /// # Errors
     /// The file is no mesh: with the line and the cause.

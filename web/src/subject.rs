@@ -42,10 +42,10 @@ impl Subject {
         Ok(Self::of_mesh(&Mesh::try_from(mesh).map_err(words)?))
     }
 
-    /// The mesh in a file of this name and content, and what is doubtful about it.
+    /// The mesh in a file of this name and content, and what is probably wrong with it.
     pub fn of_file(name: &str, bytes: &[u8]) -> Result<(Self, Vec<String>), Words> {
         let mesh = Mesh::from_bytes(name, bytes).map_err(words)?;
-        let warnings = mesh.warnings().to_vec();
+        let warnings = mesh.warnings().iter().map(ToString::to_string).collect();
         Ok((Self::of_mesh(&mesh), warnings))
     }
 

@@ -1,34 +1,42 @@
 //! Starts the repository's other programs, which Cargo builds first if need be.
 
 use anyhow::Context;
-use formats::modelnet_h5_list;
+use std::env::current_dir;
 use std::ffi::OsString;
 use std::process::Command;
-use xtask::workspace::{LAB, cargo_run};
+use xtask::workspace::{cargo, root};
 
 pub const EDGEPUCK: &str = "edgepuck";
 
 /// Commands of the product that read or write no network. A first build for them
-/// leaves out the feature `models`: infer-cpu, and readers and writers of PyTorch's
-/// and ONNX's files.
-const WITHOUT_MODELS: &str = "gen-dataset gen gen-scenes gen-drive gen-shapes sample-surfaces scan \
-     segment weather corrupt preview profile adapters merge-dataset";
+/// leaves out the feature `models`: infer-cpu and training. It leaves out `gpu`, too, on a
+/// machine without one.
+const WITHOUT_MODELS: &str = "gen-dataset gen gen-scenes scan \
+     corrupt view profile merge-dataset";
 
-/// Commands that read points in any format.
-const READS_POINTS: &str = "segment weather corrupt preview";
+/// Commands that read points in any format. The feature that they need beyond the default ones takes long to
+/// build.
+const READS_POINTS: &str = "corrupt view";
 
 /// Runs the program of `package` with `words` in the caller's folder and gives
 /// the exit code that it ended with.
 pub fn run(package: &str, words: &[OsString]) -> anyhow::Result<u8> {
-    let mut cargo = cargo_run(package);
-    if words.first().is_some_and(|word| WITHOUT_MODELS.split(' ').any(|name| word == name)) {
+    let mut cargo = cargo(&["run", "--release", "--package", package, "--bin", package]);
+    cargo.arg("--manifest-path").arg(root().join("Cargo.toml")).current_dir(current_dir()?);
+    if is_one_of(words, WITHOUT_MODELS) {
         cargo.arg("--no-default-features");
+        if names_adapter(words) || has_gpu() {
+            cargo.args(["--features", "gpu"]);
+        }
     }
-    for feature in features(package, words) {
-        cargo.args(["--features", feature]);
-    }
-    cargo.arg("--").args(words);
+    cargo.args(features(package, words)).arg("--").args(words);
     become_process(&mut cargo).context("cannot start cargo")
+}
+
+/// The flags for the features that a command line needs beyond the default ones.
+fn features(package: &str, words: &[OsString]) -> &'static [&'static str] {
+    let needs_las = package == EDGEPUCK && is_one_of(words, READS_POINTS);
+    if needs_las { &["--features", "las"] } else { &[] }
 }
 
 /// Replaces this process where the system allows it, so that a signal ends what
@@ -40,39 +48,36 @@ fn become_process(command: &mut Command) -> std::io::Result<u8> {
     Ok(command.status()?.code().and_then(|code| u8::try_from(code).ok()).unwrap_or(1))
 }
 
-/// The features that a command line needs beyond the default ones: what takes long to build.
-fn features(package: &str, words: &[OsString]) -> Vec<&'static str> {
-    let any = |is: fn(&str) -> bool| words.iter().any(|word| is(&word.to_string_lossy()));
-    let is_in_scene = |key| words.iter().any(|word| has_key(word, key));
-    let reads_hdf5 = modelnet_h5_list::is_among(words);
-    if package == LAB {
-        return if reads_hdf5 { vec!["hdf5"] } else { Vec::new() };
-    }
-    let simplifies = any(|word| word.starts_with("--simplify")) || is_in_scene("simplify");
-    let is_coloured = any(|word| word.starts_with("--colours")) || is_in_scene("colours");
-    let writes_hdf5 =
-        any(|word| word.starts_with("--layout")) && any(|word| word.contains("modelnet-h5"));
-    let hdf5 = reads_hdf5 || writes_hdf5;
-    let reads_points =
-        words.first().is_some_and(|word| READS_POINTS.split(' ').any(|name| word == name));
-    let features = [
-        (simplifies, "simplify"),
-        (hdf5, "hdf5"),
-        (is_coloured, "textures"),
-        (reads_points, "las"),
-    ];
-    features.into_iter().filter(|(is_needed, _)| *is_needed).map(|(_, name)| name).collect()
+/// Whether the command that `words` begin with is one of `commands`.
+fn is_one_of(words: &[OsString], commands: &str) -> bool {
+    words.first().is_some_and(|word| commands.split(' ').any(|name| word == name))
 }
 
-/// Whether the scene file has this key, and not `false`. An error costs a longer build alone.
-fn has_key(scene: &OsString, key: &str) -> bool {
-    scene.to_string_lossy().ends_with(".toml")
-        && std::fs::read_to_string(scene).is_ok_and(|text| is_key_of(&text, key))
+/// Whether a command line asks for a GPU, or for the list of those that there are.
+fn names_adapter(words: &[OsString]) -> bool {
+    let words: Vec<_> = words.iter().map(|word| word.to_string_lossy()).collect();
+    let value = |i: usize| match words[i].strip_prefix("--adapter") {
+        Some("") => words.get(i + 1).map(|word| word.as_ref()),
+        Some(value) => value.strip_prefix('='),
+        None => None,
+    };
+    (0..words.len()).filter_map(value).any(|name| !["auto", "cpu"].contains(&name))
 }
 
-fn is_key_of(scene: &str, key: &str) -> bool {
-    let mut code = scene.lines().map(|line| line.split('#').next().unwrap_or_default());
-    code.any(|code| code.contains(key) && !code.contains("false"))
+/// Whether this machine has a GPU that a program could open. A system that is not asked counts as one
+/// that has. Vulkan in software is none: `auto` never takes it.
+fn has_gpu() -> bool {
+    let names = |folder: &str| {
+        let files = std::fs::read_dir(format!("/dev/{folder}")).into_iter().flatten().flatten();
+        files.map(|file| format!("{folder}{}", file.file_name().display())).collect::<Vec<_>>()
+    };
+    !cfg!(target_os = "linux") || names("").iter().chain(&names("dri/")).any(|name| is_gpu(name))
+}
+
+/// Whether a file in `/dev` is a GPU: a render node of the kernel's drivers, or NVIDIA's, WSL's, Adreno's
+/// or Mali's.
+fn is_gpu(name: &str) -> bool {
+    ["dri/renderD", "nvidiactl", "dxg", "kgsl-3d", "mali"].iter().any(|it| name.starts_with(it))
 }
 
 #[cfg(test)]
@@ -80,17 +85,31 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_what_simplifies_is_built_with_the_feature() {
-        let flags = ["gen-dataset", "--simplify=auto", "--layout", "modelnet-h5"];
-        assert_eq!(features(EDGEPUCK, &flags.map(OsString::from)), ["simplify", "hdf5"]);
-        assert_eq!(features(EDGEPUCK, &["preview", "a.las"].map(OsString::from)), ["las"]);
-        for (scene, expected) in [
-            ("simplify = \"auto\"", true),
-            ("[[object]]\n  simplify = 0.01 # metres", true),
-            ("simplify = false", false),
-            ("# simplify = \"auto\"", false),
-        ] {
-            assert_eq!(is_key_of(scene, "simplify"), expected, "{scene}");
+    fn commands_that_read_points_have_las() {
+        for (word, expected) in [("view", true), ("corrupt", true), ("gen-dataset", false)] {
+            let found = features(EDGEPUCK, &[word, "a.las"].map(OsString::from));
+            assert_eq!(!found.is_empty(), expected, "{word}");
         }
+    }
+
+    #[test]
+    fn adapters_are_named_by_flags() {
+        for (words, expected) in [
+            ("gen-dataset meshes --out a", false),
+            ("gen-dataset meshes --adapter cpu --out a", false),
+            ("gen-dataset meshes --adapter=auto", false),
+            ("gen-dataset meshes --adapter llvmpipe", true),
+            ("scan scene.toml --adapter=NVIDIA", true),
+            ("gen-dataset --adapter list", true),
+        ] {
+            let typed: Vec<OsString> = words.split(' ').map(OsString::from).collect();
+            assert_eq!(names_adapter(&typed), expected, "{words}");
+        }
+    }
+
+    #[test]
+    fn a_display_without_a_render_node_is_no_gpu() {
+        let found = ["dri/card0", "dri/renderD128", "nvidiactl", "nvram", "dxg", "fb0"];
+        assert_eq!(found.map(is_gpu), [false, true, true, false, true, false]);
     }
 }

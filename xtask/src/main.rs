@@ -14,10 +14,8 @@ use xtask::workspace::LAB;
 
 /// Runs the developer commands of Edgepuck's repository.
 ///
-/// All other commands are passed to the program `edgepuck` (gen-dataset, gen-scenes, gen-drive, gen-shapes,
-/// sample-surfaces, scan, segment, detect, weather, corrupt, preview, profile, adapters, merge-dataset, card,
-/// cluster, import-weights, advise, export-onnx, train, eval, explain, compare-points), which is built first
-/// if necessary.
+/// All other commands, such as gen-dataset, are passed to the program `edgepuck`, which is built first if
+/// necessary.
 /// `cargo xtask edgepuck --help` describes them.
 #[derive(Parser)]
 #[command(name = "cargo xtask", version, max_term_width = 100)]
@@ -28,7 +26,7 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Install the packages that the tests need, and run all tests
+    /// Install the packages that the tests need, and run the tests; with --all, all of them
     Test(test::Args),
     /// Check packages, binaries, dependencies and version numbers before a release
     ReleaseCheck,
@@ -36,10 +34,6 @@ enum Command {
     BuildPi(build_pi::Args),
     /// Measure speed and accuracy: `cargo xtask bench --help`
     Bench(Forwarded),
-    /// Reproduce the accuracies of Meyer and Reitmann (2026) by points, sampler and dataset
-    Reproduce(Forwarded),
-    /// Change the code in one place at a time, and count the changes that the tests notice
-    Mutants(Forwarded),
     /// Run the program `edgepuck` with these arguments
     Edgepuck(Forwarded),
     /// A command of the program `edgepuck`
@@ -63,8 +57,8 @@ fn main() -> ExitCode {
         Command::BuildPi(args) => build_pi::run(&args).map(|()| 0),
         Command::Edgepuck(args) => forward::run(EDGEPUCK, &args.words),
         Command::Product(words) => forward::run(EDGEPUCK, &words),
-        // The laboratory's commands, which have the same names there.
-        _ => forward::run(LAB, &typed),
+        // The laboratory's command has the same name there.
+        Command::Bench(_) => forward::run(LAB, &typed),
     };
     match done {
         Ok(code) => ExitCode::from(code),

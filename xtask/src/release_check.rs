@@ -2,15 +2,17 @@
 
 use crate::summary::{Counts, Summary, check};
 use crate::test::python;
-use anyhow::bail;
+use anyhow::{bail, ensure};
 use std::process::Command;
 use xtask::workspace::{cargo, output, packages, root};
 
-const MANIFEST: &str = "Cargo.toml";
+/// What the README has in place of an address as long as the project has none.
+const PLACEHOLDER: &str = "ADDRESS";
 
 /// Runs every check even if one fails, and prints a table of the results.
 pub fn run() -> anyhow::Result<u8> {
     let mut summary = Summary::default();
+    summary.step("address", |_| address());
     summary.step("packages", |_| package());
     summary.step("binaries", binaries);
     summary.step("dependencies", |_| {
@@ -26,10 +28,20 @@ pub fn run() -> anyhow::Result<u8> {
     Ok(summary.end())
 }
 
+/// Checks that the README names the address of the repository.
+fn address() -> anyhow::Result<Counts> {
+    let readme = std::fs::read_to_string(root().join("README.md"))?;
+    ensure!(
+        !readme.contains(PLACEHOLDER),
+        "README.md: expected the address of the repository, found `{PLACEHOLDER}`"
+    );
+    Ok(Counts::PASSED)
+}
+
 /// Checks that every crate for crates.io builds from the files of its package.
 fn package() -> anyhow::Result<Counts> {
     let mut package = cargo(&["package", "--allow-dirty"]);
-    for crate_ in packages(MANIFEST)?.iter().filter(|crate_| crate_["publish"].is_null()) {
+    for crate_ in packages()?.iter().filter(|crate_| crate_["publish"].is_null()) {
         package.args(["--package", crate_["name"].as_str().unwrap_or_default()]);
     }
     check("packages", &mut package)
@@ -37,8 +49,7 @@ fn package() -> anyhow::Result<Counts> {
 
 /// Checks which files a release would have for each system.
 fn binaries(summary: &mut Summary) -> anyhow::Result<Counts> {
-    let is_known = packages(MANIFEST)?.iter().any(|crate_| crate_["repository"].is_string());
-    if !is_known {
+    if !packages()?.iter().any(|crate_| crate_["repository"].is_string()) {
         let reason = "no manifest names the `repository` to release from";
         return Ok(summary.skip("binaries", 1, reason));
     }
@@ -87,7 +98,7 @@ mod tests {
 
     #[test]
     fn crates_for_users_are_published_and_crates_for_developers_are_not() {
-        let crates = packages(MANIFEST).unwrap();
+        let crates = packages().unwrap();
         let find = |name: &str| crates.iter().find(|crate_| crate_["name"] == name).unwrap();
         let is_published = |name: &str| find(name)["publish"].is_null();
         for name in ["edgepuck", "edgepuck-formats", "sim-gpu", "infer-cpu"] {

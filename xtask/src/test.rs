@@ -8,17 +8,17 @@ mod page;
 mod peers;
 pub mod python;
 mod sanitize;
-mod structure;
 mod targets;
 mod test_programs;
 mod viewer;
 
-use crate::summary::{Counts, Summary};
+use crate::summary::{Counts, Summary, check};
 use anyhow::{bail, ensure};
 use lints::by_clippy;
-use meanwhile::nice;
+use meanwhile::{Meanwhile, nice};
 use std::process::Command;
-use xtask::workspace::{self, cargo, cargo_in_lab, output, root};
+use xtask::venv::any_python;
+use xtask::workspace::{self, cargo, output, root};
 
 /// The script that lists and installs the packages that tests need.
 const PACKAGES: &str = "xtask/packages.sh";
@@ -26,6 +26,11 @@ const PACKAGES: &str = "xtask/packages.sh";
 /// Flags of `test`.
 #[derive(clap::Args)]
 pub struct Args {
+    /// Also run the checks that take long and seldom find a fault, as CI does: the wheel, builds for other
+    /// systems, the documentation of the libraries, schedulers, fuzzing
+    #[arg(long, conflicts_with_all = ["quick", "sanitize"])]
+    all: bool,
+
     /// Check only the format, the structure, the lints and the unit tests, in a few minutes
     #[arg(long, conflicts_with = "sanitize")]
     quick: bool,
@@ -34,8 +39,8 @@ pub struct Args {
     #[arg(long)]
     no_install: bool,
 
-    /// How long to fuzz each parser
-    #[arg(long, default_value_t = 15, value_name = "SECONDS")]
+    /// How long to fuzz each parser, with --all
+    #[arg(long, default_value_t = 15, value_name = "SECONDS", requires = "all")]
     fuzz_seconds: u32,
 
     /// Which comparisons with other software (tests/peers) to run; `all` downloads about 5 GB from
@@ -57,59 +62,97 @@ pub fn run(args: &Args) -> anyhow::Result<u8> {
         check_source(&mut summary);
         summary.step("unit tests", unit_tests);
     } else {
-        run_all(args, &mut summary);
+        run_steps(args, &mut summary);
     }
     Ok(summary.end())
 }
 
-fn run_all(args: &Args, summary: &mut Summary) {
+fn run_steps(args: &Args, summary: &mut Summary) {
     let install = !args.no_install;
     if install {
-        summary.command("packages", Command::new("sh").arg(PACKAGES).current_dir(root()));
+        let mut script = Command::new("sh");
+        script.arg(PACKAGES).args(args.all.then_some("all")).current_dir(root());
+        summary.command("packages", &mut script);
     }
     let packages = peers::Packages::fetch_meanwhile(args.peers, install);
-    let wheel = python::build_meanwhile(install);
-    let fuzz_targets = fuzz::build_meanwhile(args.fuzz_seconds);
-    let pi_binary = targets::build_meanwhile();
+    let built = args.all.then(|| Built::start(args, install));
     check_source(summary);
     summary.step("tests", |summary| tests(summary, install));
-    laboratory(summary, install);
     let programs = peers::programs();
     viewer::run(summary, install, &programs);
-    // A peer takes the binary for the Raspberry Pi.
-    let _ = pi_binary.and_then(meanwhile::Meanwhile::end);
+    let (wheel, fuzz_targets) = built.map(Built::without_pi_binary).unzip();
     // Peers wait for clocks and sockets, so what only needs the processor runs beside them.
     let others = std::thread::scope(|scope| {
         let others = scope.spawn(|| {
             let mut summary = Summary::default();
-            library_lints(&mut summary);
-            let mut documentation = compile_all(&["doc", "--no-deps"]);
-            documentation.env("RUSTDOCFLAGS", "--deny warnings");
-            summary.command("documentation", &mut nice(&documentation));
-            smallest_lints(&mut summary);
+            if args.all {
+                library_lints(&mut summary);
+                documentation(&mut summary);
+                smallest_lints(&mut summary);
+            }
             summary.step("dependencies", |_| infer_cpu_is_light());
-            targets::run(&mut summary, install);
-            page::run(&mut summary, install);
+            targets::run(&mut summary, install, args.all);
+            page::run(&mut summary, install, &programs);
             let with_pytorch = args.peers == peers::Which::All;
             let wheel = python::run(&mut summary, wheel, with_pytorch);
-            docs::run_blocks(&mut summary, &wheel);
+            docs::run_blocks(&mut summary, &wheel, &programs);
             summary
         });
-        peers::run(summary, packages, &programs);
+        peers::run(summary, packages, &programs, args.all);
         others.join()
     });
     match others {
         Ok(others) => summary.append(others),
         Err(_) => summary.step("documentation and targets", |_| bail!("they panicked")),
     }
-    fuzz::run(summary, args.fuzz_seconds, fuzz_targets);
+    if let Some(targets) = fuzz_targets {
+        fuzz::run(summary, args.fuzz_seconds, targets);
+    }
+}
+
+/// What `--all` builds in the background, in the time that other steps leave a core idle.
+struct Built {
+    wheel: python::Build,
+    fuzz_targets: Option<anyhow::Result<Meanwhile>>,
+    pi_binary: anyhow::Result<Meanwhile>,
+}
+
+impl Built {
+    fn start(args: &Args, install: bool) -> Self {
+        Self {
+            wheel: python::build_meanwhile(install),
+            fuzz_targets: fuzz::build_meanwhile(args.fuzz_seconds),
+            pi_binary: targets::build_meanwhile(),
+        }
+    }
+
+    /// Waits for the binary for the Raspberry Pi, which a peer takes.
+    fn without_pi_binary(self) -> (python::Build, Option<anyhow::Result<Meanwhile>>) {
+        let _ = self.pi_binary.and_then(Meanwhile::end);
+        (self.wheel, self.fuzz_targets)
+    }
 }
 
 /// Checks the format, the structure and the lints, which compiles all tests.
 fn check_source(summary: &mut Summary) {
     summary.command("format", &mut cargo(&["fmt", "--all", "--check"]));
-    summary.step("structure", structure::check);
-    summary.step("lints", |_| lints::check("lints", compile_all(&["test"]).arg("--no-run")));
+    summary.step("structure", |_| structure());
+    summary.step("lints", |_| {
+        let tests = lints::check("lints", compile_all(&["test"]).arg("--no-run"))?;
+        Ok(tests.and(lints::check("lints of the Python module", &mut python_module())?))
+    });
+}
+
+/// Checks what neither rustc nor Clippy does.
+fn structure() -> anyhow::Result<Counts> {
+    let python = any_python().map_err(anyhow::Error::msg)?;
+    check("structure", Command::new(python).arg("xtask/structure.py").current_dir(root()))
+}
+
+/// Builds the extension module of the Python package with the features and the profile of the tests,
+/// for which Cargo looks at examples, too.
+fn python_module() -> Command {
+    compile_all(&["build", "--profile", "test", "--lib", "--examples"])
 }
 
 /// Lints the libraries without the features that only tests need, the library of the Python package
@@ -117,6 +160,12 @@ fn check_source(summary: &mut Summary) {
 fn library_lints(summary: &mut Summary) {
     let name = "lints of the libraries";
     summary.step(name, |_| lints::check(name, &mut nice(&compile_all(&["check", "--lib"]))));
+}
+
+fn documentation(summary: &mut Summary) {
+    let mut documentation = compile_all(&["doc", "--no-deps"]);
+    documentation.env("RUSTDOCFLAGS", "--deny warnings");
+    summary.command("documentation", &mut nice(&documentation));
 }
 
 /// Lints the smallest builds: of a first command, and of a machine without a GPU.
@@ -139,14 +188,10 @@ fn go_without(
     Ok(summary.skip(name, 1, lack))
 }
 
-/// A command of Cargo on every crate, with the features that all such commands share, so that
-/// nothing is built twice.
+/// A command of Cargo on every crate.
 fn cargo_on_all(words: &[&str]) -> Command {
     let mut command = cargo(words);
-    command.args(["--workspace", "--features", "edgepuck/hdf5,edgepuck/textures,train/hdf5"]);
-    if has_cpp_compiler() {
-        command.args(["--features", "edgepuck/simplify,tests/simplify"]);
-    }
+    command.arg("--workspace");
     command
 }
 
@@ -155,35 +200,10 @@ fn compile_all(words: &[&str]) -> Command {
     by_clippy(cargo_on_all(words))
 }
 
-fn compile_lab(words: &[&str]) -> Command {
-    let mut command = by_clippy(cargo_in_lab(words));
-    command.args(["--features", "hdf5"]);
-    command
-}
-
-/// Checks the format and the lints of the laboratory, and runs its tests.
-fn laboratory(summary: &mut Summary, required: bool) {
-    let manifest = root().join("xtask/lab/Cargo.toml");
-    let mut format = cargo(&["fmt", "--check", "--manifest-path"]);
-    summary.command("format of the laboratory", format.arg(manifest));
-    let name = "lints of the laboratory";
-    summary.step(name, |_| lints::check(name, compile_lab(&["test"]).arg("--no-run")));
-    summary.step("laboratory", |summary| {
-        let mut tests = compile_lab(&["test", "--no-fail-fast"]);
-        require_adapter(&mut tests, required);
-        test_programs::run(summary, &mut tests)
-    });
-}
-
 fn tests(summary: &mut Summary, required: bool) -> anyhow::Result<Counts> {
     let mut tests = compile_all(&["test", "--no-fail-fast"]);
     require_adapter(&mut tests, required);
-    let counts = test_programs::run(summary, &mut tests)?;
-    if has_cpp_compiler() {
-        return Ok(counts);
-    }
-    let lack = "there is no C++ compiler";
-    Ok(counts.and(go_without(summary, "tests of simplified meshes", lack, required)?))
+    test_programs::run(summary, &mut tests)
 }
 
 /// The tests in the same files as the code.
@@ -204,21 +224,18 @@ fn require_adapter(tests: &mut Command, required: bool) {
     }
 }
 
-/// Whether meshoptimizer, which `--simplify` uses, can be built.
-fn has_cpp_compiler() -> bool {
-    let answers = |name: &str| Command::new(name).arg("--version").output().is_ok();
-    cfg!(windows) || std::env::var_os("CXX").is_some() || answers("c++")
-}
-
-/// Checks that the Raspberry Pi's crate depends on nothing for GPUs or training.
+/// Checks that the Raspberry Pi's crate and C library depend on nothing for GPUs or training.
 fn infer_cpu_is_light() -> anyhow::Result<Counts> {
     const TOO_HEAVY: [&str; 7] =
         ["wgpu", "naga", "tokio", "ndarray", "rayon", "sim-gpu", "edgepuck-train"];
-    let tree = ["tree", "--package", "infer-cpu", "--edges", "normal", "--prefix", "none"];
-    let tree = output(&mut cargo(&tree))?;
-    let heavy = tree.lines().find(|line| TOO_HEAVY.iter().any(|name| line.starts_with(name)));
-    match heavy {
-        Some(line) => bail!("infer-cpu must stay light, but depends on {line}"),
-        None => Ok(Counts::PASSED),
+    const CLASSIFY: &[&str] = &["--no-default-features", "--features", "classify"];
+    for (package, features) in [("infer-cpu", &[][..]), ("edgepuck-ffi", CLASSIFY)] {
+        let tree = ["tree", "--package", package, "--edges", "normal", "--prefix", "none"];
+        let tree = output(cargo(&tree).args(features))?;
+        let heavy = tree.lines().find(|line| TOO_HEAVY.iter().any(|name| line.starts_with(name)));
+        if let Some(line) = heavy {
+            bail!("{package} must stay light, but depends on {line}");
+        }
     }
+    Ok(Counts::PASSED)
 }

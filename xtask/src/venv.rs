@@ -112,7 +112,8 @@ fn installer() -> Result<PathBuf, String> {
     Ok(python)
 }
 
-fn any_python() -> Result<&'static str, String> {
+/// The name of an interpreter that the machine has.
+pub fn any_python() -> Result<&'static str, String> {
     let answers = |python: &&str| succeeds(Command::new(python).arg("--version")).is_ok();
     PYTHONS.into_iter().find(answers).ok_or_else(|| "expected Python, found none".to_owned())
 }

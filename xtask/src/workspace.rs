@@ -6,7 +6,7 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The laboratory, which measures: a workspace of its own.
+/// The laboratory, which measures.
 pub const LAB: &str = "edgepuck-lab";
 
 /// The workspace's root.
@@ -14,43 +14,10 @@ pub fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."))
 }
 
-/// Cargo, at the root.
+/// The Cargo that runs us, at the root.
 pub fn cargo(args: &[&str]) -> Command {
-    let mut command = cargo_command();
+    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.args(args).current_dir(root());
-    command
-}
-
-/// Cargo, at the root, on the laboratory's workspace.
-pub fn cargo_in_lab(args: &[&str]) -> Command {
-    let mut command = cargo(args);
-    of_lab(&mut command);
-    command
-}
-
-/// Names the laboratory's workspace to Cargo, and the product's folder of build results, so that
-/// both share what they build of other packages.
-fn of_lab(cargo: &mut Command) {
-    cargo.arg("--manifest-path").arg(root().join("xtask/lab/Cargo.toml"));
-    if std::env::var_os("CARGO_TARGET_DIR").is_none() {
-        cargo.arg("--target-dir").arg(root().join("target"));
-    }
-}
-
-/// The Cargo that runs us.
-fn cargo_command() -> Command {
-    Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
-}
-
-/// Cargo, which builds the program of `package` and runs it in the caller's folder. The caller adds
-/// features, `--` and the program's arguments.
-pub fn cargo_run(package: &str) -> Command {
-    let mut command = cargo_command();
-    command.args(["run", "--release", "--package", package, "--bin", package]);
-    match package {
-        LAB => of_lab(&mut command),
-        _ => _ = command.arg("--manifest-path").arg(root().join("Cargo.toml")),
-    }
     command
 }
 
@@ -94,20 +61,29 @@ pub fn words(command: &Command) -> String {
     words.map(OsStr::to_string_lossy).collect::<Vec<_>>().join(" ")
 }
 
-/// The packages of the workspace with this manifest, as `cargo metadata` describes them.
-pub fn packages(manifest: &str) -> anyhow::Result<Vec<Value>> {
-    let words = ["metadata", "--no-deps", "--format-version", "1", "--manifest-path", manifest];
+/// The packages of the workspace, as `cargo metadata` describes them.
+pub fn packages() -> anyhow::Result<Vec<Value>> {
+    let words = ["metadata", "--no-deps", "--format-version", "1"];
     let mut metadata: Value = serde_json::from_str(&output(&mut cargo(&words))?)?;
     Ok(metadata["packages"].as_array_mut().map(std::mem::take).unwrap_or_default())
 }
 
-/// The path of program `name`, from Cargo's `messages`, one JSON object a line.
-pub fn executable(messages: &str, name: &str) -> anyhow::Result<PathBuf> {
+/// The path of program `name`, a `bin` or an `example`, from Cargo's `messages`, one JSON object a line.
+pub fn executable(messages: &str, kind: &str, name: &str) -> anyhow::Result<PathBuf> {
     let mut programs = executables(messages, false).filter(|message| {
-        message["target"]["name"] == name && message["target"]["kind"][0] == "bin"
+        message["target"]["name"] == name && message["target"]["kind"][0] == kind
     });
     let program = programs.find_map(|message| Some(message["executable"].as_str()?.into()));
     program.with_context(|| format!("Cargo has not built the program {name}"))
+}
+
+/// The path of the dynamic library `name`, from Cargo's `messages`.
+pub fn library(messages: &str, name: &str) -> anyhow::Result<PathBuf> {
+    let mut built = objects(messages).filter(|message| {
+        message["reason"] == "compiler-artifact" && message["target"]["name"] == name
+    });
+    let library = built.find_map(|message| Some(message["filenames"][0].as_str()?.into()));
+    library.with_context(|| format!("Cargo has not built the library {name}"))
 }
 
 /// The programs of unit tests, from Cargo's `messages`, each in the folder of its package.
@@ -123,10 +99,13 @@ pub fn unit_tests(messages: &str) -> Vec<Command> {
 
 /// The messages of Cargo that name an executable, either of tests or of no tests.
 fn executables(messages: &str, are_tests: bool) -> impl Iterator<Item = Value> {
-    let messages = messages.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
-    messages.filter(move |message| {
+    objects(messages).filter(move |message| {
         message["profile"]["test"] == are_tests && message["executable"].is_string()
     })
+}
+
+fn objects(messages: &str) -> impl Iterator<Item = Value> {
+    messages.lines().filter_map(|line| serde_json::from_str(line).ok())
 }
 
 /// The arguments that the user typed, paths as [`recorded`] writes them.
@@ -171,9 +150,13 @@ mod tests {
 {"target":{"kind":["lib"],"name":"a"},"profile":{"test":false},"executable":null}
 {"target":{"kind":["bin"],"name":"a"},"profile":{"test":true},"executable":"/t/deps/a-1","manifest_path":"/a/Cargo.toml"}
 {"target":{"kind":["bin"],"name":"a"},"profile":{"test":false},"executable":"/t/a"}
+{"target":{"kind":["example"],"name":"a"},"profile":{"test":false},"executable":"/t/examples/a"}
+{"reason":"compiler-artifact","target":{"name":"_m"},"profile":{"test":false},"executable":null,"filenames":["/t/m.so"]}
 not JSON"#;
-        assert_eq!(executable(messages, "a").unwrap(), Path::new("/t/a"));
-        assert!(executable(messages, "b").is_err());
+        assert_eq!(executable(messages, "bin", "a").unwrap(), Path::new("/t/a"));
+        assert_eq!(executable(messages, "example", "a").unwrap(), Path::new("/t/examples/a"));
+        assert_eq!(library(messages, "_m").unwrap(), Path::new("/t/m.so"));
+        assert!(executable(messages, "bin", "b").is_err());
         let tests = unit_tests(messages);
         assert_eq!(tests.len(), 1);
         assert_eq!(tests[0].get_program(), "/t/deps/a-1");

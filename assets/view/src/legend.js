@@ -34,8 +34,8 @@ export function scaleHtml(column) {
 
 /** The legend of boxes, without the classes that that of points has. */
 export function boxesHtml(boxes, columns) {
-  const told = (name) => columns.some(({ kind, names }) => kind === "class" && names?.includes(name));
-  const classes = [...new Set(boxes.map((box) => box.class))].filter((name) => name && !told(name)).sort();
+  const isColumn = (name) => columns.some(({ kind, names }) => kind === "class" && names?.includes(name));
+  const classes = [...new Set(boxes.map((box) => box.class))].filter((name) => name && !isColumn(name)).sort();
   const [found, truth] = [boxes.some((box) => !box.truth), boxes.some((box) => box.truth)];
   const kinds = [found && "lines: found", truth && "dashes: truth"].filter(Boolean).join(", ");
   const entries = classes.map((name) => entry(classColour(name), name)).join("");

@@ -35,7 +35,7 @@ function drawLines(positions, colours, settings) {
   return new LineSegments2(geometry, new LineMaterial({ vertexColors: true, ...settings })).computeLineDistances();
 }
 
-/** The corners that each edge of a box joins; bits of a corner's number tell its sides. */
+/** The corners that each edge of a box joins; the bits of a corner's number are its sides. */
 const EDGES = [0, 1, 2, 3, 4, 5, 6, 7, 0, 2, 1, 3, 4, 6, 5, 7, 0, 4, 1, 5, 2, 6, 3, 7];
 
 function corners({ centre: [x, y, z], size, yaw = 0 }) {

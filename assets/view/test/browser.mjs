@@ -83,9 +83,9 @@ try {
   if (pictures) mkdirSync(pictures, { recursive: true });
   run("gen-scenes street --sweeps 1 --save 1 --seed 3 --adapter cpu --out street");
   run("detect street/sweeps/000000.npz --out objects.json");
-  run("segment street/sweeps/000000.npz --out clusters");
-  run("gen-shapes --out meshes --train 1 --test 1");
-  run("gen-drive --seconds 0.5 --layout semantickitti --out drive");
+  run("detect street/sweeps/000000.npz --segment-only --out clusters");
+  run("gen-dataset --save-meshes meshes --train 1 --test 1");
+  run("gen-scenes --drive 0.5 --layout semantickitti --out drive");
   writeFileSync(join(folder, "scene.toml"), SCENE);
   await check("sweep", "street/sweeps/000000.npz objects.json", async (page) => {
     assert.match(await legend(page), /class.*ground.*boxes.*lines: found, dashes: truth/s);

@@ -43,16 +43,6 @@ impl Estimate {
         let sigma = (sum / (n - 1.0) / n).sqrt();
         (n > 1.0).then(|| Self::normal(mean, sigma.max(least), values.len()))
     }
-
-    /// The quantile `share` of sorted `values`, by the order of as many independent ones as there
-    /// are directions.
-    pub fn quantile(sorted: &[f32], share: f64, n_directions: usize) -> Option<Self> {
-        let n = sorted.len().checked_sub(1)? as f64;
-        let sigma = (share * (1.0 - share) / n_directions.max(1) as f64).sqrt();
-        let at = |share: f64| f64::from(sorted[(share.clamp(0.0, 1.0) * n).round() as usize]);
-        let [low, high] = [share - Z * sigma, share + Z * sigma].map(at);
-        Some(Self { value: at(share), low, high, n: sorted.len() })
-    }
 }
 
 /// The sums of two values over blocks of directions. Their ratio is a figure whose error the blocks

@@ -10,9 +10,6 @@ use super::turning::{Turning, turning};
 /// Bounds of the bins of range, metres.
 const BINS_M: [f64; 8] = [0.0, 2.0, 5.0, 10.0, 20.0, 40.0, 80.0, f64::INFINITY];
 
-/// Shares of the distribution of intensities.
-pub const SHARES: [f64; 7] = [0.01, 0.1, 0.25, 0.5, 0.75, 0.9, 0.99];
-
 /// A jump of a range is larger than this many standard deviations, and than 10 cm and 2 %.
 const JUMP: f64 = 8.0;
 
@@ -43,8 +40,6 @@ pub struct Figures {
     pub turning: Option<Turning>,
     /// Least and largest range of the directions that usually return, metres.
     pub ranges_m: [f64; 2],
-    /// By [`SHARES`].
-    pub intensities: Vec<Estimate>,
 }
 
 /// The figures of some directions.
@@ -56,11 +51,8 @@ pub struct Part {
 
 /// Measures a `recording`, or says why it is not one of a sensor and a scene at rest.
 pub fn figures(recording: &Recording) -> Result<Figures, String> {
-    let returns = || {
-        let firings = recording.rings.iter().flat_map(|ring| &ring.firings);
-        firings.filter(|firing| !firing.range_m.is_nan())
-    };
-    let quantum_m = quantum(returns().map(|firing| firing.range_m).collect());
+    let ranges_m = recording.rings.iter().flat_map(|ring| &ring.firings).map(|it| it.range_m);
+    let quantum_m = quantum(ranges_m.filter(|range_m| !range_m.is_nan()).collect());
     let unit_m = quantum_m.map_or(0.0, |quantum| quantum.value);
     let mut all = Vec::new();
     for ring in &recording.rings {
@@ -120,10 +112,6 @@ pub fn figures(recording: &Recording) -> Result<Figures, String> {
         let name = format!("ring {}", ring.number);
         part(name, &still.iter().filter(is_of).copied().collect::<Vec<_>>())
     });
-    let mut intensities: Vec<f32> =
-        returns().map(|firing| firing.intensity).filter(|intensity| !intensity.is_nan()).collect();
-    intensities.sort_by(f32::total_cmp);
-    let quantile = |&share: &f64| Estimate::quantile(&intensities, share, all.len());
     let ends = still.iter().map(|direction| direction.range_m);
     let measured = |part: &Part| part.repeatability_m.is_some() || part.missing.is_some();
     Ok(Figures {
@@ -137,6 +125,5 @@ pub fn figures(recording: &Recording) -> Result<Figures, String> {
         quantum_m,
         turning: turning(recording),
         ranges_m: ends.fold([f64::INFINITY, 0.0], |[a, b], range| [a.min(range), b.max(range)]),
-        intensities: SHARES.iter().filter_map(quantile).collect(),
     })
 }

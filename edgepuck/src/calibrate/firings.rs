@@ -30,7 +30,6 @@ pub struct Firing {
     pub turns: f64,
     /// NaN without a return.
     pub range_m: f64,
-    pub intensity: f32,
     /// Seconds since the start of the capture or of the sweep; NaN if unknown.
     pub time_s: f64,
     /// Grows where firings may be missing: at gaps between packets, and with each sweep.
@@ -70,7 +69,7 @@ pub fn read(files: &[PathBuf], points: &PointsArgs) -> anyhow::Result<Recording>
         false => read_captures(files, points, &mut recorded, &mut model)?,
     };
     if !whole {
-        formats::say!("warning: only the first {MOST_TURNS} turns are used");
+        program::say!("warning: only the first {MOST_TURNS} turns are used");
     }
     let rings = (0..).zip(recorded).map(|(ring, all)| Ring::of(ring, all));
     let rings: Vec<_> = rings.filter_map(Result::transpose).collect::<Result<_, _>>()?;
@@ -94,8 +93,6 @@ fn read_captures(
     model: &mut Option<Model>,
 ) -> anyhow::Result<bool> {
     let metadata = points.metadata.as_deref().map(ouster::Metadata::read).transpose()?;
-    // A Velodyne tells the brightness of a white surface as 100, an Ouster as 255.
-    let white = if metadata.is_some() { 255.0 } else { 100.0 };
     let (mut start, mut piece, mut time_s) = (None::<f64>, 0, 0.0);
     for file in files {
         let mut senders = Senders::new(points.from);
@@ -112,17 +109,8 @@ fn read_captures(
                 return ControlFlow::Break(());
             }
             (piece, time_s, last) = (first_piece + turned.gaps, first_s + turned.time_s, turns);
-            push(
-                rings,
-                turned.found.ring,
-                Firing {
-                    turns,
-                    range_m: turned.found.range_m.into(),
-                    intensity: f32::from(turned.found.reflectivity) / white,
-                    time_s,
-                    piece,
-                },
-            );
+            let range_m = turned.found.range_m.into();
+            push(rings, turned.found.ring, Firing { turns, range_m, time_s, piece });
             ControlFlow::Continue(())
         })?;
         let name = file.display();
@@ -206,19 +194,9 @@ fn add_sweep(sweep: &Scan, number: u32, rings: &mut Vec<Vec<Firing>>) -> anyhow:
             continue;
         }
         let azimuth = (-libm::atan2(beam.y, beam.x) / std::f64::consts::TAU).rem_euclid(1.0);
-        let brightness = sweep.intensity.as_ref().map(|all| all[i]);
-        let reflectivity = sweep.reflectivity.as_ref().map(|all| f32::from(all[i]) / 100.0);
-        push(
-            rings,
-            ring,
-            Firing {
-                turns: f64::from(number) + azimuth,
-                range_m,
-                intensity: brightness.or(reflectivity).unwrap_or(f32::NAN),
-                time_s: sweep.time_s.as_ref().map_or(f64::NAN, |all| all[i].into()),
-                piece: number,
-            },
-        );
+        let time_s = sweep.time_s.as_ref().map_or(f64::NAN, |all| all[i].into());
+        let turns = f64::from(number) + azimuth;
+        push(rings, ring, Firing { turns, range_m, time_s, piece: number });
         let flat = libm::hypot(beam.x, beam.y);
         elevations_deg.resize_with(elevations_deg.len().max(usize::from(ring) + 1), Vec::new);
         elevations_deg[usize::from(ring)].push(libm::atan2(beam.z, flat).to_degrees());
@@ -264,7 +242,6 @@ impl Ring {
                 firings.extend((1..n as u32).map(|i| Firing {
                     turns: before.turns + gap * f64::from(i) / n,
                     range_m: f64::NAN,
-                    intensity: f32::NAN,
                     time_s: f64::NAN,
                     piece: before.piece,
                 }));

@@ -14,8 +14,8 @@ use std::path::PathBuf;
 
 use anyhow::{Context, bail, ensure};
 use formats::atomic;
-use formats::outputs::{Overwrite, need_extension};
-use sim_gpu::internals::sensor::{Layout, Rotating, SensorProfile, TypicalNoise};
+use program::outputs::{Overwrite, need_extension};
+use sim_gpu::sensors::{Layout, Rotating, SensorProfile, TypicalNoise};
 
 use crate::points::PointsArgs;
 use crate::{Outcome, Usage};
@@ -87,14 +87,14 @@ pub fn run(args: &CalibrateArgs) -> anyhow::Result<Outcome> {
     }
     let found = figures(&recording).map_err(anyhow::Error::msg).context(name.to_string())?;
     if found.jumping.value > STILL {
-        formats::say!(
+        program::say!(
             "warning: {name}: ranges jump in {:.1} % of directions, which are left out: something \
              moved",
             100.0 * found.jumping.value
         );
     }
     if found.drift > STEADY {
-        formats::say!(
+        program::say!(
             "warning: {name}: ranges drift to {:.2} times the variance from turn to turn: does the \
              sensor warm up, or something move slowly?",
             found.drift
@@ -109,7 +109,7 @@ pub fn run(args: &CalibrateArgs) -> anyhow::Result<Outcome> {
         true => writeln!(out, "{:#}", report::json(&found, &recording))?,
         false => out.write_all(text.as_bytes())?,
     }
-    formats::say!("{}", args.out.display());
+    program::say!("{}", args.out.display());
     Ok(Outcome::Success)
 }
 

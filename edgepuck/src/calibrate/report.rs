@@ -4,12 +4,12 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use serde_json::{Value, json};
-use sim_gpu::internals::sensor::SensorProfile;
+use sim_gpu::sensors::SensorProfile;
 
 use super::estimate::{Estimate, rounded};
-use super::figures::{Figures, Part, SHARES};
+use super::figures::{Figures, Part};
 use super::firings::Recording;
-use crate::significant_digits::digits;
+use program::significant_digits::digits;
 
 /// A table of the figures, and how commands are asked for those that a profile does not hold.
 pub fn text(found: &Figures, recording: &Recording, out: &Path) -> String {
@@ -42,9 +42,6 @@ pub fn text(found: &Figures, recording: &Recording, out: &Path) -> String {
         line("rate", &turning.rpm, 1.0, ", rpm");
         line("its deviation", &turning.between_rpm, 1.0, ", rpm");
         line("angle's deviation", &turning.within_deg, 1.0, ", deg");
-    }
-    for (share, intensity) in SHARES.iter().zip(&found.intensities) {
-        line(&format!("intensity, {} %", 100.0 * share), intensity, 1.0, "");
     }
     let [least_m, largest_m] = found.ranges_m.map(digits);
     lines.push(format!(
@@ -100,7 +97,6 @@ pub fn json(found: &Figures, recording: &Recording) -> Value {
         parts.iter().map(part).collect()
     };
     let [least_m, largest_m] = found.ranges_m;
-    let intensities = SHARES.iter().zip(&found.intensities);
     json!({
         "turns": recording.n_turns,
         "directions": found.n_directions,
@@ -115,9 +111,6 @@ pub fn json(found: &Figures, recording: &Recording) -> Value {
         "clockwise": found.turning.as_ref().map(|turning| turning.is_clockwise),
         "least_range_m": least_m,
         "largest_range_m": largest_m,
-        "intensity": intensities
-            .map(|(share, intensity)| json!({ "share": share, "quantile": intensity }))
-            .collect::<Vec<_>>(),
         "by_range": parts(&found.bins),
         "by_ring": parts(&found.rings),
     })

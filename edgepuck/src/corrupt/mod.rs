@@ -1,38 +1,39 @@
-//! `edgepuck corrupt`: applies the corruptions of Robo3D and ModelNet-C that have a physical cause
-//! in a sensor.
+//! `edgepuck corrupt`: applies weather, or the corruptions of Robo3D, to recorded sweeps.
 
-mod objects;
 mod plan;
 mod sweep;
+mod weather;
 
 use crate::brightness::BrightnessArgs;
+use crate::flags::first_given;
 use crate::points::{PlaceArgs, SweepArgs};
 use crate::{Outcome, Usage};
 use anyhow::Context;
-use formats::outputs::Overwrite;
 use plan::{Entry, Plan};
+use program::outputs::Overwrite;
 use sim_gpu::Sensor;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
 #[command(after_help = "\
-For a sweep, --out gets a scan for each corruption and severity of Robo3D, such as fog-1.npz.
-SWEEP may also be a folder of meshes, as for gen-dataset. --out then gets a packed set of clouds
-for each corruption and severity of ModelNet-C, such as jitter-1-test.npz, and clean-test.npz, all
-of the same views of the test meshes. `edgepuck corrupt --list` describes the corruptions, and
-names those that are left out.")]
+With --rain, --snow, --fog or --haze, --out is a file with the strongest return of each beam that
+still has one: `intensity` is the intensity in the weather, and `medium` the source of the return,
+0 a surface, 1 rain, 2 snow, 3 fog.
+Without weather, --out is a folder that gets a scan for each corruption and severity of Robo3D, such as
+fog-1.npz. `edgepuck corrupt --list` describes the corruptions.")]
 pub struct CorruptArgs {
-    /// Sweep, as for `edgepuck segment`, or a folder of meshes
+    /// Sweep, as for `edgepuck detect`
     #[arg(value_name = "SWEEP", required_unless_present = "list")]
     sweep: Option<PathBuf>,
 
     #[command(flatten)]
     place: PlaceArgs,
 
-    /// Folder for the corrupted scans, or the packed sets, and corruptions.csv
-    #[arg(long, value_name = "DIR", default_value = "data/corrupted")]
-    out: PathBuf,
+    /// Folder for the corrupted scans and corruptions.csv [default: data/corrupted]; for weather the file
+    /// to write: .npz, .ply, .csv or .pcd
+    #[arg(long, value_name = "DIR|FILE")]
+    out: Option<PathBuf>,
 
     #[command(flatten)]
     overwrite: Overwrite,
@@ -49,19 +50,20 @@ pub struct CorruptArgs {
     #[arg(long, value_name = "TOML")]
     plan: Option<PathBuf>,
 
-    /// Describe the corruptions and those that are left out, and write nothing
+    /// Describe the corruptions, and write nothing
     #[arg(long, exclusive = true)]
     list: bool,
 
-    /// Sensor that recorded the sweep, or that scans the meshes: a built-in name or a TOML file
+    /// Sensor that recorded the sweep: a built-in name or a TOML file. Its detection limit, beam width
+    /// and range determine which returns are detected
     #[arg(long, default_value = "vlp32c", value_name = "NAME")]
-    profile: String,
+    sensor: String,
 
     #[command(flatten)]
     brightness: BrightnessArgs,
 
     #[command(flatten)]
-    objects: objects::ObjectArgs,
+    weather: weather::WeatherArgs,
 
     /// Seed of all random numbers
     #[arg(long, default_value_t = 0)]
@@ -69,44 +71,51 @@ pub struct CorruptArgs {
 }
 
 pub fn run(args: &CorruptArgs) -> anyhow::Result<Outcome> {
+    if let Some(flag) = args.weather.given() {
+        return in_weather(args, flag);
+    }
     let plan = Plan::read(args.plan.as_deref())?;
     if args.list {
         std::io::stdout().write_all(listed(&plan).as_bytes())?;
         return Ok(Outcome::Success);
     }
+    let input = sweep_of(args)?;
+    let out = args.out.as_deref().unwrap_or(Path::new(OUT));
+    args.overwrite.check_folder(out)?;
+    let sensor = Sensor::resolve(&args.sensor)?;
+    sweep::run(args, &input, out, &plan, sensor.profile())
+}
+
+/// Adds weather to a sweep, as `flag` asks.
+fn in_weather(args: &CorruptArgs, flag: &str) -> anyhow::Result<Outcome> {
+    let others = [
+        (!args.only.is_empty(), "--only"),
+        (!args.severity.is_empty(), "--severity"),
+        (args.plan.is_some(), "--plan"),
+    ];
+    if let Some(other) = first_given(&others) {
+        return Err(usage(format!("expected {flag} or {other}, found both")).into());
+    }
+    let input = sweep_of(args)?;
+    let sensor = Sensor::resolve(&args.sensor)?;
+    weather::run(args, &input, sensor.profile())
+}
+
+/// The sweep to corrupt, which is not a folder.
+fn sweep_of(args: &CorruptArgs) -> Result<SweepArgs, Usage> {
     let sweep = args.sweep.clone().expect("invariant: required without --list");
-    let (given, other, found) = match sweep.is_dir() {
-        true => (args.brightness.given(), "a sweep", "a folder"),
-        false => (args.objects.given(), "a folder of meshes", "a file"),
-    };
-    if let Some(flag) = given.filter(|_| sweep.exists()) {
-        let cause = format!("{flag} applies to {other} only, and {} is {found}", sweep.display());
-        return Err(Usage(cause).into());
+    if sweep.is_dir() {
+        let cause =
+            "expected a sweep, found a folder: `gen-dataset --effects` scans meshes with effects";
+        return Err(usage(format!("{}: {cause}", sweep.display())));
     }
-    args.overwrite.check_folder(&args.out)?;
-    let input = SweepArgs { sweep, place: args.place.clone() };
-    let sensor = Sensor::resolve(&args.profile)?;
-    if input.sweep.is_dir() {
-        return objects::run(args, &input.sweep, &plan, &sensor);
-    }
-    sweep::run(args, &input, &plan, sensor.profile())
+    Ok(SweepArgs { sweep, place: args.place.clone() })
 }
 
 fn listed(plan: &Plan) -> String {
-    let mut text = String::new();
-    let mut line = |kind: &str, name: &str, severities: usize, by: &str| {
-        text += &format!("{kind:<8} {name:<16} {severities}  {by}\n");
-    };
-    for Entry { name, by, severity } in &plan.sweep {
-        line("sweep", name, severity.len(), by);
-    }
-    for Entry { name, by, severity } in &plan.object {
-        line("object", name, severity.len(), by);
-    }
-    for plan::LeftOut { name, of, because } in &plan.left_out {
-        line("-", name, 0, &format!("left out of {of}: {because}"));
-    }
-    text
+    let line =
+        |Entry { name, by, severity }: &Entry| format!("{name:<16} {}  {by}\n", severity.len());
+    plan.sweep.iter().map(line).collect()
 }
 
 /// Removes what an earlier run wrote into `out`, which its list names, but for the `input`.
@@ -125,6 +134,9 @@ fn remove_former(out: &Path, input: &Path) -> anyhow::Result<()> {
     std::fs::remove_file(&list).with_context(|| list.display().to_string())
 }
 
+/// The folder of the corrupted scans by default.
+const OUT: &str = "data/corrupted";
+
 /// The list of what was written.
 const LIST: &str = "corruptions.csv";
 
@@ -134,9 +146,9 @@ struct Written<'a> {
     file: String,
     corruption: &'a str,
     severity: u32,
-    /// Number of points of the scan, or of clouds of the set.
+    /// Number of points of the scan.
     count: usize,
-    /// Number of points of the sweep, or of clouds before the corruption.
+    /// Number of points of the sweep.
     of: usize,
     by: &'a str,
 }
@@ -146,7 +158,7 @@ fn ended(written: &[Written<'_>]) -> Outcome {
     if written.iter().any(|written| written.count > 0) {
         return Outcome::Success;
     }
-    formats::say!("warning: nothing is left: expected other corruptions by --only, or milder ones");
+    program::say!("warning: nothing is left: expected other corruptions by --only, or milder ones");
     Outcome::SomeRefused
 }
 

@@ -1,43 +1,28 @@
 use edgepuck_assets::CORRUPTIONS;
-use edgepuck_dataset::ObjectCorruption;
 use serde::Deserialize;
-use sim_gpu::internals::config::{self, InvalidValue};
-use sim_gpu::internals::corruption::Corruption;
+use sim_gpu::errors::InvalidValue;
+use sim_gpu::recorded::Corruption;
+use sim_gpu::settings;
 use std::path::Path;
 
 use crate::Usage;
 
-/// The corruptions of sweeps and of objects, and those that are left out.
+/// The corruptions of sweeps.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Plan {
-    #[serde(default)]
-    pub sweep: Vec<Entry<Corruption>>,
-    #[serde(default)]
-    pub object: Vec<Entry<ObjectCorruption>>,
-    #[serde(default)]
-    pub left_out: Vec<LeftOut>,
+    pub sweep: Vec<Entry>,
 }
 
 /// A corruption.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Entry<T> {
+pub struct Entry {
     pub name: String,
     /// The physical cause.
     pub by: String,
     /// The parameters of each severity, beginning with severity 1, the mildest.
-    pub severity: Vec<T>,
-}
-
-/// A corruption of another benchmark that is left out.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct LeftOut {
-    pub name: String,
-    /// The benchmark.
-    pub of: String,
-    pub because: String,
+    pub severity: Vec<Corruption>,
 }
 
 impl Plan {
@@ -45,62 +30,52 @@ impl Plan {
     pub fn read(file: Option<&Path>) -> anyhow::Result<Self> {
         let checked = |plan: Self| plan.check().map(|()| plan);
         Ok(match file {
-            Some(file) => config::read(file, checked)?,
-            None => config::parse(CORRUPTIONS, Path::new("corruptions.toml"), checked)?,
+            Some(file) => settings::read(file, checked)?,
+            None => settings::parse(CORRUPTIONS, Path::new("corruptions.toml"), checked)?,
         })
     }
 
+    /// Checks that the names of corruptions are valid and unique, and that their parameters are valid.
     fn check(&self) -> Result<(), InvalidValue> {
-        check_all("sweep", &self.sweep, Corruption::validate)?;
-        check_all("object", &self.object, ObjectCorruption::validate)
+        for (i, Entry { name, severity, .. }) in self.sweep.iter().enumerate() {
+            let wrong =
+                |field: &str, cause| Err(InvalidValue::new(format!("sweep[{i}].{field}"), cause));
+            let is_allowed = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+            if name.is_empty() || !name.chars().all(is_allowed) {
+                return wrong("name", format!("expected letters, digits and -, found \"{name}\""));
+            }
+            if let Some(first) = self.sweep[..i].iter().position(|other| other.name == *name) {
+                return wrong("name", format!("\"{name}\" is the name of sweep[{first}] too"));
+            }
+            if severity.is_empty() {
+                return wrong("severity", "expected one at least, found none".to_owned());
+            }
+            for (n, corruption) in severity.iter().enumerate() {
+                corruption.validate(&format!("sweep[{i}].severity[{n}]"))?;
+            }
+        }
+        Ok(())
     }
-}
-
-/// Checks that the names of `entries` are valid and unique, and that their parameters are valid.
-fn check_all<T>(
-    kind: &str,
-    entries: &[Entry<T>],
-    validate: impl Fn(&T, &str) -> Result<(), InvalidValue>,
-) -> Result<(), InvalidValue> {
-    for (i, Entry { name, severity, .. }) in entries.iter().enumerate() {
-        let wrong = |field: &str, cause: String| {
-            Err(InvalidValue::new(format!("{kind}[{i}].{field}"), cause))
-        };
-        let is_allowed = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
-        if name.is_empty() || !name.chars().all(is_allowed) {
-            return wrong("name", format!("expected letters, digits and -, found \"{name}\""));
-        }
-        if let Some(first) = entries[..i].iter().position(|other| other.name == *name) {
-            return wrong("name", format!("\"{name}\" is the name of {kind}[{first}] too"));
-        }
-        if severity.is_empty() {
-            return wrong("severity", "expected one at least, found none".to_owned());
-        }
-        for (n, corruption) in severity.iter().enumerate() {
-            validate(corruption, &format!("{kind}[{i}].severity[{n}]"))?;
-        }
-    }
-    Ok(())
 }
 
 /// A corruption, one of its severities, and the parameters of that severity.
-pub type Chosen<'a, T> = (&'a Entry<T>, u32, &'a T);
+pub type Chosen<'a> = (&'a Entry, u32, &'a Corruption);
 
 /// Chooses the `entries` with these `names`, at these `severities`. An empty list stands for all
 /// names or all severities.
-pub fn chosen<'a, T>(
-    entries: &'a [Entry<T>],
+pub fn chosen<'a>(
+    entries: &'a [Entry],
     names: &[String],
     severities: &[u32],
-) -> Result<Vec<Chosen<'a, T>>, Usage> {
+) -> Result<Vec<Chosen<'a>>, Usage> {
     if entries.is_empty() {
-        return Err(Usage("--plan: expected a corruption for this input, found none".to_owned()));
+        return Err(Usage("--plan: expected a corruption, found none".to_owned()));
     }
     let known = || entries.iter().map(|entry| entry.name.as_str()).collect::<Vec<_>>().join(", ");
     if let Some(name) = names.iter().find(|name| entries.iter().all(|e| e.name != **name)) {
         return Err(Usage(format!("--only: expected some of {}, found {name}", known())));
     }
-    let is_wanted = |entry: &&Entry<T>| names.is_empty() || names.contains(&entry.name);
+    let is_wanted = |entry: &&Entry| names.is_empty() || names.contains(&entry.name);
     let most = entries.iter().filter(is_wanted).map(|entry| entry.severity.len()).max();
     let most = most.unwrap_or(0);
     if let Some(found) = severities.iter().find(|n| !(1..=most as u32).contains(n)) {

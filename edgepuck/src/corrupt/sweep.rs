@@ -2,7 +2,7 @@ use super::plan::{Plan, chosen};
 use super::{CorruptArgs, Written, ended, remove_former, usage, write_list};
 use crate::Outcome;
 use crate::points::SweepArgs;
-use edgepuck_segment::{Label, Segmenter, Settings, Sweep, doubtful_axes};
+use edgepuck_segment::{Label, Segmenter, Settings, Sweep, other_axis_up};
 use formats::Scan;
 use formats::atomic::UnfinishedFolder;
 use formats::hash::Hashing;
@@ -11,14 +11,16 @@ use formats::streams::Stream;
 use glam::DVec3;
 use sim_gpu::effects::{Detection, Effects};
 use sim_gpu::glam;
-use sim_gpu::internals::corruption::{Corruption, Recorded};
-use sim_gpu::internals::sensor::{DetectionLimit, SensorProfile};
-use sim_gpu::internals::weather::{Air, in_weather};
+use sim_gpu::recorded::{Air, in_weather};
+use sim_gpu::recorded::{Corruption, Recorded};
+use sim_gpu::sensors::{DetectionLimit, SensorProfile};
+use std::path::Path;
 
 /// Writes a scan for each corruption and severity.
 pub(super) fn run(
     args: &CorruptArgs,
     input: &SweepArgs,
+    out: &Path,
     plan: &Plan,
     sensor: &SensorProfile,
 ) -> anyhow::Result<Outcome> {
@@ -38,8 +40,8 @@ pub(super) fn run(
         false => Vec::new(),
     };
 
-    remove_former(&args.out, &input.sweep)?;
-    let begun = UnfinishedFolder::begin_new(&args.out)?;
+    remove_former(out, &input.sweep)?;
+    let begun = UnfinishedFolder::begin_new(out);
     let is_dark = brightness.is_none();
     let (mut written, mut too_weak_before) = (Vec::new(), 0);
     for (entry, severity, corruption) in chosen {
@@ -55,7 +57,7 @@ pub(super) fn run(
                 Corruption::Motion { .. } => "times",
                 _ => "rings",
             };
-            formats::say!("{name}: left out, since the points of the sweep have no {lacks}");
+            program::say!("{name}: left out, since the points of the sweep have no {lacks}");
             continue;
         };
         if is_dark {
@@ -63,8 +65,8 @@ pub(super) fn run(
         }
         args.brightness.restore(&mut found);
         let file = format!("{name}.npz");
-        write_scan(&args.out.join(&file), ScanFormat::Npz, Hashing::None, &found)?;
-        formats::say!("{name:<20} {:>9} of {} points", found.len(), scan.len());
+        write_scan(&out.join(&file), ScanFormat::Npz, Hashing::None, &found)?;
+        program::say!("{name:<20} {:>9} of {} points", found.len(), scan.len());
         if takes_light(corruption) {
             too_weak_before = too_weak_before.max(recorded.too_weak_before());
         }
@@ -72,16 +74,16 @@ pub(super) fn run(
         written.push(Written { file, corruption, severity, count, of, by });
     }
     if !written.is_empty() {
-        write_list(&written, &args.out)?;
+        write_list(&written, out)?;
         begun.into_iter().for_each(UnfinishedFolder::finish);
     }
     if too_weak_before > 0 {
-        formats::say!(
-            "warning: {too_weak_before} of the points are below the profile's detection limit as \
-             they were recorded: see --profile, --white and --reflectivity"
+        program::say!(
+            "warning: {too_weak_before} of the points are below the sensor's detection limit as \
+             they were recorded: see --sensor, --white and --reflectivity"
         );
     }
-    formats::say!("{} scans: {}", written.len(), args.out.display());
+    program::say!("{} scans: {}", written.len(), out.display());
     Ok(ended(&written))
 }
 
@@ -123,7 +125,7 @@ fn ground(input: &SweepArgs, scan: &Scan, sensor_m: DVec3) -> anyhow::Result<Vec
     let origin = DVec3::from_array(scan.origin) - sensor_m;
     let from_sensor = |point: &[f32; 3]| (origin + DVec3::from(point.map(f64::from))).as_vec3();
     let points: Vec<[f32; 3]> = scan.positions.iter().map(|p| from_sensor(p).to_array()).collect();
-    input.warn(doubtful_axes(&points));
+    input.warn(other_axis_up(&points));
     let mut segmenter = Segmenter::new(Settings::default()).map_err(usage)?;
     let found = segmenter.segment(&Sweep { points: &points, rings: scan.ring.as_deref() })?;
     Ok(found.labels().iter().map(|label| *label == Label::Ground).collect())

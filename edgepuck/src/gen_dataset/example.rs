@@ -1,9 +1,8 @@
-//! The example picture of a dataset: one mesh from all its viewpoints, clean above noisy.
+//! The example picture of a dataset: one mesh from all its viewpoints.
 
-use crate::preview;
 use crate::view::frame::Frame;
-use edgepuck_dataset::internals::layout;
-use edgepuck_dataset::{Manifest, MeshRecord, Variant};
+use crate::view::preview;
+use edgepuck_dataset::{DatasetFolder, Manifest, MeshRecord, Variant};
 use formats::Scan;
 use formats::scan_file::{ScanFormat, read_scan};
 use glam::DVec3;
@@ -25,19 +24,10 @@ pub fn draw(out: &Path, manifest: &Manifest) -> anyhow::Result<Option<PathBuf>> 
     let Some(record) = most.filter(|record| points(record) > 0) else { return Ok(None) };
     let centre = DVec3::from_array(record.views_around);
     let poses = set.poses(manifest.config.seed, &record.entry.id(), centre);
-    let all_views = |variant| all_views(out, record, &set.name, variant, &poses);
-    let clean = all_views(Variant::Clean)?;
-    let has_noisy = manifest.config.variants.contains(&Variant::Noisy);
-    let noisy = has_noisy.then(|| all_views(Variant::Noisy)).transpose()?;
-    let (name, sensor, n_views) = (&record.entry.name, set.sensor.name(), poses.len());
-    let views = match n_views {
-        1 => "one view".to_owned(),
-        _ => format!("{n_views} views together"),
-    };
-    let title = format!("{name} as {sensor} sees it, {views}");
-    let picture = layout::example(out);
-    let clean = Frame::of_scan(String::new(), clean, Vec::new());
-    preview::draw(&clean, noisy.as_ref(), &title, &picture)?;
+    let noisy = Some(Variant::Noisy).filter(|noisy| manifest.config.variants.contains(noisy));
+    let scan = all_views(out, record, &set.name, noisy.unwrap_or(Variant::Clean), &poses)?;
+    let picture = DatasetFolder(out).picture_file();
+    preview::draw(&Frame::of_scan(String::new(), scan, Vec::new()), &picture)?;
     Ok(Some(picture))
 }
 
@@ -53,7 +43,7 @@ fn all_views(
     let mut ranges_m = Vec::new();
     let centre = DVec3::from_array(record.views_around);
     for (pose, view) in poses.iter().zip(0..) {
-        let file = layout::scan(out, set, variant, &record.entry, view, ScanFormat::Npz);
+        let file = out.join(record.entry.scan_file(set, variant, view, ScanFormat::Npz));
         let scan = read_scan(&file)?;
         let origin = DVec3::from_array(scan.origin);
         for position in scan.positions {

@@ -1,6 +1,8 @@
 //! `edgepuck gen-dataset`: a folder of meshes into a LiDAR dataset.
 
 mod bar;
+mod card;
+mod empty;
 mod example;
 mod settings;
 mod summary;
@@ -8,24 +10,21 @@ mod tars;
 
 use crate::caster::CasterArgs;
 use crate::shard::Shard;
-use crate::{Outcome, Usage, flags, gen_shapes, outcome, signals};
+use crate::{Outcome, Usage, flags, gen_shapes, signals};
 use anyhow::Context;
-use clap::error::ErrorKind;
-use clap::{CommandFactory, Parser};
 use edgepuck_dataset::{
-    Begin, DatasetConfig, DatasetError, Layout, Manifest, MeshEntry, MeshFailure, PackedRecord,
-    Plan, Progress, check_layouts, discover, doubts, make, verify,
+    Begin, DatasetError, Layout, Manifest, MeshEntry, MeshFailure, Plan, Progress, discover, make,
+    verify,
 };
 use edgepuck_shapes as shapes;
 use formats::hash::Hashing;
-use formats::outputs::check_place;
+use program::outputs::check_place;
 use settings::Settings;
-use sim_gpu::{Caster, Tally};
+use sim_gpu::Caster;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering::SeqCst;
 use std::time::Instant;
-pub use summary::print_notes;
 
 /// Folder of the built-in shapes, to which the seed is appended.
 const DEFAULT_SHAPES: &str = "data/default-shapes";
@@ -35,12 +34,14 @@ const DEFAULT_OUT: &str = "data/lidar-shapes";
 
 #[derive(clap::Args)]
 pub(crate) struct Args {
-    /// Folder of OBJ, OFF, PLY, STL and glTF files, as CLASS/{train,test}/NAME or in any other layout
-    /// [default: built-in procedural shapes, written to data/default-shapes-SEED]
+    /// Folder of meshes, such as CLASS/{train,test}/NAME [default: built-in shapes]
+    ///
+    /// OBJ, OFF, PLY, STL and glTF files are read. The built-in procedural shapes are written to
+    /// data/default-shapes-SEED.
     #[arg(value_name = "MESHES")]
     meshes: Option<PathBuf>,
 
-    /// Folder to write the dataset to [default: data/lidar-MESHES, or data/lidar-shapes]
+    /// Folder to write the dataset to [default: data/lidar-MESHES]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 
@@ -48,7 +49,9 @@ pub(crate) struct Args {
     #[arg(long, value_name = "DIR", exclusive = true)]
     verify: Option<PathBuf>,
 
-    /// Continue an interrupted run; the dataset has the same bytes as without the interruption
+    /// Continue an interrupted run
+    ///
+    /// The dataset has the same bytes as without the interruption.
     #[arg(long, conflicts_with = "overwrite")]
     resume: bool,
 
@@ -56,15 +59,12 @@ pub(crate) struct Args {
     #[arg(long)]
     overwrite: bool,
 
-    /// Make only part I of N of the dataset; `merge-dataset` joins the parts. `auto/N` takes the
-    /// part from the environment of a job array, counted from 0: SLURM_ARRAY_TASK_ID,
-    /// JOB_COMPLETION_INDEX (Kubernetes) or HQ_TASK_ID (HyperQueue). `auto` asks Slurm for N, too
-    #[arg(long, value_name = "I/N|auto/N|auto")]
+    /// Make only part I of N; `merge-dataset` joins the parts
+    ///
+    /// `auto/N` takes the part from the environment of a job array, counted from 0:
+    /// SLURM_ARRAY_TASK_ID, JOB_COMPLETION_INDEX (Kubernetes) or HQ_TASK_ID (HyperQueue).
+    #[arg(long, value_name = "I/N|auto/N")]
     shard: Option<Shard>,
-
-    /// Also print the numbers of rays and the time of each stage
-    #[arg(long, short)]
-    verbose: bool,
 
     #[command(flatten)]
     tars: tars::TarArgs,
@@ -74,52 +74,27 @@ pub(crate) struct Args {
 
     #[command(flatten)]
     caster: CasterArgs,
-}
 
-/// The settings of a dataset that these `flags` ask for, such as `--distance=2,10`.
-pub fn config(flags: &[String]) -> anyhow::Result<DatasetConfig> {
-    outcome::parsed::<Settings>(Settings::command(), behind_name(flags))?.config()
-}
+    #[command(flatten)]
+    shapes: gen_shapes::ShapeArgs,
 
-/// A command line: the program's name and these `words`.
-fn behind_name(words: &[String]) -> impl Iterator<Item = &str> {
-    std::iter::once("gen-dataset").chain(words.iter().map(String::as_str))
-}
-
-/// Checks the words of a command line for the tasks of a cluster, which share their folders. The
-/// folders need not exist on this machine.
-pub(crate) fn check_words_of_tasks(words: &[String]) -> anyhow::Result<()> {
-    #[derive(Parser)]
-    struct Words {
-        #[command(flatten)]
-        args: Args,
-    }
-    let parsed = outcome::parsed(Words::command(), behind_name(words));
-    let Words { args } = parsed.map_err(|error| match error.kind() {
-        ErrorKind::DisplayHelp => Usage("--help: tasks make a dataset".to_owned()),
-        _ => Usage(error.to_string().trim_start_matches("error: ").to_owned()),
-    })?;
-    let config = args.settings.config()?;
-    let missing = [
-        (args.meshes.is_none(), "the folder of the meshes"),
-        (args.out.is_none(), "--out"),
-        (!config.layouts.contains(&Layout::Webdataset), "--layout webdataset"),
-    ];
-    if let Some((_, word)) = missing.into_iter().find(|(is_missing, _)| *is_missing) {
-        let cause = format!("expected {word} among the words: tasks share folders and make tars");
-        return Err(Usage(cause).into());
-    }
-    Ok(check_layouts(&config, &[])?)
+    #[command(flatten)]
+    card: card::CardArgs,
 }
 
 pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     if let Some(folder) = &args.verify {
         return check(folder);
     }
+    if let Some(folder) = &args.card.card {
+        return args.card.write(folder, args.overwrite);
+    }
+    if let Some(folder) = &args.shapes.save_meshes {
+        return args.shapes.write(folder, args.settings.seed(), args.overwrite);
+    }
     let progress = Progress::default();
     let config = args.settings.config()?;
-    flags::need_simplification(config.simplify.is_some())?;
-    check_layouts(&config, &[])?;
+    config.check()?;
     let are_tars = config.layouts.contains(&Layout::Webdataset);
     if let Some(flag) = args.tars.given().filter(|_| !are_tars) {
         return Err(usage(format!("{flag} applies to tars only: add --layout webdataset")));
@@ -149,31 +124,26 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     let made = if are_tars {
         tars::run(&args.tars, &plan, &caster, &progress)
     } else {
-        make_files(&plan, &caster, &progress, args.verbose)
+        make_files(&plan, &caster, &progress)
     };
     made.or_else(|error| match error.downcast_ref() {
         Some(DatasetError::Interrupted { .. }) => {
-            formats::say!("{}: {error}", out.display());
+            program::say!("{}: {error}", out.display());
             Ok(Outcome::Interrupted)
         }
         _ => Err(error),
     })
 }
 
-fn make_files(
-    plan: &Plan,
-    caster: &Caster,
-    progress: &Progress,
-    verbose: bool,
-) -> anyhow::Result<Outcome> {
+fn make_files(plan: &Plan, caster: &Caster, progress: &Progress) -> anyhow::Result<Outcome> {
     let started = Instant::now();
     let manifest =
         bar::beside(progress, || signals::stop(progress, || make(plan, caster, progress)))?;
     if progress.is_scanned.load(SeqCst) {
         report_failures(&manifest.failures);
-        summary::print(plan.out, &manifest, progress, started.elapsed(), verbose);
+        summary::print(plan.out, &manifest, progress, started.elapsed());
     } else {
-        formats::say!("{}: the dataset is already complete.", plan.out.display());
+        program::say!("{}: the dataset is already complete.", plan.out.display());
         summary::tell_failures(plan.out, &manifest);
     }
     end(plan.out, &manifest)
@@ -182,8 +152,8 @@ fn make_files(
 /// The meshes in `folder`; prints what is odd about its layout.
 pub fn listed(folder: &Path, seed: u64) -> anyhow::Result<Vec<MeshEntry>> {
     let meshes = discover(folder, seed)?;
-    for doubt in doubts(folder, &meshes) {
-        formats::say!("warning: {}: {doubt}", folder.display());
+    for warning in edgepuck_mesh::tree::warnings(folder, &meshes) {
+        program::say!("warning: {}: {warning}", folder.display());
     }
     Ok(meshes)
 }
@@ -191,7 +161,7 @@ pub fn listed(folder: &Path, seed: u64) -> anyhow::Result<Vec<MeshEntry>> {
 /// Prints the meshes that failed, with the causes.
 pub fn report_failures(failures: &[MeshFailure]) {
     for failure in failures {
-        formats::say!("failed: {failure}");
+        program::say!("failed: {failure}");
     }
 }
 
@@ -199,66 +169,15 @@ pub fn report_failures(failures: &[MeshFailure]) {
 pub(crate) fn end(out: &Path, manifest: &Manifest) -> anyhow::Result<Outcome> {
     match example::draw(out, manifest).context("cannot draw the example")? {
         Some(picture) => {
-            formats::say!("Open this picture to see an example: {}", picture.display())
+            program::say!("Open this picture to see an example: {}", picture.display())
         }
-        None => formats::say!("No scan holds a point, so no example picture was drawn."),
+        None => program::say!("No scan holds a point, so no example picture was drawn."),
     }
-    let has_clouds = report_empty_sets(manifest) && report_empty_packed(manifest);
+    let has_clouds = empty::report_empty_sets(manifest) && empty::report_empty_packed(manifest);
     Ok(match manifest.failures.is_empty() && has_clouds {
         true => Outcome::Success,
         false => Outcome::SomeRefused,
     })
-}
-
-/// Prints the sets without a point, with the likely reason. Returns whether every set has points.
-fn report_empty_sets(manifest: &Manifest) -> bool {
-    let mut all_have_points = true;
-    for set in &manifest.config.sets {
-        let scans = manifest.meshes.iter().flat_map(|mesh| &mesh.scans);
-        let of_set = scans.filter(|scan| scan.set == set.name).flat_map(|scan| &scan.variants);
-        let tally = of_set.fold(Tally::default(), |mut sum, scan| {
-            sum += scan.tally;
-            sum
-        });
-        if tally.points > 0 || manifest.meshes.is_empty() {
-            continue;
-        }
-        all_have_points = false;
-        let lost = tally.out_of_range + tally.dropped + tally.undetected + tally.negative;
-        let range = &set.sensor.profile().range;
-        let reason = match lost {
-            0 => "no beam met a mesh".to_owned(),
-            _ => format!(
-                "of {lost} beams that met a mesh, {} did so outside the sensor's range of {} to {} m",
-                tally.out_of_range, range.min_m, range.max_m
-            ),
-        };
-        formats::say!(
-            "No scan of {} holds a point: {reason}. --distance, --normalize and --units change this.",
-            set.name
-        );
-    }
-    all_have_points
-}
-
-/// Prints the packed files from which all clouds are left out. Returns `false` if one of these is of a
-/// set whose other part has no cloud either.
-fn report_empty_packed(manifest: &Manifest) -> bool {
-    let is_empty = |packed: &&PackedRecord| packed.clouds == 0 && !packed.left_out.is_empty();
-    let empty: Vec<_> = manifest.packed.iter().filter(is_empty).collect();
-    for PackedRecord { file, left_out, .. } in &empty {
-        let most = left_out.iter().map(|scan| scan.points).max().unwrap_or_default();
-        formats::say!(
-            "{file} holds no cloud: expected scans of {} points, found {most} at most. --min-points, \
-             --distance and --sensor change this.",
-            manifest.config.min_points
-        );
-    }
-    let set = |packed: &PackedRecord| packed.file.rsplit_once('-').map(|(set, _)| set.to_owned());
-    let has_clouds = |of: &&PackedRecord| {
-        manifest.packed.iter().any(|other| set(other) == set(of) && other.clouds > 0)
-    };
-    empty.iter().all(has_clouds)
 }
 
 /// Verifies the dataset in `folder` and prints its problems, one a line.
@@ -266,21 +185,21 @@ fn check(folder: &Path) -> anyhow::Result<Outcome> {
     let report = verify(flags::dataset_folder(folder))?;
     let by = match report.hash {
         Hashing::None => "read, without hashes to compare",
-        Hashing::Sha256 | Hashing::Blake3 => "checked",
+        Hashing::Sha256 => "checked",
     };
     let mut out = std::io::stdout().lock();
     for problem in &report.problems {
         writeln!(out, "{problem}")?;
     }
     let (files, problems) = (report.files, report.problems.len());
-    formats::say!("{}: {files} files {by}, {problems} problems.", folder.display());
+    program::say!("{}: {files} files {by}, {problems} problems.", folder.display());
     Ok(if report.is_sound() { Outcome::Success } else { Outcome::SomeFailed })
 }
 
 fn write_default_shapes(seed: u64) -> anyhow::Result<PathBuf> {
     // Each seed has its own folder, so that meshes of different runs do not mix.
     let folder = PathBuf::from(format!("{DEFAULT_SHAPES}-{seed}"));
-    formats::say!(
+    program::say!(
         "No meshes were named: writing built-in procedural shapes to {}.",
         folder.display()
     );
@@ -298,4 +217,23 @@ fn default_out(meshes: &Path) -> PathBuf {
 
 fn usage(message: impl std::fmt::Display) -> anyhow::Error {
     Usage(message.to_string()).into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::{CommandFactory, Parser};
+
+    #[derive(Parser)]
+    #[command(term_width = 100)]
+    struct Words {
+        #[command(flatten)]
+        _args: Args,
+    }
+
+    #[test]
+    fn the_short_help_fits_one_screen() {
+        let help = Words::command().render_help().to_string();
+        assert!(help.lines().count() <= 45, "{} lines:\n{help}", help.lines().count());
+    }
 }

@@ -19,18 +19,18 @@ const TAR_CLOUDS: u32 = 65_536;
 pub struct TarArgs {
     /// What a sample of a tar is: `clouds` (1,024 packed clouds with their labels) or `scan` (one scan,
     /// its label and what it is of)
-    #[arg(long, default_value = "clouds", value_name = "clouds|scan")]
+    #[arg(long, default_value = "clouds", value_name = "clouds|scan", hide_short_help = true)]
     sample: Sample,
 
     /// Number of clouds or scans in each tar; by default a tar of clouds of 1,024 points takes 800 MB
-    #[arg(long, default_value_t = TAR_CLOUDS, value_name = "N",
+    #[arg(long, default_value_t = TAR_CLOUDS, value_name = "N", hide_short_help = true,
           value_parser = clap::value_parser!(u32).range(1..))]
     tar_clouds: u32,
 
     /// Command of the shell to run when a tar is complete, with its path in place of {}, such as
     /// 'rclone copyto {} remote:bucket/{name}'; {name} is the name of its file. Both are quoted
     /// already. A command that fails is tried four times
-    #[arg(long, value_name = "COMMAND")]
+    #[arg(long, value_name = "COMMAND", hide_short_help = true)]
     on_shard: Option<String>,
 }
 
@@ -56,7 +56,7 @@ pub fn run(
     let tars = Tars {
         cut: Cut { sample: args.sample, clouds_per_tar: args.tar_clouds },
         on_made: &|TarRecord { file, clouds, bytes, .. }| {
-            formats::say!("{file}: {clouds} clouds, {} MiB", bytes >> 20);
+            program::say!("{file}: {clouds} clouds, {} MiB", bytes >> 20);
         },
         hand_over: hand_over.as_ref().map(|hand_over| hand_over as HandOver),
     };
@@ -70,7 +70,7 @@ pub fn run(
     let clouds: u64 = made.tars.iter().map(|tar| tar.clouds).sum();
     let bytes: u64 = made.tars.iter().map(|tar| tar.bytes).sum();
     let (tars, mib, out) = (made.tars.len(), bytes >> 20, plan.out.display());
-    formats::say!("{tars} tars, {clouds} clouds, {mib} MiB: {out}");
+    program::say!("{tars} tars, {clouds} clouds, {mib} MiB: {out}");
     Ok(if failures.is_empty() { Outcome::Success } else { Outcome::SomeRefused })
 }
 
@@ -88,7 +88,7 @@ fn hand_over(command: &str, tar: &Path, stop: &AtomicBool) -> Result<(), String>
             Err(error) => format!("the shell: {error}"),
         };
         let Some(&pause_s) = pauses_s.next() else { return Err(cause) };
-        formats::say!("{cause}; trying again in {pause_s} s");
+        program::say!("{cause}; trying again in {pause_s} s");
         for _ in 0..10 * pause_s {
             if stop.load(SeqCst) {
                 return Err(cause);

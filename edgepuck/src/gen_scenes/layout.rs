@@ -6,16 +6,16 @@
 use std::path::PathBuf;
 
 use edgepuck_scenes::{LabelledScene, ObjectBox, SceneError, Stage, is_test, place_in_set};
-use edgepuck_segment::OrientedBox;
+use formats::geometry::OrientedBox;
 use formats::hash::Hashing;
 use formats::trajectory::KITTI_PERIOD_S;
 use formats::{FormatError, atomic, rows};
 use glam::DVec3;
 use sim_gpu::{Pose, glam};
 
+use super::labels::semantic_labels;
 use super::sequence::{Sequence, point_columns};
-use super::sweep_file::semantic_labels;
-use crate::kitti::{CALIBRATION, Camera, corners, line};
+use crate::kitti::{CALIBRATION, Camera, line};
 
 formats::named! {
     /// A layout of data sets of sweeps.
@@ -111,8 +111,8 @@ impl Writer {
 
     /// The line of a box, if it is before the camera and partly in its picture.
     fn kitti_line(&self, class: &str, of: &ObjectBox) -> Option<String> {
-        let place = oriented(of);
-        let [left, top, right, bottom] = self.camera.bounds(corners(&place))?;
+        let place = of.place.narrowed();
+        let [left, top, right, bottom] = self.camera.bounds(place.widened().corners())?;
         let [width, height] = PICTURE;
         let clipped = [left.max(0.0), top.max(0.0), right.min(width), bottom.min(height)];
         let area = |[left, top, right, bottom]: [f64; 4]| (right - left) * (bottom - top);
@@ -122,7 +122,7 @@ impl Writer {
         let truncated = 1.0 - area(clipped) / area([left, top, right, bottom]);
         let truncated = (100.0 * truncated).round() / 100.0;
         let occluded = occlusion(of.visible);
-        Some(line(class, [truncated, occluded], Some(clipped), &place, Some(&self.camera)) + "\n")
+        Some(line(class, [truncated, occluded], Some(clipped), place, Some(&self.camera)) + "\n")
     }
 }
 
@@ -155,19 +155,9 @@ fn less_than_a_tenth_and_less_than_half_are_hidden() {
     assert!(expected.into_iter().all(|(visible, state)| occlusion(visible) == state));
 }
 
-fn oriented(of: &ObjectBox) -> OrientedBox {
-    OrientedBox {
-        centre_m: of.centre_m.as_vec3().to_array(),
-        size_m: of.size_m.as_vec3().to_array(),
-        yaw_rad: of.yaw_rad as f32,
-    }
-}
-
 /// The middle, the size, the heading and the class of a box.
 fn openpcdet_line(class: &str, of: &ObjectBox) -> String {
-    let [x, y, z] = of.centre_m.to_array();
-    let [length, width, height] = of.size_m.to_array();
+    let OrientedBox { centre_m: [x, y, z], size_m: [length, width, height], yaw_rad } = of.place;
     let class = class.replace(char::is_whitespace, "_");
-    let yaw_rad = of.yaw_rad;
     format!("{x:.3} {y:.3} {z:.3} {length:.3} {width:.3} {height:.3} {yaw_rad:.4} {class}\n")
 }

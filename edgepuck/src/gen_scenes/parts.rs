@@ -49,7 +49,7 @@ pub fn merge(folders: &[PathBuf], out: &Path) -> anyhow::Result<()> {
     });
     check_parts(&said.collect::<Vec<_>>(), out)?;
     parts.sort_by_key(|(_, record)| record.number);
-    let begun = UnfinishedFolder::begin(out)?;
+    let begun = UnfinishedFolder::begin(out);
     for (folder, _) in &parts {
         link_all(folder, out).with_context(|| folder.display().to_string())?;
     }

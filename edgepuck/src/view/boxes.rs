@@ -1,10 +1,10 @@
-//! Boxes in the JSON files of `detect`, `live`, `gen-scenes` and `gen-drive`.
+//! Boxes in the JSON files of `detect`, `live` and `gen-scenes`.
 
 use super::frame::Placed;
 use formats::FormatError;
-use formats::foreign::read_text;
+use formats::geometry::{OrientedBox, Pose};
+use formats::plausible::read_text;
 use serde::Deserialize;
-use sim_gpu::Pose;
 use std::fmt::Display;
 use std::path::Path;
 
@@ -19,7 +19,7 @@ struct OfSweep {
     sensor_pose: Option<Pose>,
 }
 
-/// What the commands tell of an object; each has its own part of it.
+/// An object of any of the commands; each writes some of these keys.
 #[derive(Deserialize)]
 struct Object {
     class: Option<String>,
@@ -30,23 +30,16 @@ struct Object {
     confidence: Option<f64>,
     probability: Option<f64>,
     frame: Option<String>,
-    whole_box: Option<Cuboid>,
-    r#box: Option<Cuboid>,
+    whole_box: Option<OrientedBox>,
+    r#box: Option<OrientedBox>,
     /// Beside the size and the direction: the middle, or of `gen-scenes` that of the base.
     #[serde(alias = "centre_m")]
     position_m: Option<[f64; 3]>,
     size_m: Option<[f64; 3]>,
     yaw_deg: Option<f64>,
-    /// Of `gen-drive`; of `live` that of the last point.
+    /// Of `gen-scenes --drive`; of `live` that of the last point.
     #[serde(alias = "last_s")]
     time_s: Option<f64>,
-}
-
-#[derive(Clone, Copy, Deserialize)]
-struct Cuboid {
-    centre_m: [f64; 3],
-    size_m: [f64; 3],
-    yaw_deg: f64,
 }
 
 /// The truth of the sweep that `gen-scenes` describes in `file`; none if the file is another's.
@@ -59,7 +52,7 @@ pub fn described(file: &Path) -> Result<Vec<Placed>, FormatError> {
 pub fn read(file: &Path) -> Result<Vec<Placed>, FormatError> {
     let text = read_text(file, u64::MAX).map_err(|source| FormatError::io(file, source))?;
     let flaw = |key: &str, error: &dyn Display| {
-        let cause = format!("expected boxes as of detect, live, gen-scenes or gen-drive: {error}");
+        let cause = format!("expected boxes as of detect, live or gen-scenes: {error}");
         FormatError::malformed(file, key, cause)
     };
     if file.extension().is_some_and(|found| found.eq_ignore_ascii_case("jsonl")) {
@@ -91,23 +84,20 @@ impl Object {
     fn placed(self, in_world: bool) -> Result<Placed, &'static str> {
         let own = || {
             let (centre_m, size_m) = (self.position_m?, self.size_m?);
-            Some(Cuboid { centre_m, size_m, yaw_deg: self.yaw_deg? })
+            Some(OrientedBox { centre_m, size_m, yaw_rad: self.yaw_deg?.to_radians() })
         };
-        let Cuboid { centre_m, size_m, yaw_deg } =
-            self.whole_box.or(self.r#box).or_else(own).ok_or(
-                "found neither `whole_box` nor `box`, nor the three of `position_m`, `size_m` and \
-                 `yaw_deg`",
-            )?;
-        let is_sound = size_m.iter().all(|size| (0.0..=FARTHEST_M).contains(size))
-            && centre_m.iter().all(|x| x.abs() <= FARTHEST_M);
+        let place = self.whole_box.or(self.r#box).or_else(own).ok_or(
+            "found neither `whole_box` nor `box`, nor the three of `position_m`, `size_m` and \
+             `yaw_deg`",
+        )?;
+        let is_sound = place.size_m.iter().all(|size| (0.0..=FARTHEST_M).contains(size))
+            && place.centre_m.iter().all(|x| x.abs() <= FARTHEST_M);
         if !is_sound {
             return Err("expected metres up to 1e7, and no size below 0");
         }
         Ok(Placed {
             class: self.class,
-            centre: centre_m,
-            size: size_m,
-            yaw: yaw_deg.to_radians(),
+            place,
             score: self.probability.or(self.confidence),
             track: self.track.or(self.object),
             truth: false,
@@ -119,8 +109,7 @@ impl Object {
 }
 
 /// The truth of a box with this base in the street's frame, from the sensor.
-fn truth_seen_from(pose: Pose, placed: Placed) -> Placed {
-    let [x, y, z] = placed.centre;
-    let centre = [x, y, z + 0.5 * placed.size[2]];
-    Placed { centre, truth: true, ..placed }.seen_from(pose)
+fn truth_seen_from(pose: Pose, mut placed: Placed) -> Placed {
+    placed.place.centre_m[2] += 0.5 * placed.place.size_m[2];
+    Placed { place: placed.place.seen_from(&pose), truth: true, ..placed }
 }

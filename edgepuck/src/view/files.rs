@@ -7,12 +7,12 @@ use super::scene;
 use crate::points::{PointsArgs, warn_of_packets};
 use crate::{Usage, colours};
 use anyhow::{Context, bail, ensure};
+use edgepuck_mesh::MeshFormat;
+use edgepuck_mesh::import::Format;
 use formats::cloud_file::{CloudFormat, must_be_scan};
 use formats::labelled::{is_labelled, read_labelled};
 use formats::turns::read_turns;
 use formats::{FormatError, Scan, Senders, ouster};
-use sim_gpu::internals::import::Format;
-use sim_gpu::internals::mesh::MeshFormat;
 use std::collections::HashMap;
 use std::fs;
 use std::io::Read;
@@ -44,7 +44,7 @@ pub fn read(file: &Path, points: &PointsArgs) -> anyhow::Result<Content> {
         "ply" if !has_faces(file) => vec![cloud(file, points)?],
         _ if Format::from_path(file).is_some() => vec![scene::read(file)?],
         _ if MeshFormat::from_path(file).is_some() => vec![scene::of_mesh(file)?],
-        "npz" if points.format.is_none() && !must_be_scan(file) => set(file, points)?,
+        "npz" if points.input_format.is_none() && !must_be_scan(file) => set(file, points)?,
         _ => vec![cloud(file, points)?],
     }))
 }
@@ -74,7 +74,7 @@ fn cloud(file: &Path, points: &PointsArgs) -> anyhow::Result<Frame> {
     let finite: Vec<usize> = (0..scan.len()).filter(is_finite).collect();
     if finite.len() < scan.len() {
         let (n, all, file) = (scan.len() - finite.len(), scan.len(), file.display());
-        formats::say!("{file}: {n} of {all} points without finite coordinates are left out");
+        program::say!("{file}: {n} of {all} points without finite coordinates are left out");
         scan = scan.select(&finite);
         for Labels { values, .. } in &mut labels {
             *values = finite.iter().map(|&i| values[i]).collect();
@@ -168,7 +168,7 @@ fn set(file: &Path, points: &PointsArgs) -> anyhow::Result<Vec<Frame>> {
     let shown = set.len().min(MOST_FRAMES);
     if shown < set.len() {
         let file = file.display();
-        formats::say!("{file}: the first {shown} of {} clouds are shown", set.len());
+        program::say!("{file}: the first {shown} of {} clouds are shown", set.len());
     }
     let frame = |i: usize| {
         let positions = set.cloud(i).to_vec();
@@ -182,7 +182,7 @@ fn set(file: &Path, points: &PointsArgs) -> anyhow::Result<Vec<Frame>> {
     Ok((0..shown).map(frame).collect())
 }
 
-/// The sweeps of a sequence or of a folder; or the clusters that `segment` wrote, as one frame.
+/// The sweeps of a sequence or of a folder; or the clusters that `detect --segment-only` wrote, as one frame.
 fn folder(folder: &Path, points: &PointsArgs) -> anyhow::Result<Vec<Frame>> {
     for inside in ["sweeps", "velodyne"] {
         if folder.join(inside).is_dir() {
@@ -212,7 +212,7 @@ fn folder(folder: &Path, points: &PointsArgs) -> anyhow::Result<Vec<Frame>> {
     let every = n_points.div_ceil(MOST_POINTS).max(1);
     if every > 1 {
         let (folder, shown) = (folder.display(), files.len().div_ceil(every));
-        formats::say!("{folder}: {shown} of {} sweeps are shown", files.len());
+        program::say!("{folder}: {shown} of {} sweeps are shown", files.len());
     }
     let frame = |(file, number): (&PathBuf, u64)| {
         let frame = cloud(file, points)?;
@@ -246,10 +246,9 @@ fn of_clusters(files: &[&PathBuf], points: &PointsArgs) -> anyhow::Result<Frame>
 fn turns(file: &Path, points: &PointsArgs) -> anyhow::Result<Vec<Frame>> {
     let metadata = points.metadata.as_deref().map(ouster::Metadata::read).transpose()?;
     let mut senders = Senders::new(points.from);
-    let (mut first, mut scans) = (None, Vec::<Scan>::new());
+    let mut scans = Vec::<Scan>::new();
     let (_, counts) = read_turns(file, metadata.as_ref(), &mut senders, |turned| {
-        // As `live` counts turns.
-        let number = (turned.turns - *first.get_or_insert(turned.turns)).max(0.0) as usize;
+        let number = turned.turn as usize;
         if number >= MOST_FRAMES {
             return ControlFlow::Break(());
         }

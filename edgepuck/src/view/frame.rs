@@ -5,23 +5,22 @@ use anyhow::{Context, ensure};
 use base64::display::Base64Display;
 use base64::engine::general_purpose::STANDARD;
 use bytemuck::cast_slice;
+use formats::geometry::{OrientedBox, Trajectory};
 use formats::scan::{Attribute, Column};
 use formats::trajectory::check_cover;
 use formats::{FormatError, Scan};
-use glam::{DQuat, DVec3};
 use serde::ser::{SerializeMap, SerializeStruct};
 use serde::{Serialize, Serializer};
-use sim_gpu::{Pose, Trajectory, glam};
 use std::path::{Path, PathBuf};
 
-use crate::{Usage, cuboid};
+use crate::Usage;
 
 /// A file, or a drive or a folder of sweeps.
 #[derive(Serialize)]
 pub struct Pane {
     name: String,
     pub frames: Vec<Frame>,
-    /// Where the sensor's poses would be, if it moves: `gen-drive` writes them beside a capture.
+    /// Where the sensor's poses would be, if it moves: `gen-scenes --drive` writes them beside a capture.
     #[serde(skip)]
     poses: PathBuf,
 }
@@ -56,7 +55,7 @@ pub struct Labels {
 }
 
 /// Triangles, metres from the origin of the frame's points.
-#[derive(Serialize)]
+#[derive(Clone, Serialize)]
 pub struct Mesh {
     pub name: String,
     pub class: Option<String>,
@@ -76,13 +75,11 @@ pub struct Sensor {
 }
 
 /// A box around an object.
-#[derive(Clone, Serialize)]
+#[derive(Clone, Default, Serialize)]
 pub struct Placed {
     pub class: Option<String>,
-    pub centre: [f64; 3],
-    pub size: [f64; 3],
-    /// The direction of the length, radians counterclockwise from x.
-    pub yaw: f64,
+    #[serde(flatten, with = "Keys")]
+    pub place: OrientedBox,
     pub score: Option<f64>,
     pub track: Option<u64>,
     pub truth: bool,
@@ -94,6 +91,18 @@ pub struct Placed {
     /// When it was there: Unix time in seconds.
     #[serde(skip)]
     pub time_s: Option<f64>,
+}
+
+/// The keys of a box.
+#[derive(Serialize)]
+#[serde(remote = "OrientedBox")]
+struct Keys {
+    #[serde(rename = "centre")]
+    centre_m: [f64; 3],
+    #[serde(rename = "size")]
+    size_m: [f64; 3],
+    #[serde(rename = "yaw")]
+    yaw_rad: f64,
 }
 
 impl Pane {
@@ -109,8 +118,8 @@ impl Pane {
             .all(|frame| frame.n_points() + frame.meshes.len() + frame.boxes.len() == 0)
     }
 
-    /// What it shows, for people.
-    pub fn told(&self) -> String {
+    /// The numbers of points, meshes, boxes and frames.
+    pub fn summary(&self) -> String {
         let sum = |of: fn(&Frame) -> usize| self.frames.iter().map(of).sum::<usize>();
         let all = [
             (sum(Frame::n_points), ["point", "points"]),
@@ -118,11 +127,11 @@ impl Pane {
             (sum(|frame| frame.boxes.len()), ["box", "boxes"]),
         ];
         let all = all.iter().filter(|(n, _)| *n > 0);
-        let told: Vec<_> =
+        let counts: Vec<_> =
             all.map(|(n, words)| format!("{n} {}", words[usize::from(*n > 1)])).collect();
         match self.frames.len() {
-            1 => told.join(", "),
-            n => format!("{} in {n} frames", told.join(", ")),
+            1 => counts.join(", "),
+            n => format!("{} in {n} frames", counts.join(", ")),
         }
     }
 
@@ -149,7 +158,7 @@ impl Pane {
             };
             let shift = frame.sensor_m();
             let boxes = boxes.iter().filter(is_of).cloned().map(|mut placed| {
-                placed.centre = [0, 1, 2].map(|axis| placed.centre[axis] + shift[axis]);
+                (0..3).for_each(|axis| placed.place.centre_m[axis] += shift[axis]);
                 placed
             });
             let boxes: Vec<_> = boxes.collect();
@@ -178,7 +187,8 @@ impl Pane {
             let time_s = placed.time_s.with_context(lack)?;
             check_cover(motion.known_s(), [time_s; 2])
                 .map_err(|cause| FormatError::malformed(&self.poses, "times", cause))?;
-            Ok(placed.seen_from(motion.at(time_s)))
+            let place = placed.place.seen_from(&motion.at(time_s));
+            Ok(Placed { place, ..placed })
         });
         seen.collect()
     }
@@ -192,13 +202,13 @@ impl Pane {
             let n = self.frames.len();
             let mut number = 0..;
             self.frames.retain(|_| number.next().is_some_and(|i: usize| i.is_multiple_of(every)));
-            formats::say!("{}: {} of {n} frames are shown", self.name, self.frames.len());
+            program::say!("{}: {} of {n} frames are shown", self.name, self.frames.len());
         }
         for frame in &mut self.frames {
             let Some(Points { scan, labels }) = &mut frame.points else { continue };
             let every = scan.len().div_ceil(most.max(1));
             if every > 1 {
-                formats::say!("{}: one of {every} points is shown", self.name);
+                program::say!("{}: one of {every} points is shown", self.name);
                 let kept: Vec<usize> = (0..scan.len()).step_by(every).collect();
                 *scan = scan.select(&kept);
                 for Labels { values, .. } in labels {
@@ -206,21 +216,6 @@ impl Pane {
                 }
             }
         }
-    }
-}
-
-impl Placed {
-    /// Its [corners](cuboid::corners).
-    pub fn corners(&self) -> [DVec3; 8] {
-        cuboid::corners(self.centre.into(), self.size.into(), self.yaw)
-    }
-
-    /// The box in the frame of a sensor with this pose.
-    pub fn seen_from(self, pose: Pose) -> Self {
-        let back = pose.rotation.inverse();
-        let ahead = back * (DQuat::from_rotation_z(self.yaw) * DVec3::X);
-        let centre = (back * (DVec3::from(self.centre) - pose.position_m)).to_array();
-        Self { centre, yaw: libm::atan2(ahead.y, ahead.x), ..self }
     }
 }
 

@@ -1,9 +1,11 @@
-//! `edgepuck view`: a page that shows points, meshes, boxes and scenes in three dimensions.
+//! `edgepuck view`: a page or a picture that shows points, meshes, boxes and scenes in three dimensions.
 
 mod boxes;
 pub mod files;
 pub mod frame;
 mod page;
+mod picture;
+pub mod preview;
 mod scene;
 
 use crate::points::PointsArgs;
@@ -11,8 +13,8 @@ use crate::{Outcome, Usage};
 use anyhow::{bail, ensure};
 use files::Content;
 use formats::hash::of_bytes;
-use formats::outputs::{Overwrite, need_extension};
 use frame::{Pane, Placed};
+use program::outputs::{Overwrite, need_extension};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -35,8 +37,9 @@ pub struct Args {
     #[command(flatten)]
     points: PointsArgs,
 
-    /// Page to write (.html) [default: one in the folder for temporary files, which is opened]
-    #[arg(long, value_name = "HTML")]
+    /// Page (.html) or picture (.png) to write [default: a page in the folder for temporary files, which is
+    /// opened]. A picture shows the first frame, and a mesh under its scan
+    #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 
     #[command(flatten)]
@@ -45,8 +48,11 @@ pub struct Args {
 
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     if let Some(out) = &args.out {
-        need_extension("--out", out, &["html"])?;
+        need_extension("--out", out, &["html", "png"])?;
         args.overwrite.check([&**out])?;
+        if out.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
+            return picture::draw(args, out);
+        }
     }
     let mut panes =
         panes(&args.files, args.truth.as_deref(), |file| files::read(file, &args.points))?;
@@ -58,8 +64,8 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     }
     let out = args.out.clone().unwrap_or_else(|| temporary(&args.files[0]));
     page::write(&panes, &out)?;
-    let told = panes.iter().map(Pane::told).collect::<Vec<_>>();
-    formats::say!("{}: {}", told.join(" | "), out.display());
+    let summary = panes.iter().map(Pane::summary).collect::<Vec<_>>();
+    program::say!("{}: {}", summary.join(" | "), out.display());
     if args.out.is_none() {
         open(&out);
     }

@@ -19,7 +19,7 @@ pub fn of_mesh(file: &Path) -> anyhow::Result<Frame> {
 
 /// What stands in a glTF file, a robot's file or a scene's.
 pub fn read(file: &Path) -> anyhow::Result<Frame> {
-    match sim_gpu::internals::import::Format::from_path(file) {
+    match edgepuck_mesh::import::Format::from_path(file) {
         None => of_scene(&Scene::read(file)?),
         Some(_) => {
             let mut scene = Scene::new();
@@ -30,7 +30,7 @@ pub fn read(file: &Path) -> anyhow::Result<Frame> {
 }
 
 fn of_scene(scene: &Scene) -> anyhow::Result<Frame> {
-    scene.warnings().iter().for_each(|warning| formats::say!("warning: {warning}"));
+    scene.warnings().iter().for_each(|warning| program::say!("warning: {warning}"));
     let mut scene = scene.clone();
     let wanted = [Attribute::Range, Attribute::Ring, Attribute::Object, Attribute::Intensity];
     scene.attributes = AttributeSet::from(wanted);

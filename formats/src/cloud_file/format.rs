@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use crate::error::FormatError;
-use crate::foreign::foreign;
 use crate::lines::BYTE_ORDER_MARK;
 use crate::npy;
+use crate::plausible::foreign;
 use crate::records;
 
 /// The number of first bytes that [`CloudFormat::of_content`] examines.
@@ -64,6 +64,20 @@ impl CloudFormat {
         }
     }
 
+    /// As [`CloudFormat::of_path`], of a cloud to write: LAS and raw floats are only read.
+    ///
+    /// # Errors
+    /// As [`CloudFormat::of_path`]; a format that is only read.
+    pub fn of_output(path: &Path) -> Result<Self, FormatError> {
+        match Self::of_path(path)? {
+            Self::Kitti | Self::Nuscenes | Self::Las => {
+                let cause = "expected a format to write: .ply, .npz, .npy, .pcd, .xyz or .csv";
+                Err(FormatError::malformed(path, "extension", cause))
+            }
+            format => Ok(format),
+        }
+    }
+
     /// The format of the file at `path` by its first bytes, if these are unmistakable.
     pub(super) fn of_signature(path: &Path) -> Option<Self> {
         let mut start = [0; SIGNED_SIZE];
@@ -109,9 +123,9 @@ const SIGNED_SIZE: usize = 128;
 pub(super) const COMPRESSED_LAS: &str =
     "LAZ is compressed LAS: decompress it first (`laszip`, or `pdal translate in.laz out.las`)";
 pub(super) const MESH: &str = "expected a cloud, found a mesh: scan it first";
-const CAPTURE: &str =
-    "expected a cloud, found a capture: `edgepuck segment` cuts its first turn into clouds";
-const UNKNOWN: &str = "the first bytes are of no known binary format; name the format";
+const CAPTURE: &str = "expected a cloud, found a capture: `edgepuck detect --segment-only` cuts its first turn into clouds";
+const UNKNOWN: &str =
+    "the first bytes are of no known binary format; name the format by --input-format";
 const EXTENSIONS: &str = "ply, npz, npy, pcd, xyz, txt, asc, tsv, pts, csv, bin, las";
 
 #[cfg(test)]
@@ -152,7 +166,7 @@ mod tests {
         let raw = of(&[0, 0, 0x80, 0x3f]).unwrap_err().to_string();
         assert_eq!(
             raw,
-            "-: format: the first bytes are of no known binary format; name the format"
+            "-: format: the first bytes are of no known binary format; name the format by --input-format"
         );
     }
 }

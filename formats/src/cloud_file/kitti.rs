@@ -4,16 +4,14 @@
 //! The name can state another number of columns: `NAME.f32x6.bin` has six.
 
 use std::fs::File;
-use std::io::{BufRead, Read, Write};
+use std::io::{BufRead, Read};
 use std::path::Path;
 
 use super::columns::{Extra, Rows, Unit};
-use super::precision::{self, Precision};
 use super::{Cloud, CloudFormat};
-use crate::atomic;
 use crate::error::FormatError;
-use crate::foreign::foreign;
 use crate::number::{ByteOrder, NumberType};
+use crate::plausible::foreign;
 use crate::records;
 
 /// x, y, z, intensity.
@@ -25,7 +23,7 @@ const COLUMN_SIZE: usize = size_of::<f32>();
 const FEWEST: usize = 5;
 
 /// What to do where the format may not be KITTI's.
-pub(super) const REMEDY: &str = "name the format by --format: kitti has four f32 for each point, nuscenes five; a file called \
+pub(super) const REMEDY: &str = "name the format by --input-format: kitti has four f32 for each point, nuscenes five; a file called \
      NAME.f32x6.bin has six";
 
 pub(super) fn read(
@@ -89,33 +87,33 @@ pub(super) fn check_columns(
 /// Whether a tenth of the fourth numbers, at least, is below 0: of coordinates around a sensor, half
 /// is.
 fn has_negative_intensities(start: &[u8]) -> bool {
-    let points = start.as_chunks::<{ KITTI_COLUMNS * COLUMN_SIZE }>().0;
-    let intensity = |point: &[u8]| NumberType::F32.decode(&point[12..], ByteOrder::Little);
-    let negative = points.iter().filter(|point| intensity(&point[..]) < 0.0).count();
-    points.len() >= FEWEST && negative > points.len() / 10
+    let negative = points(start, KITTI_COLUMNS).filter(|point| point[3] < 0.0).count();
+    let n = points(start, KITTI_COLUMNS).count();
+    n >= FEWEST && negative > n / 10
 }
 
 /// Whether a tenth of the fifth numbers, at least, is not whole.
 fn has_fractions(start: &[u8]) -> bool {
-    let points = start.as_chunks::<{ NUSCENES_COLUMNS * COLUMN_SIZE }>().0;
-    let fifth = |point: &[u8]| NumberType::F32.decode(&point[16..], ByteOrder::Little);
-    let broken = points.iter().filter(|point| fifth(&point[..]).fract() != 0.0).count();
-    points.len() >= FEWEST && broken > points.len() / 10
+    let broken = points(start, NUSCENES_COLUMNS).filter(|point| point[4].fract() != 0.0).count();
+    let n = points(start, NUSCENES_COLUMNS).count();
+    n >= FEWEST && broken > n / 10
 }
 
 /// Whether each fifth number is a small whole number, as the rings of nuScenes are, and others are
 /// not.
 fn has_rings(start: &[u8]) -> bool {
-    let points = start.as_chunks::<{ NUSCENES_COLUMNS * COLUMN_SIZE }>().0;
-    let number = |point: &[u8], at: usize| {
-        NumberType::F32.decode(&point[at * COLUMN_SIZE..], ByteOrder::Little)
-    };
-    let is_whole = |x: f64| x.fract() == 0.0;
-    let is_ring = |x: f64| is_whole(x) && (0.0..256.0).contains(&x);
-    points.len() >= FEWEST
-        && points.iter().all(|point| is_ring(number(point, 4)))
-        && points.iter().any(|point| number(point, 4) != number(&points[0], 4))
-        && points.iter().any(|point| (0..3).any(|axis| !is_whole(number(point, axis))))
+    let points = || points(start, NUSCENES_COLUMNS);
+    let first = points().next().map_or(0.0, |point| point[4]);
+    points().count() >= FEWEST
+        && points().all(|point| point[4].fract() == 0.0 && (0.0..256.0).contains(&point[4]))
+        && points().any(|point| point[4] != first)
+        && points().any(|point| point[..3].iter().any(|x| x.fract() != 0.0))
+}
+
+/// The points at the start of a file with this number of columns, without one that is cut off.
+fn points(start: &[u8], columns: usize) -> impl Iterator<Item = Vec<f32>> {
+    let point = |bytes: &[u8]| bytes.as_chunks().0.iter().map(|x| f32::from_le_bytes(*x)).collect();
+    start.chunks_exact(columns * COLUMN_SIZE).map(point)
 }
 
 /// Passes the numbers of every point, by their index, to `take`.
@@ -166,41 +164,6 @@ fn stated_columns(name: &Path) -> Option<usize> {
 fn is_velodyne_packets(start: &[u8]) -> bool {
     const FLAG: &[u8] = &[0xff, 0xee];
     start.starts_with(FLAG) && start.get(100..102) == Some(FLAG)
-}
-
-/// What f32 may always change in a coordinate, metres.
-const COARSEST_M: f64 = 1e-3;
-
-/// Writes `points` with intensity 0.
-pub(super) fn write(
-    path: &Path,
-    format: CloudFormat,
-    points: &[[f64; 3]],
-) -> Result<(), FormatError> {
-    let columns = columns(format, path);
-    if columns != KITTI_COLUMNS {
-        let cause = format!("files of {columns} columns are read but not written");
-        return Err(FormatError::malformed(path, "extension", cause));
-    }
-    let fits = |x: &f64| !x.is_finite() || (*x as f32).is_finite();
-    if let Some(i) = points.iter().position(|point| !point.iter().all(fits)) {
-        let cause = format!("{:?} does not fit f32, the format's only type", points[i]);
-        return Err(FormatError::malformed(path, format!("point {i}"), cause));
-    }
-    let loss_m = precision::loss(points);
-    if loss_m > COARSEST_M && Precision::tolerable(points) == Precision::Double {
-        let cause = format!(
-            "f32, the format's only type, changes coordinates by {loss_m:.4} m: move the origin near the \
-             points, or choose another format"
-        );
-        return Err(FormatError::malformed(path, "points", cause));
-    }
-    atomic::write(path, |writer| {
-        points.iter().try_for_each(|&[x, y, z]| {
-            let record = [x, y, z, 0.0].map(|number| (number as f32).to_le_bytes());
-            writer.write_all(record.as_flattened())
-        })
-    })
 }
 
 #[cfg(test)]

@@ -8,9 +8,9 @@
 //! | NPY | `[n, 3]` or wider, any numbers, C or Fortran order; records with `x`, `y`, `z` | `[n, 3]` |
 //! | PCD | ASCII, binary, LZF-compressed | binary |
 //! | XYZ, TXT, ASC, TSV, PTS, CSV | separated by blanks, tabs, commas or semicolons | blanks, in CSV commas |
-//! | KITTI `.bin` | f32, four for each point or as many as the name states | f32, intensity 0 |
+//! | KITTI `.bin` | f32, four for each point or as many as the name states | |
 //! | nuScenes `.pcd.bin` | f32, five for each point | |
-//! | LAS | 1.0 to 1.4 | 1.2, in steps of 1 nm or more |
+//! | LAS | 1.0 to 1.4 | |
 //!
 //! NaN and infinities are kept; the caller decides how to treat them. Memory grows
 //! with the decompressed bytes of the file, never with a count in a header.
@@ -20,8 +20,6 @@ mod format;
 mod kitti;
 #[cfg(feature = "las")]
 mod las;
-#[cfg(feature = "las")]
-mod las_write;
 #[cfg(feature = "pcd")]
 mod lzf;
 mod npy;
@@ -31,7 +29,6 @@ mod npz;
 mod pcd;
 #[cfg(feature = "pcd")]
 mod pcd_header;
-mod plausible;
 #[cfg(feature = "ply")]
 mod ply;
 mod precision;
@@ -43,15 +40,12 @@ use std::path::Path;
 
 use crate::atomic;
 use crate::error::FormatError;
-use crate::foreign::or_foreign_file;
+use crate::plausible::{check_sweep, or_foreign_file};
 use crate::records;
 use crate::scan::Scan;
 pub use format::CloudFormat;
-#[cfg(feature = "las")]
-pub use las_write::{LasPoint, write_las};
 #[cfg(feature = "dataset")]
 pub(crate) use npz::{read_points as read_npz_points, read_pose as read_npz_pose};
-pub use plausible::{Unlike, check_sweep, coarse_coordinates, judge_object, judge_sweep};
 use precision::Precision;
 
 /// Points, and what a file says of them.
@@ -150,7 +144,7 @@ pub fn read_cloud_as(path: &Path, format: Option<CloudFormat>) -> Result<Cloud, 
             Some(found) if expected.is_some_and(|expected| expected != found) => {
                 let cause = format!(
                     "expected {}, found {found} by the first bytes: call the file .{found}, or name \
-                     the format by --format {found}",
+                     the format by --input-format {found}",
                     expected.map_or("a cloud", CloudFormat::name)
                 );
                 FormatError::malformed(path, "format", cause)
@@ -242,23 +236,17 @@ fn read_as(
 /// Writes `points` to `path`, atomically, in the format of its extension.
 ///
 /// Coordinates are written as f32 if that is exact, as for clouds that were read as f32, and
-/// otherwise as f64. The same points give the same bytes. Three formats round. KITTI's holds only
-/// f32. PCD gets f64 only if f32 would lose more than a millionth of the cloud's extent, because
-/// the usual clouds of PCL and Open3D read no other type. LAS holds whole steps: 1 nm in clouds of
-/// up to 4 m, 10 nm up to 40 m, and so on.
+/// otherwise as f64. The same points give the same bytes. PCD gets f64 only if f32 would lose more than
+/// a millionth of the cloud's extent, because the usual clouds of PCL and Open3D read no other type.
 ///
 /// # Errors
-/// As [`read_cloud`]; raw floats of a number of columns other than four; a
-/// coordinate beyond f32 in KITTI's format, or not finite in LAS; errors of the
-/// system.
+/// As [`CloudFormat::of_output`]; errors of the system.
 pub fn write_cloud(path: &Path, points: &[[f64; 3]]) -> Result<(), FormatError> {
     let precision = Precision::lossless(points);
-    let format = CloudFormat::of_path(path)?;
-    match format {
+    match CloudFormat::of_output(path)? {
         CloudFormat::Text => atomic::write(path, |writer| text::write(writer, points)),
         CloudFormat::Csv => atomic::write(path, |writer| text::write_csv(writer, points)),
         CloudFormat::Npy => atomic::write(path, |writer| npy::write(writer, points, precision)),
-        CloudFormat::Kitti | CloudFormat::Nuscenes => kitti::write(path, format, points),
         #[cfg(feature = "ply")]
         CloudFormat::Ply => atomic::write(path, |writer| ply::write(writer, points, precision)),
         #[cfg(feature = "pcd")]
@@ -268,9 +256,6 @@ pub fn write_cloud(path: &Path, points: &[[f64; 3]]) -> Result<(), FormatError> 
         }
         #[cfg(feature = "npz")]
         CloudFormat::Npz => atomic::write(path, |writer| npz::write(writer, points, precision)),
-        #[cfg(feature = "las")]
-        CloudFormat::Las => write_las(path, points, |_| LasPoint::default()),
-        #[allow(unreachable_patterns, reason = "a build may leave no format out")]
         left_out => Err(not_in_this_build(left_out, path)),
     }
 }

@@ -49,7 +49,7 @@ impl Precision {
 }
 
 /// The largest error of a coordinate as f32.
-pub(super) fn loss(points: &[[f64; 3]]) -> f64 {
+fn loss(points: &[[f64; 3]]) -> f64 {
     let finite = points.as_flattened().iter().filter(|x| x.is_finite());
     finite.map(|&x| (f64::from(x as f32) - x).abs()).fold(0.0, f64::max)
 }

@@ -49,8 +49,6 @@ pub fn read_labelled(path: &Path) -> Result<LabelledSet, FormatError> {
         truth_share: column(&mut npz, "truth_share", of_ragged, numbers)?,
         sensor: column(&mut npz, "sensor", of_ragged, NpzReader::text)?,
         ids: column(&mut npz, "ids", of_ragged, NpzReader::text)?,
-        raw_labels: column(&mut npz, "raw_labels", of_ragged, NpzReader::text)?,
-        fold: column(&mut npz, "fold", of_ragged, read_whole_numbers)?,
     })
 }
 

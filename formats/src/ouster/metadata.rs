@@ -6,7 +6,7 @@ use std::path::Path;
 use serde_json::Value;
 
 use crate::error::FormatError;
-use crate::foreign::{or_foreign_file, read_text};
+use crate::plausible::{or_foreign_file, read_text};
 
 /// The longest metadata, bytes.
 const LONGEST: u64 = 4 << 20;
@@ -33,13 +33,18 @@ crate::named! {
 pub struct Metadata {
     pub(super) profile: Profile,
     pub(super) is_fusa: bool,
-    pub(super) columns_per_frame: u16,
-    pub(super) columns_per_packet: u16,
+    /// Columns of a turn.
+    pub columns_per_frame: u16,
+    /// Columns of each packet.
+    pub columns_per_packet: u16,
     /// The first and the last column that are sent. The first may have the larger number.
     pub(super) column_window: [u16; 2],
-    pub(super) rate_hz: f64,
-    pub(super) beams_deg: Vec<[f64; 2]>,
-    pub(super) origin_m: [f64; 2],
+    /// Turns per second.
+    pub rate_hz: f64,
+    /// Altitude of each row, and azimuth clockwise from the encoder's direction, degrees.
+    pub beams_deg: Vec<[f64; 2]>,
+    /// x and z of the origin of the beams while the encoder is at 0, metres, in the lidar frame.
+    pub origin_m: [f64; 2],
     /// The upper three rows of the transform, metres.
     pub(super) lidar_to_sensor: [[f64; 4]; 3],
 }
@@ -130,12 +135,6 @@ impl Metadata {
 }
 
 impl Metadata {
-    /// Columns of each packet.
-    #[must_use]
-    pub fn columns_per_packet(&self) -> u16 {
-        self.columns_per_packet
-    }
-
     /// Columns of a turn that the sensor does not send.
     #[must_use]
     pub fn n_columns_unsent(&self) -> u16 {
@@ -148,30 +147,6 @@ impl Metadata {
     #[must_use]
     pub fn range_unit_m(&self) -> f64 {
         if self.profile == Profile::LowRate { 0.008 } else { 0.001 }
-    }
-
-    /// Columns of a turn.
-    #[must_use]
-    pub fn columns_per_frame(&self) -> u16 {
-        self.columns_per_frame
-    }
-
-    /// Turns per second.
-    #[must_use]
-    pub fn rate_hz(&self) -> f64 {
-        self.rate_hz
-    }
-
-    /// Altitude of each row, and azimuth clockwise from the encoder's direction, degrees.
-    #[must_use]
-    pub fn beams_deg(&self) -> &[[f64; 2]] {
-        &self.beams_deg
-    }
-
-    /// x and z of the origin of the beams while the encoder is at 0, metres, in the lidar frame.
-    #[must_use]
-    pub fn origin_m(&self) -> [f64; 2] {
-        self.origin_m
     }
 
     /// Rotation of the lidar frame in the sensor's frame about z, radians counterclockwise.

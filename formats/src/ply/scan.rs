@@ -8,11 +8,12 @@
 
 use std::fs::File;
 use std::io::BufReader;
+use std::ops::Range;
 use std::path::Path;
 
 use super::elements::read_elements;
 use crate::error::FormatError;
-use crate::scan::{Attribute, ColumnSlot, Scan, whole};
+use crate::scan::{Attribute, Scan};
 
 /// Reads a scan, ASCII or binary, with properties in any order. Other properties are skipped.
 pub fn read_scan(path: &Path) -> Result<Scan, FormatError> {
@@ -33,46 +34,24 @@ pub fn read_scan(path: &Path) -> Result<Scan, FormatError> {
         |_, row| values.extend_from_slice(row),
     )?;
     let width = 3 + known.iter().map(|attribute| attribute.column_names().len()).sum::<usize>();
-    let rows = Rows { values: &values, width };
-    let mut scan = Scan { pose: frame.pose, positions: rows.vectors(0), ..Scan::default() };
+    let columns = |range: Range<usize>| -> Vec<f64> {
+        values.chunks_exact(width).flat_map(|row| row[range.clone()].iter().copied()).collect()
+    };
+    let mut scan = Scan { pose: frame.pose, ..Scan::default() };
     scan.origin = frame.origin.unwrap_or_default();
+    let positions = columns(0..3);
+    scan.positions =
+        positions.as_chunks().0.iter().map(|at: &[f64; 3]| at.map(|x| x as f32)).collect();
     let mut first = 3;
     for attribute in known {
-        let wrong =
-            |cause: String| FormatError::malformed(path, format!("property {attribute}"), cause);
-        match scan.slot(attribute) {
-            ColumnSlot::F32(slot) => *slot = Some(rows.column(first).map(|x| x as f32).collect()),
-            // Other numbers are intensities.
-            ColumnSlot::U8(slot) if attribute == Attribute::Reflectivity => {
-                *slot = rows.whole(first).ok();
-            }
-            ColumnSlot::U8(slot) => *slot = Some(rows.whole(first).map_err(wrong)?),
-            ColumnSlot::U16(slot) => *slot = Some(rows.whole(first).map_err(wrong)?),
-            ColumnSlot::U32(slot) => *slot = Some(rows.whole(first).map_err(wrong)?),
-            ColumnSlot::Vector(slot) => *slot = Some(rows.vectors(first)),
+        let end = first + attribute.column_names().len();
+        let stored = scan.slot(attribute).set(&columns(first..end));
+        first = end;
+        // Other reflectivities are intensities.
+        if attribute != Attribute::Reflectivity {
+            let part = format!("property {attribute}");
+            stored.map_err(|cause| FormatError::malformed(path, part, cause))?;
         }
-        first += attribute.column_names().len();
     }
     Ok(scan)
-}
-
-/// The numbers of all vertices, `width` for each.
-struct Rows<'a> {
-    values: &'a [f64],
-    width: usize,
-}
-
-impl Rows<'_> {
-    fn column(&self, at: usize) -> impl Iterator<Item = f64> {
-        self.values.chunks_exact(self.width).map(move |row| row[at])
-    }
-
-    fn vectors(&self, first: usize) -> Vec<[f32; 3]> {
-        let vector = |row: &[f64]| [0, 1, 2].map(|axis| row[first + axis] as f32);
-        self.values.chunks_exact(self.width).map(vector).collect()
-    }
-
-    fn whole<T: TryFrom<u32>>(&self, at: usize) -> Result<Vec<T>, String> {
-        self.column(at).map(whole).collect()
-    }
 }

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use super::packet::{TURN, advance};
-use super::{Decoder, Header, Model, PacketError};
+use super::packet::{LONGEST_STEP_US, TURN, forward, step_us};
+use super::{Decoder, Header, Model, PacketError, Sector};
 use crate::capture::{Points, Senders, each_packet};
 use crate::error::FormatError;
 use crate::pcap::Counts;
@@ -13,10 +13,7 @@ use crate::periodic::shorter_way;
 use crate::returns::Kind;
 use crate::scan::Scan;
 use crate::vlp32c::packet::PAYLOAD_SIZE;
-use crate::vlp32c::{AZIMUTH_UNIT_DEG, HOUR_US, Returns, WHITE};
-
-/// Longer steps are gaps, even if the head stands still, microseconds.
-const LONGEST_STEP_US: f64 = 1e6;
+use crate::vlp32c::{AZIMUTH_UNIT_DEG, Returns, WHITE};
 
 /// Counts the beams with a return in the capture of a VLP-32C at `path`. Two returns of a beam count
 /// as one.
@@ -27,7 +24,7 @@ pub fn count_returns(path: &Path) -> Result<u64, FormatError> {
     let decoder = Decoder::new(Model::Vlp32c);
     let mut count = 0;
     let is_data = |payload: &[u8]| Header::parse(payload).is_ok();
-    each_packet(path, &mut Senders::default(), is_data, |payload| {
+    let counts = each_packet(path, &mut Senders::default(), is_data, |payload| {
         let (mut all, mut strongest) = (0, 0);
         let header = decoder.decode(payload, |found| {
             all += 1;
@@ -37,26 +34,32 @@ pub fn count_returns(path: &Path) -> Result<u64, FormatError> {
         count += if header.returns == Returns::Dual { all - strongest } else { all };
         Ok::<_, PacketError>(ControlFlow::Continue(()))
     })?;
-    Ok(count)
+    match counts.first_flawed {
+        Some((number, flaw)) => {
+            Err(FormatError::malformed(path, format!("UDP packet {number}"), flaw))
+        }
+        None => Ok(count),
+    }
 }
 
 /// Reads the first complete turn of a VLP-16 or VLP-32C in the capture at `path`, pcap or pcapng:
-/// points in the sensor's frame, ranges, rings, times in seconds since the first packet, and
-/// reflectivities divided by 100. UDP packets of another length or of another of the `senders` are
-/// skipped.
+/// points in the sensor's frame, ranges, rings, times in seconds since the turn's first packet, and
+/// reflectivities divided by 100. The turn of a sensor that sends a sector only is that sector. UDP
+/// packets of another length or of another of the `senders` are skipped, and so are those that cannot
+/// be decoded, which are counted.
 ///
 /// # Errors
-/// A file that is not such a capture or has no complete turn; a packet that cannot be decoded,
-/// with its number.
+/// A file that is not such a capture or has no complete turn.
 pub fn read_turn(path: &Path, senders: &mut Senders) -> Result<(Scan, Counts), FormatError> {
-    let mut turn = Turn::default();
+    let sector = Sector::of_capture(path, senders)?;
+    let mut turn = Turn { sector, ..Turn::default() };
     let is_data = |payload: &[u8]| Header::parse(payload).is_ok();
     let mut counts = each_packet(path, senders, is_data, |payload| turn.take(payload))?;
     // Rounding may lose a unit.
-    if !turn.is_complete && turn.end() < f64::from(TURN) - 1.0 {
+    if !turn.is_complete && turn.end() < f64::from(TURN) - sector.unsent() - 1.0 {
         let found = match turn.decoder {
             None => "none".to_owned(),
-            Some(_) => format!("{:.1} degrees of one", turn.end() * AZIMUTH_UNIT_DEG),
+            Some(_) => format!("{:.1} degrees of one", turn.end().max(0.0) * AZIMUTH_UNIT_DEG),
         };
         let n = counts.packets;
         let cause = format!(
@@ -71,9 +74,10 @@ pub fn read_turn(path: &Path, senders: &mut Senders) -> Result<(Scan, Counts), F
 
 #[derive(Default)]
 struct Turn {
+    sector: Sector,
     decoder: Option<Decoder>,
-    /// The last packet by its time, its start in azimuth units after that of the first packet, and
-    /// microseconds after it.
+    /// The last packet by its time, its start in azimuth units after that of the turn, and
+    /// microseconds after the first packet of the turn.
     last: Option<(Header, f64, f64)>,
     /// The times and azimuths of the packets.
     stamps: BTreeSet<(u32, u16)>,
@@ -94,25 +98,28 @@ impl Turn {
         if self.stamps.contains(&stamp) {
             return Ok(ControlFlow::Continue(()));
         }
-        let (mut start, mut time_us) = (0.0, 0.0);
+        let (mut start, mut time_us) = (self.sector.after_start(header.azimuth), 0.0);
         if let Some((last, last_start, last_us)) = self.last {
             let step_us = step_us(&last, &header);
-            let turned = if step_us < 0.0 {
-                -f64::from(advance(header.azimuth, last.azimuth))
+            if self.is_gap(&last, step_us) {
+                *self = Self { sector: self.sector, ..Self::default() };
             } else {
-                f64::from(advance(last.azimuth, header.azimuth))
-            };
-            (start, time_us) = (last_start + turned, last_us + step_us);
-            if is_gap(&last, step_us) {
-                *self = Self::default();
-                (start, time_us) = (0.0, 0.0);
-            } else if start >= f64::from(TURN) {
+                start = last_start + turned(&last, &header, step_us);
+                time_us = last_us + step_us;
+            }
+            if start >= f64::from(TURN) {
                 self.stamps.insert(stamp);
                 self.is_complete = true;
                 return Ok(ControlFlow::Break(()));
-            } else if start < 0.0 || time_us < 0.0 {
+            }
+            if time_us < 0.0 || last_start >= 0.0 && start < 0.0 {
                 return Ok(ControlFlow::Continue(()));
             }
+        }
+        if start + header.units_per_us * header.duration_us() <= 0.0 && start < 0.0 {
+            // Of the turn before.
+            self.last = Some((header, start, 0.0));
+            return Ok(ControlFlow::Continue(()));
         }
         self.stamps.insert(stamp);
         if self.last.is_none_or(|(_, _, last_us)| time_us >= last_us) {
@@ -121,35 +128,49 @@ impl Turn {
         let Self { decoder, points, .. } = self;
         let decoder = decoder.get_or_insert_with(|| Decoder::new(header.model));
         decoder.decode(payload, |found| {
-            if start + header.units_per_us * found.after_us < f64::from(TURN) {
+            // A firing at the border is on its later side, whatever the rounding.
+            let turned = start + header.units_per_us * found.after_us + 1e-6;
+            if (0.0..f64::from(TURN)).contains(&turned) {
                 points.push(found, time_us, f32::from(WHITE));
             }
         })?;
         Ok(ControlFlow::Continue(()))
     }
 
-    /// The number of packets that fit into the gaps between the times of the packets.
-    fn n_missing(&self) -> u64 {
-        let Some((last, ..)) = self.last else { return 0 };
-        let times = || self.stamps.iter().map(|(time_us, _)| f64::from(*time_us));
-        let steps = times().zip(times().skip(1)).map(|(from, to)| to - from);
-        let in_gap = |us: f64| ((us / last.duration_us()).round() as u64).saturating_sub(1);
-        // A longer step is from the end of an hour to its start.
-        steps.filter(|us| *us < LONGEST_STEP_US).map(in_gap).sum()
+    /// Whether azimuths no longer tell how far the head turned in a step after `last`.
+    fn is_gap(&self, last: &Header, step_us: f64) -> bool {
+        let most = f64::from(TURN) / 4.0 + self.sector.unsent();
+        step_us.abs() > LONGEST_STEP_US || last.units_per_us * step_us > most
     }
 
-    /// Azimuth units from the start of the first packet to the end of the last.
+    /// The number of packets that fit into the gaps between the times of the packets. There are none for
+    /// what the sensor does not send.
+    fn n_missing(&self) -> u64 {
+        let Some((last, ..)) = self.last else { return 0 };
+        let in_gap = |((from_us, from), (to_us, to)): (&(u32, u16), &(u32, u16))| {
+            let us = f64::from(to_us - from_us);
+            let unsent = if self.sector.is_passed(*from, *to) { self.sector.unsent() } else { 0.0 };
+            let sending_us = if unsent > 0.0 { us - unsent / last.units_per_us } else { us };
+            // A longer step is from the end of an hour to its start.
+            let is_gap = us < LONGEST_STEP_US;
+            let n = (sending_us / last.sending_us()).round() as u64;
+            if is_gap { n.saturating_sub(1) } else { 0 }
+        };
+        self.stamps.iter().zip(self.stamps.iter().skip(1)).map(in_gap).sum()
+    }
+
+    /// Azimuth units from the start of the turn to the end of the last packet.
     fn end(&self) -> f64 {
         self.last.map_or(0.0, |(last, start, _)| start + last.units_per_us * last.duration_us())
     }
 }
 
-/// Microseconds from one packet to another, by the shorter way around the hour.
-fn step_us(from: &Header, to: &Header) -> f64 {
-    shorter_way(f64::from(to.time_us) - f64::from(from.time_us), HOUR_US as f64)
-}
-
-/// Whether azimuths no longer tell how far the head turned in a step after `last`.
-fn is_gap(last: &Header, step_us: f64) -> bool {
-    step_us.abs() > LONGEST_STEP_US || last.units_per_us * step_us > f64::from(TURN) / 4.0
+/// How far the head turned from one packet to another, azimuth units: as its azimuths say, by the way
+/// around that is next to its speed.
+fn turned(from: &Header, to: &Header, step_us: f64) -> f64 {
+    let ahead = f64::from(forward(from.azimuth, to.azimuth));
+    let off = shorter_way(ahead - from.units_per_us * step_us, f64::from(TURN));
+    let turned = from.units_per_us * step_us + off;
+    // A head that starts or stops may seem to turn backwards.
+    if step_us < 0.0 { turned.min(0.0) } else { turned.max(0.0) }
 }

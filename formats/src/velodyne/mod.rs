@@ -9,7 +9,9 @@
 mod capture;
 mod model;
 mod packet;
+mod sector;
 
 pub use capture::{count_returns, read_turn};
 pub use model::Model;
 pub use packet::{Decoder, Header, PacketError};
+pub(crate) use sector::Sector;

@@ -18,39 +18,16 @@ const VLP16_DEG: [f64; 16] =
 
 /// Azimuth offsets and elevations of a VLP-32C's lasers, degrees: User Manual 63-9325, chapter 9;
 /// the same in ros-drivers/velodyne, `VeloView-VLP-32C.yaml`.
-const VLP32C_DEG: [[f64; 2]; 32] = [
-    [-1.4, -25.0],
-    [4.2, -1.0],
-    [-1.4, -1.667],
-    [1.4, -15.639],
-    [-1.4, -11.31],
-    [1.4, 0.0],
-    [-4.2, -0.667],
-    [1.4, -8.843],
-    [-1.4, -7.254],
-    [4.2, 0.333],
-    [-1.4, -0.333],
-    [1.4, -6.148],
-    [-4.2, -5.333],
-    [1.4, 1.333],
-    [-4.2, 0.667],
-    [1.4, -4.0],
-    [-1.4, -4.667],
-    [4.2, 1.667],
-    [-1.4, 1.0],
-    [4.2, -3.667],
-    [-4.2, -3.333],
-    [1.4, 3.333],
-    [-1.4, 2.333],
-    [1.4, -2.667],
-    [-1.4, -3.0],
-    [1.4, 7.0],
-    [-1.4, 4.667],
-    [4.2, -2.333],
-    [-4.2, -2.0],
-    [1.4, 15.0],
-    [-1.4, 10.333],
-    [1.4, -1.333],
+const VLP32C_DEG: [[f64; 32]; 2] = [
+    [
+        -1.4, 4.2, -1.4, 1.4, -1.4, 1.4, -4.2, 1.4, -1.4, 4.2, -1.4, 1.4, -4.2, 1.4, -4.2, 1.4,
+        -1.4, 4.2, -1.4, 4.2, -4.2, 1.4, -1.4, 1.4, -1.4, 1.4, -1.4, 4.2, -4.2, 1.4, -1.4, 1.4,
+    ],
+    [
+        -25.0, -1.0, -1.667, -15.639, -11.31, 0.0, -0.667, -8.843, -7.254, 0.333, -0.333, -6.148,
+        -5.333, 1.333, 0.667, -4.0, -4.667, 1.667, 1.0, -3.667, -3.333, 3.333, 2.333, -2.667, -3.0,
+        7.0, 4.667, -2.333, -2.0, 15.0, 10.333, -1.333,
+    ],
 ];
 
 /// Time between two firings of a sequence, microseconds (both user manuals).
@@ -113,20 +90,22 @@ impl Model {
 
     /// Its lasers, in the order of packets.
     pub(super) fn lasers(self) -> Vec<Laser> {
-        let (angles_deg, crossing_m, at_once) = match self {
-            Self::Vlp16 => {
-                (VLP16_DEG.map(|elevation| [0.0, elevation]).to_vec(), VLP16_CROSSING_M, 1)
-            }
-            Self::Vlp32c => (VLP32C_DEG.to_vec(), BEAM_CROSSING_M, 2),
+        let [offsets_deg, elevations_deg]: [&[f64]; 2] = match self {
+            Self::Vlp16 => [&[0.0; 16], &VLP16_DEG],
+            Self::Vlp32c => [&VLP32C_DEG[0], &VLP32C_DEG[1]],
         };
-        let laser = |(number, &[offset, elevation]): (usize, &[f64; 2])| Laser {
-            ring: angles_deg.iter().filter(|[_, other]| *other < elevation).count() as u16,
+        let (crossing_m, at_once) = match self {
+            Self::Vlp16 => (VLP16_CROSSING_M, 1),
+            Self::Vlp32c => (BEAM_CROSSING_M, 2),
+        };
+        let laser = |(number, (offset, elevation)): (usize, (&f64, &f64))| Laser {
+            ring: elevations_deg.iter().filter(|other| *other < elevation).count() as u16,
             azimuth_offset: offset.to_radians(),
             sin_elevation: libm::sin(elevation.to_radians()),
             cos_elevation: libm::cos(elevation.to_radians()),
             drop_m: crossing_m * libm::tan(elevation.to_radians()),
             fires_us: (number / at_once) as f64 * FIRING_US,
         };
-        angles_deg.iter().enumerate().map(laser).collect()
+        offsets_deg.iter().zip(elevations_deg).enumerate().map(laser).collect()
     }
 }

@@ -2,14 +2,18 @@
 
 use super::Model;
 use super::model::Laser;
+use crate::periodic::shorter_way;
 use crate::returns::{Kind, Return};
 use crate::vlp32c::packet::{
     BLOCK_HEADER_SIZE, BLOCK_SIZE, BLOCKS, FLAG, MEASUREMENT_SIZE, PAYLOAD_SIZE,
 };
-use crate::vlp32c::{AZIMUTH_UNIT_DEG, Returns, SEQUENCE_US};
+use crate::vlp32c::{AZIMUTH_UNIT_DEG, HOUR_US, Returns, SEQUENCE_US};
 
 /// Azimuth units of a turn.
 pub(super) const TURN: u16 = 36_000;
+
+/// Longer steps are gaps, even if the head stands still, microseconds.
+pub(super) const LONGEST_STEP_US: f64 = 1e6;
 
 /// Why a payload is not a data packet.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -59,6 +63,19 @@ pub struct Header {
     /// Rotation rate of the head, units of 0.01 degree per microsecond, from the packet's first and
     /// last azimuth. It is 0 if the head seems to turn backwards, as while it starts or stops.
     pub units_per_us: f64,
+    /// Where the packet goes on behind a sector that the sensor does not send.
+    jump: Option<Jump>,
+}
+
+/// Where a packet goes on behind a sector that the sensor does not send.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Jump {
+    /// The first block, or pair of blocks with both returns, behind it.
+    firing: usize,
+    /// Its azimuth.
+    azimuth: u16,
+    /// How long the head turns through the sector, microseconds.
+    us: f64,
 }
 
 /// Decodes packets of one sensor.
@@ -84,22 +101,55 @@ impl Header {
         };
         let model = Model::of_byte(model).ok_or(PacketError::Model(model))?;
         let returns = Returns::of_byte(mode).ok_or(PacketError::Returns(mode))?;
-        let (first, step) = (azimuth(blocks[0]), returns.blocks_per_sequence());
-        let turned = advance(first, azimuth(blocks[BLOCKS - step]));
-        let elapsed_us = (BLOCKS / step - 1) as f64 * model.block_us();
-        Ok(Self {
-            model,
-            returns,
-            time_us: u32::from_le_bytes([a, b, c, d]),
-            azimuth: first,
-            units_per_us: f64::from(turned) / elapsed_us,
-        })
+        let firings = Vec::from_iter(
+            blocks.chunks_exact(returns.blocks_per_sequence()).map(|blocks| azimuth(blocks[0])),
+        );
+        let n_steps = (firings.len() - 1) as f64;
+        let first = firings[0];
+        let (turned, n_even, jump) = match find_jump(&firings) {
+            Some((firing, even)) => (even, n_steps - 1.0, Some(firing)),
+            None => (advance(first, firings[firings.len() - 1]), n_steps, None),
+        };
+        let units_per_us = f64::from(turned) / (n_even * model.block_us());
+        let jump = jump.map(|firing| {
+            let jumped = forward(firings[firing - 1], firings[firing]);
+            let us = f64::from(jumped) / units_per_us - model.block_us();
+            Jump { firing, azimuth: firings[firing], us }
+        });
+        let time_us = u32::from_le_bytes([a, b, c, d]);
+        Ok(Self { model, returns, time_us, azimuth: first, units_per_us, jump })
+    }
+
+    /// The number of its blocks, or of pairs of blocks with both returns.
+    fn n_firings(&self) -> usize {
+        BLOCKS / self.returns.blocks_per_sequence()
     }
 
     /// Time from the start of the packet's first firing sequence to the end of its last, microseconds.
     #[must_use]
     pub fn duration_us(&self) -> f64 {
-        (BLOCKS / self.returns.blocks_per_sequence()) as f64 * self.model.block_us()
+        self.firing_us(self.n_firings())
+    }
+
+    /// The same without the time in which the sensor turns through what it does not send.
+    #[must_use]
+    pub fn sending_us(&self) -> f64 {
+        self.n_firings() as f64 * self.model.block_us()
+    }
+
+    /// The time of a block, or pair of blocks with both returns, after the first, microseconds.
+    fn firing_us(&self, number: usize) -> f64 {
+        let pause_us = self.jump.filter(|jump| number >= jump.firing).map_or(0.0, |jump| jump.us);
+        number as f64 * self.model.block_us() + pause_us
+    }
+
+    /// The azimuths over which it fires: where each span begins, and its width.
+    pub(super) fn spans(&self) -> impl Iterator<Item = (u16, u16)> {
+        let step = self.units_per_us * self.model.block_us();
+        let width = move |n: usize| (n as f64 * step).ceil() as u16;
+        let n_before = self.jump.map_or(self.n_firings(), |jump| jump.firing);
+        let behind = self.jump.map(|jump| (jump.azimuth, width(self.n_firings() - jump.firing)));
+        [(self.azimuth, width(n_before))].into_iter().chain(behind)
     }
 }
 
@@ -149,7 +199,7 @@ impl Decoder {
         }
         let step = header.returns.blocks_per_sequence();
         for (number, blocks) in blocks.chunks_exact(step).enumerate() {
-            let block_us = number as f64 * self.model.block_us();
+            let block_us = header.firing_us(number);
             let encoder = f64::from(azimuth(blocks[0]));
             for i in 0..self.model.sequences_per_block() * self.lasers.len() {
                 let (sequence, laser) =
@@ -228,7 +278,32 @@ fn measurement(block: &[u8], i: usize) -> (u16, u8) {
 }
 
 /// Azimuth units from one azimuth to a later one, or 0 if the head seems to turn backwards.
-pub(super) fn advance(from: u16, to: u16) -> u16 {
-    let turned = if to >= from { to - from } else { TURN - from + to };
+fn advance(from: u16, to: u16) -> u16 {
+    let turned = forward(from, to);
     if turned > TURN / 2 { 0 } else { turned }
+}
+
+/// Azimuth units clockwise from one azimuth to another.
+pub(super) fn forward(from: u16, to: u16) -> u16 {
+    if to >= from { to - from } else { TURN - from + to }
+}
+
+/// Of firings at these azimuths, the first behind a sector that was not sent, and how far the head
+/// turned in all other steps. The steps of a head that starts, stops or shakes are not even, and
+/// tell of no sector.
+fn find_jump(azimuths: &[u16]) -> Option<(usize, u16)> {
+    // More than the steps of any speed, 0.8 degrees, and than how far a head shakes backwards.
+    const LEAST: u16 = 300;
+    let steps = || azimuths.windows(2).map(|pair| forward(pair[0], pair[1]));
+    let (jump, before) = steps().zip(0..).max()?;
+    let others = || steps().zip(0..).filter(|(_, number)| *number != before).map(|(step, _)| step);
+    let (least, most) = (others().min()?, others().max()?);
+    let is_even = least > 0 && most < LEAST / 2 && most <= 2 * least;
+    let is_jump = (LEAST..=TURN - LEAST).contains(&jump);
+    (is_even && is_jump).then(|| (before + 1, others().sum()))
+}
+
+/// Microseconds from one packet to another, by the shorter way around the hour.
+pub(super) fn step_us(from: &Header, to: &Header) -> f64 {
+    shorter_way(f64::from(to.time_us) - f64::from(from.time_us), HOUR_US as f64)
 }

@@ -1,10 +1,11 @@
 use std::fs;
 
 use formats::Scan;
-use formats::cloud_file::{LasPoint, read_cloud_as, write_las};
+use formats::cloud_file::read_cloud_as;
 use formats::hash::Hashing;
 use formats::scan_file::{ScanFormat, write_scan};
 
+use super::las::las;
 use crate::numpy::{npy, npz};
 
 fn read(path: &std::path::Path) -> Option<Vec<f32>> {
@@ -94,7 +95,7 @@ fn columns_of_rings_are_known_by_their_names() {
 
 /// The largest intensity of LAS is 65535, and 0 stands for none (LAS 1.4 R15, 2.6.2).
 #[test]
-fn what_is_written_is_read() {
+fn written_columns_are_read() {
     let folder = tempfile::tempdir().unwrap();
     let positions = vec![[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]];
     let scan = Scan { positions, intensity: Some(vec![0.3, 1.0]), ..Scan::default() };
@@ -107,8 +108,8 @@ fn what_is_written_is_read() {
     for (written, expected) in
         [([13107, 65535], Some(vec![0.2, 1.0])), ([0, 255], Some(vec![0.0, 255.0])), ([0, 0], None)]
     {
-        let of = |i: usize| LasPoint { intensity: written[i], ..LasPoint::default() };
-        write_las(&path, &[[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]], of).unwrap();
+        let points = [([1.0, 2.0, 3.0], written[0]), ([4.0, 5.0, 6.0], written[1])];
+        fs::write(&path, las((1, 2), 0, [0.0; 3], &points)).unwrap();
         assert_eq!(read(&path), expected);
     }
 }

@@ -13,7 +13,7 @@ static WHOLE_FILES: LazyLock<Vec<(CloudFormat, Vec<u8>)>> = LazyLock::new(whole_
 fn whole_files() -> Vec<(CloudFormat, Vec<u8>)> {
     let folder = tempfile::tempdir().unwrap();
     let points: Vec<_> = (0..20).map(f64::from).map(|i| [i * 0.1, -1e-30, i * 1e30]).collect();
-    let extensions = ["ply", "npz", "npy", "pcd", "xyz", "csv", "bin"];
+    let extensions = ["ply", "npz", "npy", "pcd", "xyz", "csv"];
     let mut files: Vec<_> = extensions
         .into_iter()
         .map(|extension| {
@@ -22,6 +22,7 @@ fn whole_files() -> Vec<(CloudFormat, Vec<u8>)> {
             (CloudFormat::of_path(&path).unwrap(), std::fs::read(&path).unwrap())
         })
         .collect();
+    files.push((CloudFormat::Kitti, [0.1f32, -1e-30, 1e30, 0.0].map(f32::to_le_bytes).concat()));
     let ply = "element a 1\nproperty list uchar int l\nelement vertex 2\nproperty double x\n\
                property list char short l\nproperty uint y\nproperty char z\nend_header\n\
                1 2 -.5 1 7 8 9\n";

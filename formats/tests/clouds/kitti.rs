@@ -22,14 +22,14 @@ fn the_name_says_how_many_columns_there_are() {
 }
 
 #[test]
-fn what_is_not_finite_is_passed_on() {
+fn points_that_are_not_finite_are_passed_on() {
     let points = read("a.bin", floats(&[f32::NAN, f32::INFINITY, 1e-45, 0.0]));
     assert!(points[0][0].is_nan());
     assert_eq!(points[0][1..], [f64::INFINITY, f64::from(1e-45f32)]);
 }
 
 #[test]
-fn what_only_its_name_makes_kittis_must_make_sense() {
+fn bin_files_must_hold_plausible_points() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("frame.bin");
     let read = |format: Option<CloudFormat>, points: &[&[f32]]| {
@@ -37,7 +37,7 @@ fn what_only_its_name_makes_kittis_must_make_sense() {
         let read = read_cloud_as(&path, format).map(|cloud| cloud.points.len());
         read.map_err(|error| error.to_string().split_once("frame.bin: ").unwrap().1.to_owned())
     };
-    let remedy = "name the format by --format: kitti has four f32 for each point, nuscenes five; \
+    let remedy = "name the format by --input-format: kitti has four f32 for each point, nuscenes five; \
                   a file called NAME.f32x6.bin has six";
     let five: Vec<_> = (0..100u8)
         .map(|i| (0.37 * f32::from(i), f32::from(i % 32)))

@@ -14,24 +14,34 @@ const OFFSETS: usize = 155;
 const N_EVLRS: usize = 243;
 const N_POINTS_1_4: usize = 247;
 
-/// Three points of UTM, written by crate `las`.
-fn utm(version: (u8, u8), format: u8) -> Vec<u8> {
+/// Points with their intensities, as crate `las` writes them in millimetres from `offset`.
+pub fn las(
+    version: (u8, u8),
+    format: u8,
+    [x, y, z]: [f64; 3],
+    points: &[([f64; 3], u16)],
+) -> Vec<u8> {
     let mut builder = Builder::from(version);
-    builder.point_format = las::point::Format::new(format).unwrap();
+    let format = las::point::Format::new(format).unwrap();
+    builder.point_format = format;
     let transform = |offset| Transform { scale: 0.001, offset };
-    builder.transforms = Vector { x: transform(4.5e5), y: transform(5.4e6), z: transform(0.0) };
+    builder.transforms = Vector { x: transform(x), y: transform(y), z: transform(z) };
     let header = builder.into_header().unwrap();
     let mut writer = Writer::new(Cursor::new(Vec::new()), header).unwrap();
-    for i in 0..3 {
-        let x = 450_000.123 + f64::from(i);
-        let mut point = Point { x, y: 5_400_000.456, z: -0.001, ..Point::default() };
-        let format = las::point::Format::new(format).unwrap();
+    for &([x, y, z], intensity) in points {
+        let mut point = Point { x, y, z, intensity, ..Point::default() };
         point.gps_time = format.has_gps_time.then_some(0.0);
         point.color = format.has_color.then(las::Color::default);
         point.nir = format.has_nir.then_some(0);
         writer.write_point(point).unwrap();
     }
     writer.into_inner().unwrap().into_inner()
+}
+
+/// Three points of UTM.
+fn utm(version: (u8, u8), format: u8) -> Vec<u8> {
+    let point = |i: u8| ([450_000.123 + f64::from(i), 5_400_000.456, -0.001], 0);
+    las(version, format, [4.5e5, 5.4e6, 0.0], &[0, 1, 2].map(point))
 }
 
 #[test]
@@ -56,7 +66,7 @@ fn changed(mut bytes: Vec<u8>, at: usize, value: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn what_is_no_cloud_is_refused() {
+fn malformed_files_are_refused() {
     let whole = || utm((1, 2), 1);
     assert!(error("a.las", "LASF").starts_with("header: "));
     assert!(error("a.las", "no las file at all").starts_with("header: "));

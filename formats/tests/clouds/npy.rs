@@ -91,7 +91,7 @@ fn records_have_their_coordinates_by_name() {
 }
 
 #[test]
-fn what_is_no_cloud_is_refused() {
+fn malformed_files_are_refused() {
     let wrong = |descr, shape: &str, data: &[u8]| error("a.npy", npy(descr, "False", shape, data));
     let shape = |found: &str| format!("array: expected shape [n, 3], found {found}");
     assert_eq!(wrong("<f4", "(3,)", &[0; 12]), shape("[3]"));

@@ -53,7 +53,7 @@ fn standard_input_tells_an_archive_by_its_first_bytes() {
 }
 
 #[test]
-fn what_is_no_cloud_is_refused_with_its_key() {
+fn malformed_files_are_refused_with_their_key() {
     let cloud = || bytes_of("(1, 3)", &[1; 3]);
     let flat = || bytes_of("(3,)", &[1; 3]);
     assert_eq!(

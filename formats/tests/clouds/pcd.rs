@@ -109,7 +109,7 @@ fn compressed_points_lie_field_after_field() {
 }
 
 #[test]
-fn what_is_no_cloud_is_refused() {
+fn malformed_files_are_refused() {
     let refuse = |header: &str, data: &[u8]| error("a.pcd", pcd(header, data));
     let xyz = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\n";
     for (header, message) in [

@@ -99,7 +99,7 @@ fn no_vertices_are_a_cloud() {
 }
 
 #[test]
-fn what_is_no_cloud_is_refused() {
+fn malformed_files_are_refused() {
     for (header, message) in [
         ("element face 0\n", "element vertex: missing"),
         ("element vertex 0\nproperty float x\n", "element vertex: property y is missing"),

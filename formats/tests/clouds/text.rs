@@ -46,7 +46,7 @@ fn a_line_of_names_says_which_columns_are_meant() {
 }
 
 #[test]
-fn millimetres_are_told_by_names() {
+fn names_of_columns_show_millimetres() {
     assert_eq!(read("a.csv", "t,X (mm),Y (mm),Z (mm)\n9,1000,-500,250\n"), [[1.0, -0.5, 0.25]]);
 }
 
@@ -65,7 +65,7 @@ fn numbers_of_lines_are_no_coordinates() {
 }
 
 #[test]
-fn decimal_commas_between_commas_are_told() {
+fn decimal_commas_between_commas_are_named() {
     let rows = |row: &str| row.repeat(9);
     let cause = "columns: expected x, y and z, found pairs of whole numbers, probably with decimal \
                  commas: write decimal points, or semicolons between the columns";
@@ -126,7 +126,7 @@ fn every_digit_of_f64_counts() {
 }
 
 #[test]
-fn what_is_no_cloud_is_refused_with_its_line() {
+fn malformed_files_are_refused_with_their_line() {
     for (text, message) in [
         ("1 2 3\n4 five 6\n", "line 2: expected a number, found `five`"),
         ("1 2 3\n\n# c\n4 5\n", "line 4: expected 3 columns, found 2"),

@@ -12,13 +12,14 @@
 //! ```
 
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+#![warn(clippy::print_stdout, clippy::print_stderr)]
 
 mod definitions;
 mod messages;
 mod objects;
 
 pub use messages::*;
-pub use objects::{MARKER_LIFETIME_S, Object, WholeBox, detections, markers};
+pub use objects::{MARKER_LIFETIME_S, Object, detections, markers};
 
 use serde::Serialize;
 

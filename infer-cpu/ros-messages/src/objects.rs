@@ -1,3 +1,4 @@
+use formats::geometry::OrientedBox;
 use serde::Deserialize;
 
 use crate::messages::{
@@ -36,18 +37,7 @@ pub struct Object {
     /// The box of the whole object, if it is known; messages then have it in place of the box around
     /// its points.
     #[serde(default)]
-    pub whole_box: Option<WholeBox>,
-}
-
-/// The box of a whole object, of which a sensor sees a part.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-pub struct WholeBox {
-    /// Its middle, metres.
-    pub centre_m: [f64; 3],
-    /// Length, width and height, metres.
-    pub size_m: [f64; 3],
-    /// The direction of the length, degrees counterclockwise from x.
-    pub yaw_deg: f64,
+    pub whole_box: Option<OrientedBox>,
 }
 
 impl Object {
@@ -57,7 +47,7 @@ impl Object {
 
     fn bbox(&self) -> BoundingBox3D {
         let ([x, y, z], size_m, yaw_deg) = match &self.whole_box {
-            Some(whole) => (whole.centre_m, whole.size_m, whole.yaw_deg),
+            Some(whole) => (whole.centre_m, whole.size_m, whole.yaw_rad.to_degrees()),
             None => (self.position_m, self.size_m, self.yaw_deg),
         };
         let orientation = Quaternion::from_yaw_deg(yaw_deg);
@@ -213,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_becomes_a_box_and_a_text_that_a_later_one_of_its_track_replaces() {
+    fn an_object_becomes_a_box_and_a_text() {
         let array = markers(&[object(), Object { class: None, ..object() }]);
         let [cube, text, nameless, _] = &array.markers[..] else { panic!("{array:?}") };
         assert_eq!((cube.kind, cube.id, cube.ns.as_str(), cube.action), (1, 7, "boxes", 0));

@@ -7,7 +7,7 @@ use std::io::{self, BufReader};
 use std::process::ExitCode;
 
 use clap::Parser;
-use formats::outcome::{Outcome, exit_code};
+use program::outcome::{Outcome, exit_code};
 
 use publisher::Publisher;
 

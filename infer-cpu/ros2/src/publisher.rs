@@ -5,7 +5,7 @@ use std::thread;
 use std::time::Duration;
 
 use anyhow::{Context as _, anyhow};
-use formats::outcome::Usage;
+use program::outcome::Usage;
 use ros2_client::qos::{Durability, History, WhenFull};
 use ros2_client::{
     Context, ContextOptions, MessageTypeName, Name, Node, NodeName, NodeOptions, QosProfile,
@@ -25,7 +25,7 @@ pub struct Publisher {
     node: Node,
     topics: BTreeMap<String, ros2_client::Publisher<Body>>,
     /// Whether the warning about a slow subscriber was printed.
-    is_told: bool,
+    has_warned: bool,
 }
 
 /// An encoded message, without its header.
@@ -50,7 +50,7 @@ impl Publisher {
             .map_err(|cause| anyhow!("DDS domain {domain}: {cause}"))?
             .new_node(name, NodeOptions::new().enable_rosout(false))
             .map_err(|cause| anyhow!("the node {node}: {cause:?}"))?;
-        Ok(Self { node, topics: BTreeMap::new(), is_told: false })
+        Ok(Self { node, topics: BTreeMap::new(), has_warned: false })
     }
 
     /// Publishes a message on its topic, which the first message creates. A subscriber that is too
@@ -67,7 +67,7 @@ impl Publisher {
             self.topics.insert(topic.clone(), publisher);
         }
         if let Err(cause) = self.topics[&topic].publish(Body(cdr))
-            && !std::mem::replace(&mut self.is_told, true)
+            && !std::mem::replace(&mut self.has_warned, true)
         {
             eprintln!("warning: a message of {topic} was not sent, and others may not be: {cause}");
         }

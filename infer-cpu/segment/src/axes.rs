@@ -1,14 +1,16 @@
 //! Whether z is the axis that points up.
 
+use formats::plausible::Warning;
+
 use crate::label::Label;
 use crate::segmenter::Segmenter;
 use crate::settings::Settings;
 use crate::sweep::Sweep;
 
-/// The least share of ground under another axis that casts doubt on z.
+/// The least share of ground under another axis that speaks against z.
 const LEAST_GROUND: f64 = 0.2;
 /// How many times as wide the elevations above another axis must be, or as large the ground below
-/// z, to dispel the doubt: rooms and roofs have a ceiling, too.
+/// z, to speak for it: rooms and roofs have a ceiling, too.
 const CLEARLY: [f64; 2] = [3.0, 0.5];
 
 /// Where all but a hundredth of the points are nearer than this, metres, a plane above the sensor is
@@ -22,7 +24,7 @@ const FEWEST_SECTORS: u32 = 7;
 /// Why z probably does not point up in a sweep, metres from the sensor: most of its beams leave the
 /// sensor across another axis, below which more ground is found.
 #[must_use]
-pub fn doubtful_axes(points: &[[f32; 3]]) -> Option<String> {
+pub fn other_axis_up(points: &[[f32; 3]]) -> Option<Warning> {
     let square = |point: &[f32; 3]| -> f64 { point.iter().map(|x| f64::from(*x).powi(2)).sum() };
     let returns = || points.iter().filter(|point| square(point) > 0.0 && square(point).is_finite());
     let (mut squares, mut below) = ([0.0; 3], [0i64; 3]);
@@ -51,17 +53,17 @@ pub fn doubtful_axes(points: &[[f32; 3]]) -> Option<String> {
     }
     let [found, other] = [ground(&points), ground(&turned)];
     let is_across = squares[2] > CLEARLY[0] * squares[up];
-    let is_doubtful = found < other * if is_across { 1.0 } else { CLEARLY[1] };
-    (other >= LEAST_GROUND && is_doubtful).then(|| {
-        format!(
-            "{:.0} % of the points are ground if z points up, and {:.0} % if {}{} does: expected \
-             the sensor's frame, z up",
-            100.0 * found,
-            100.0 * other,
-            if sign < 0.0 { "-" } else { "" },
-            ["x", "y", "z"][up]
-        )
-    })
+    let is_less = found < other * if is_across { 1.0 } else { CLEARLY[1] };
+    let axis = match (up, sign < 0.0) {
+        (0, false) => "x",
+        (0, true) => "-x",
+        (1, false) => "y",
+        (1, true) => "-y",
+        (_, false) => "z",
+        (_, true) => "-z",
+    };
+    let warning = Warning::OtherAxisUp { ground_of_z: found, ground: other, axis };
+    (other >= LEAST_GROUND && is_less).then_some(warning)
 }
 
 /// The share of ground among `points`, which are returns, 0 to 1.

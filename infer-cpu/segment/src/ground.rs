@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn the_foot_of_a_steep_surface_is_no_ground_and_what_lies_before_it_is() {
+    fn the_foot_of_a_steep_surface_ends_the_ground() {
         let feet = [[9.0, 0.0], [9.5, 0.0], [9.7, 0.05]];
         let before = |range_m: f32, z: f32| seeds(&[feet[0], feet[1], feet[2], [range_m, z]]);
         // 0.4 m over 0.25 m from the last return that is 0.3 m after another.
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn the_sensor_stands_above_the_median_of_the_lowest_returns_within_20_m() {
+    fn the_sensor_height_is_above_the_median_of_low_returns() {
         let level_m = |returns: &[[f32; 2]]| {
             let columns = Lowest(returns.iter().map(at).collect());
             GroundFinder::default().level_under_sensor(&columns).z_m(3.0, 4.0)

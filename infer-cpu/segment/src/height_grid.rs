@@ -288,7 +288,7 @@ mod tests {
     /// Between sectors at 10.5 m lie 0.3665 m, over which ground climbs by 0.3 times that, and a
     /// kerb of 0.15 m besides.
     #[test]
-    fn a_mean_is_ground_up_to_a_kerb_above_what_the_slope_allows_from_anywhere_around() {
+    fn ground_means_may_rise_by_a_kerb_and_the_slope() {
         for (low, high, sectors) in
             [(89, 90, 1.0), (91, 90, 1.0), (80, 90, 10.0), (176, 3, 7.0), (3, 176, 7.0)]
         {

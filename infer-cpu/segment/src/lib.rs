@@ -21,6 +21,7 @@
 //! arrive. Clouds without the structure of a scan are cut into connected components instead.
 
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+#![warn(clippy::print_stdout, clippy::print_stderr)]
 
 mod angle;
 mod axes;
@@ -33,7 +34,6 @@ mod label;
 mod link;
 mod look;
 mod open_sets;
-mod oriented_box;
 mod plane;
 mod segmentation;
 mod segmenter;
@@ -42,10 +42,10 @@ mod settings;
 mod stream;
 mod sweep;
 
-pub use axes::doubtful_axes;
+pub use axes::other_axis_up;
+pub use formats::geometry::OrientedBox;
 pub use hierarchy::{BestCut, Hierarchy, Node};
 pub use label::Label;
-pub use oriented_box::OrientedBox;
 pub use segmentation::{Cluster, Segmentation};
 pub use segmenter::Segmenter;
 pub use settings::{Settings, SettingsError};

@@ -299,7 +299,7 @@ mod tests {
 
     /// Seven points in a row, each a step from the next; the third and the fourth are removed.
     #[test]
-    fn what_is_left_of_a_set_is_the_sets_that_its_steps_join() {
+    fn thinned_sets_are_joined_by_the_remaining_steps() {
         let mut points = OpenSets::<()>::new(10);
         for place in 0..7u16 {
             let point = points.insert([f32::from(place), 0.0, 0.0], 0, (), place.into()).unwrap();

@@ -1,37 +1,36 @@
 //! `infer-cpu classify`: the class of each cloud.
 
-use std::fs::File;
-use std::io::{self, BufReader, stdin};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use crate::kernel::KernelName;
-use crate::network::open;
-use crate::sampler::{SamplerKind, SamplerSpec};
-use crate::{Classifier, Options, Precision, UpAxis};
 use anyhow::Context;
+use edgepuck_kernels::KernelName;
 use formats::FormatError;
-use formats::cloud_file::{Cloud, CloudFormat, Unlike, check_sweep, judge_object, read_cloud_as};
+use formats::cloud_file::{Cloud, CloudFormat};
 use formats::model_card::{ModelCard, Normalization};
-use formats::outcome::{joined_causes, say};
+use formats::plausible::{Unlike, check_sweep, judge_object};
+use program::outcome::{joined_causes, say};
 
 use super::default_model::{Kind, Kinds, SCANS};
 use super::input;
 use super::model::ModelArgs;
-use super::names;
 use super::report::Style;
 use super::sampler::SamplerArgs;
 use super::{Outcome, n_threads, of_setup};
+use crate::model::network::open;
+use crate::sampler::{SamplerKind, SamplerSpec};
+use crate::{Classifier, Options, Precision};
 
 /// Flags of `classify`.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
   infer-cpu classify scan.ply more/*.npz
-  infer-cpu classify --sampler cpl --points 64 --precision f16 --threads 4 scan.npz
+  infer-cpu classify --sampler cpl --points 64 --precision i8 --threads 4 scan.npz
   infer-cpu classify --json --drop-invalid scan.pcd
-  producer | infer-cpu classify --format ply -
-  find scans -name '*.npz' | infer-cpu classify --json --files-from -
+  producer | infer-cpu classify --input-format ply -
+  find scans -name '*.npz' -print0 | xargs -0 infer-cpu classify --json
 
 Where no model is named, edge-64 classifies; but scans of gen-dataset, which show an
 object from one side, are for shapes-rotational-64 if it knows all classes of the
@@ -42,29 +41,23 @@ separated by tabs. The class is `unknown` for an object that belongs to no known
 class. With --json, the line is an object with these keys: file, class (a number),
 label, unknown (true, only for such an object; class, label and confidence are then
 those of the most similar class), confidence (0 to 1), logits, points (number of
-valid points), dropped (number of invalid points), outliers (number of points that
-the outlier filter dropped, if any), used (number of points that the network
-processed), clipped (number of activations, with i8), precision (f32 if the chosen
-one overflowed) and ms (time without reading the file). If the file fails, the keys
-are file and error.
+valid points), dropped (number of invalid points), used (number of points that the
+network processed), clipped (number of activations, with i8), precision (f32 if the
+chosen one overflowed) and ms (time without reading the file). If the file fails, the
+keys are file and error.
 After a failure, the program continues with the next file, and exits with 1 at the
 end.
 
 Formats, by file extension: PLY, NPZ, NPY, PCD, XYZ, PTS, CSV, KITTI's .bin, LAS.")]
 pub struct ClassifyArgs {
     /// Files of clouds; `-` reads one cloud from standard input
-    #[arg(value_name = "FILES", required_unless_present = "files_from")]
+    #[arg(value_name = "FILES", required = true)]
     files: Vec<PathBuf>,
-
-    /// Read file names from LIST, one per line; with `-`, from standard input, and print the result
-    /// for each name before reading the next one
-    #[arg(long, value_name = "LIST", conflicts_with = "files")]
-    files_from: Option<PathBuf>,
 
     /// Format of all clouds: ply, npz, npy, pcd, xyz, csv, kitti, nuscenes, las [default: detected
     /// from the file extension, or from the first bytes of standard input]
-    #[arg(long)]
-    format: Option<CloudFormat>,
+    #[arg(long, value_name = "FORMAT")]
+    input_format: Option<CloudFormat>,
 
     /// Print one JSON object per line
     #[arg(long)]
@@ -83,16 +76,12 @@ pub struct ClassifyArgs {
     #[arg(long, value_name = "HOW")]
     normalize: Option<Normalization>,
 
-    /// Drop outliers before the sampler, from clouds of the unit sphere [default: as in training]
-    #[arg(long, value_name = "YES", value_parser = clap::value_parser!(bool))]
-    outlier_filter: Option<bool>,
-
-    /// Precision of the network: f32, f32-fc16, f16 or i8
+    /// Precision of the network: f32 or i8
     #[arg(long, default_value = "f32")]
     precision: Precision,
 
-    /// Kernels to use: scalar, avx2, avx512, neon, neon_f16, neon_dot [default: the fastest that
-    /// this machine supports]
+    /// Kernels to use: scalar, avx2, avx512, neon, neon_dot [default: the fastest that this machine
+    /// supports]
     #[arg(long)]
     kernel: Option<KernelName>,
 
@@ -100,21 +89,7 @@ pub struct ClassifyArgs {
     #[arg(long, value_name = "T", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
 
-    /// Classify K times and average the log-probabilities; requires --sampler random or
-    /// --vote-rotations, because the passes are identical otherwise
-    #[arg(long, value_name = "K", default_value_t = 1)]
-    #[arg(value_parser = clap::value_parser!(u32).range(1..=1000))]
-    votes: u32,
-
-    /// Rotate the cloud about its up axis between votes
-    #[arg(long)]
-    vote_rotations: bool,
-
-    /// Up axis of the clouds, about which --vote-rotations rotates them: x, y or z
-    #[arg(long, default_value = "z", requires = "vote_rotations")]
-    up: UpAxis,
-
-    /// Sampler that chooses the points that the network sees: all, first, random, fps, voxel, cpl
+    /// Sampler that chooses the points that the network sees: all, first, random, fps, cpl
     /// [default: as in training, else all]
     #[arg(long, value_name = "NAME")]
     sampler: Option<SamplerKind>,
@@ -130,26 +105,11 @@ pub fn run(args: &ClassifyArgs) -> anyhow::Result<Outcome> {
     let kinds = (!args.model.is_named()).then(Kinds::new).transpose()?;
     let style = if args.json { Style::Json } else { Style::Text };
     let mut session =
-        Session { args, classifier, kinds, scans: None, told: Vec::new(), style, failed: false };
-    match &args.files_from {
-        Some(list) => {
-            for_each_name(list, |name| session.answer(name, read_cloud_as(name, args.format)))?
-        }
-        None => {
-            for name in &args.files {
-                session.answer(name, input::read(name, args.format))?;
-            }
-        }
+        Session { args, classifier, kinds, scans: None, warned: Vec::new(), style, failed: false };
+    for name in &args.files {
+        session.answer(name, input::read(name, args.input_format))?;
     }
     Ok(if session.failed { Outcome::SomeFailed } else { Outcome::Success })
-}
-
-fn for_each_name(list: &Path, take: impl FnMut(&Path) -> anyhow::Result<()>) -> anyhow::Result<()> {
-    if list.as_os_str() == "-" {
-        return names::for_each(stdin().lock(), take);
-    }
-    let file = File::open(list).with_context(|| list.display().to_string())?;
-    names::for_each(BufReader::new(file), take).with_context(|| list.display().to_string())
 }
 
 impl ClassifyArgs {
@@ -161,11 +121,7 @@ impl ClassifyArgs {
             threads: n_threads(self.threads),
             sampler: Some(self.how.apply(self.sampler, trained)?),
             normalization: self.normalize,
-            outlier_filter: self.outlier_filter,
             drop_invalid: self.drop_invalid,
-            votes: self.votes,
-            vote_rotations: self.vote_rotations,
-            up: self.up,
             ..Options::default()
         };
         Classifier::load(model, &options).map_err(of_setup)
@@ -180,8 +136,8 @@ struct Session<'a> {
     /// one.
     kinds: Option<Kinds>,
     scans: Option<Classifier>,
-    /// The kinds that the user was told of.
-    told: Vec<Kind>,
+    /// The kinds of which the user was warned.
+    warned: Vec<Kind>,
     style: Style,
     failed: bool,
 }
@@ -236,10 +192,10 @@ impl Session<'_> {
 
     /// Tells the user once that a cloud is not what the default model has learnt.
     fn tell(&mut self, name: &Path, kind: Kind) {
-        if kind == Kind::Other || self.told.contains(&kind) {
+        if kind == Kind::Other || self.warned.contains(&kind) {
             return;
         }
-        self.told.push(kind);
+        self.warned.push(kind);
         let name = name.display();
         say(match kind {
             Kind::Unlike(unlike) => format!("warning: {name} {unlike}"),

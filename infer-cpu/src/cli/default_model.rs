@@ -5,11 +5,12 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf, absolute};
 
 use formats::FormatError;
-use formats::cloud_file::{Unlike, is_scan};
+use formats::cloud_file::is_scan;
+use formats::plausible::Unlike;
 use serde::Deserialize;
 
 use crate::ModelCard;
-use crate::network::open;
+use crate::model::network::open;
 
 /// The bundled model of scans, which show an object from one side.
 pub const SCANS: &str = "shapes-rotational-64";

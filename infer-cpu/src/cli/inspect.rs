@@ -63,9 +63,7 @@ fn as_json(path: &Path, summary: &Summary, sampler: &SamplerSpec) -> Value {
         "accuracy": card.accuracy,
         "provenance": card.provenance,
         "normalization": card.normalization.name(),
-        "outlier_filter": card.outlier_filter,
         "unknown_classes": card.unknown_classes,
-        "unknown_energy": card.unknown_energy,
         "temperature": card.temperature,
         "sampler": sampler.kind.name(),
         "points": card.points,
@@ -125,8 +123,7 @@ fn as_text(
     }
     row("normalization", card.normalization.name().to_owned())?;
     let points = card.points.map_or(String::new(), |points| format!(", {points} points"));
-    let filter = if card.outlier_filter { ", after the outlier filter" } else { "" };
-    row("sampler", format!("{}{points}{filter}", sampler.kind))?;
+    row("sampler", format!("{}{points}", sampler.kind))?;
     row("input T-Net", net(summary.stn.as_ref()))?;
     let feature = net(summary.fstn.as_ref());
     match summary.fstn {
@@ -176,13 +173,9 @@ fn classes(summary: &Summary) -> String {
     }
 }
 
-/// The classes and energies that count as unknown, if there are any.
+/// The classes that count as unknown, if there are any.
 fn unknown(card: &ModelCard) -> Option<String> {
-    let classes = card.unknown_classes.join(", ");
-    let energy = card.unknown_energy.map(|most| format!("any energy above {most:.3}"));
-    let parts: Vec<String> =
-        Some(classes).filter(|classes| !classes.is_empty()).into_iter().chain(energy).collect();
-    (!parts.is_empty()).then(|| parts.join("; "))
+    (!card.unknown_classes.is_empty()).then(|| card.unknown_classes.join(", "))
 }
 
 fn macs(summary: &Summary) -> String {

@@ -8,13 +8,12 @@ mod inspect;
 #[cfg(feature = "mcap")]
 mod live;
 mod model;
-mod names;
 mod report;
 mod sample;
 mod sampler;
 
 use clap::Subcommand;
-use formats::outcome::{Outcome, Usage};
+use program::outcome::{Outcome, Usage};
 
 /// A command and its flags.
 #[derive(Subcommand)]
@@ -57,7 +56,6 @@ fn of_setup(error: crate::Error) -> anyhow::Error {
         | Error::KernelPrecision { .. }
         | Error::Sampler(_)
         | Error::FrontMissing { .. }
-        | Error::VotesWithoutDraws(_)
         | Error::TooManyThreads(_)
         | Error::Threads { .. } => Usage(error.to_string()).into(),
         _ => error.into(),

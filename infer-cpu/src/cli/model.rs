@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use formats::model_card::ModelCard;
 
 use super::Usage;
-use crate::network::open;
+use crate::model::network::open;
 
 /// The environment variable that names a model if `--model` does not.
 const VARIABLE: &str = "EDGEPUCK_MODEL";
@@ -18,7 +18,7 @@ const DEFAULT: &str = "edge-64";
 #[derive(clap::Args)]
 pub struct ModelArgs {
     /// Model: edge-64 (whole objects of ModelNet40), set-64 (the same, more accurate and slower),
-    /// shapes-rotational-64 (scans of gen-shapes), street-128 (clusters of streets), or a file in
+    /// shapes-rotational-64 (scans of the built-in shapes), street-128 (clusters of streets), or a file in
     /// safetensors format [default: $EDGEPUCK_MODEL, else edge-64, or street-128 for `live`]
     #[arg(long, value_name = "MODEL")]
     model: Option<PathBuf>,

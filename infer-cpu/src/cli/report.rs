@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use crate::{Precision, Prediction};
-use formats::outcome::say;
+use program::outcome::say;
 use serde::Serialize;
 
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -28,16 +28,9 @@ struct Classified<'a> {
     points: usize,
     used: usize,
     dropped: usize,
-    #[serde(skip_serializing_if = "is_zero")]
-    outliers: usize,
     clipped: u64,
     precision: &'a str,
     ms: f64,
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde calls it")]
-fn is_zero(n: &usize) -> bool {
-    *n == 0
 }
 
 #[derive(Serialize)]
@@ -72,7 +65,6 @@ impl Style {
             points: prediction.n_points,
             used: prediction.n_used,
             dropped: prediction.n_dropped,
-            outliers: prediction.n_outliers,
             clipped: prediction.n_clipped,
             precision: prediction.precision.name(),
             ms: time.as_secs_f64() * 1e3,
@@ -97,12 +89,6 @@ fn warn(name: &Path, prediction: &Prediction, precision: Precision) {
         0 => {}
         1 => warn("1 point that is not finite was dropped"),
         n => warn(&format!("{n} points that are not finite were dropped")),
-    }
-    if prediction.precision != precision {
-        let used = prediction.precision;
-        warn(&format!(
-            "{precision} overflows on this cloud, which was classified in {used} instead"
-        ));
     }
     if prediction.n_clipped > 0 {
         let n = prediction.n_clipped;

@@ -7,8 +7,8 @@ use crate::sampler::{SamplerKind, SamplerSpec};
 use crate::{Classifier, Options};
 use anyhow::Context;
 use formats::cloud_file::{Cloud, CloudFormat, write_cloud};
-use formats::outcome::say;
-use formats::outputs::Overwrite;
+use program::outcome::say;
+use program::outputs::Overwrite;
 
 use super::input;
 use super::model::ModelArgs;
@@ -20,14 +20,14 @@ use super::{Outcome, of_setup};
 #[command(after_help = "\
 Examples:
   infer-cpu sample --sampler fps --points 128 in.ply out.ply
-  infer-cpu sample --sampler voxel --voxel-size 0.05 in.las thinned.npz
+  infer-cpu sample --sampler random --points 4096 in.las thinned.npz
   infer-cpu sample --sampler cpl --points 64 --model model.safetensors in.npz out.xyz
 
 The output holds the chosen points with the coordinates of the input. cpl
 normalizes the cloud as in training before it chooses points. The extension of the
-output file determines its format: PLY, NPZ, NPY, PCD, XYZ, CSV, .bin, LAS.")]
+output file determines its format: PLY, NPZ, NPY, PCD, XYZ or CSV.")]
 pub struct SampleArgs {
-    /// Sampler that chooses the points: all, first, random, fps, voxel, cpl
+    /// Sampler that chooses the points: all, first, random, fps, cpl
     #[arg(long, value_name = "NAME")]
     sampler: SamplerKind,
 
@@ -40,8 +40,8 @@ pub struct SampleArgs {
 
     /// Format of the input: ply, npz, npy, pcd, xyz, csv, kitti, nuscenes, las [default: detected
     /// from the file extension, or from the first bytes of standard input]
-    #[arg(long)]
-    format: Option<CloudFormat>,
+    #[arg(long, value_name = "FORMAT")]
+    input_format: Option<CloudFormat>,
 
     #[command(flatten)]
     model: ModelArgs,
@@ -58,13 +58,9 @@ pub struct SampleArgs {
 
 pub fn run(args: &SampleArgs) -> anyhow::Result<Outcome> {
     // An unknown extension fails before a long computation.
-    let format = CloudFormat::of_path(&args.output)?;
+    CloudFormat::of_output(&args.output)?;
     args.overwrite.check([&*args.output])?;
-    let Cloud { mut points, intensities, .. } = input::read(&args.input, args.format)?;
-    if format == CloudFormat::Kitti && intensities.is_some() {
-        let name = args.output.display();
-        say(format!("warning: {name}: the intensities are 0: only coordinates are written"));
-    }
+    let Cloud { mut points, .. } = input::read(&args.input, args.input_format)?;
     if args.drop_invalid {
         let n = points.len();
         points.retain(|point| point.iter().all(|x| x.is_finite()));

@@ -19,11 +19,6 @@ pub struct SamplerArgs {
     #[arg(long, value_name = "WHERE")]
     fps_start: Option<FpsStart>,
 
-    /// Edge length of a voxel, instead of --points; `sample` takes it in the unit of the cloud,
-    /// `classify` in the unit of the normalized cloud
-    #[arg(long, value_name = "LENGTH", conflicts_with = "points")]
-    voxel_size: Option<f64>,
-
     /// Layers whose features cpl pools: `own` is the model's own front end, `stn` the trunk of its
     /// input T-Net, `trunk` its trunk, and `auto` the first of these that the model has [default:
     /// auto]
@@ -45,17 +40,15 @@ impl SamplerArgs {
             points: self.points.unwrap_or(trained.points),
             seed: self.seed.unwrap_or(trained.seed),
             fps_start: self.fps_start.unwrap_or(trained.fps_start),
-            voxel_size: self.voxel_size.or(trained.voxel_size),
             front: self.front.unwrap_or(trained.front),
         })
     }
 
     fn check_flags(&self, kind: SamplerKind) -> Result<(), Usage> {
-        use SamplerKind::{Cpl, First, Fps, Random, Voxel};
-        let flags: [(_, _, &[SamplerKind]); 4] = [
-            ("--points", self.points.is_some(), &[First, Random, Fps, Voxel, Cpl]),
+        use SamplerKind::{Cpl, First, Fps, Random};
+        let flags: [(_, _, &[SamplerKind]); 3] = [
+            ("--points", self.points.is_some(), &[First, Random, Fps, Cpl]),
             ("--fps-start", self.fps_start.is_some(), &[Fps]),
-            ("--voxel-size", self.voxel_size.is_some(), &[Voxel]),
             ("--front", self.front.is_some(), &[Cpl]),
         ];
         match flags.iter().find(|(_, is_given, kinds)| *is_given && !kinds.contains(&kind)) {
@@ -76,7 +69,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn flags_replace_what_the_model_was_trained_behind_and_leave_the_rest() {
+    fn flags_replace_parts_of_the_trained_sampler() {
         let trained = SamplerSpec {
             kind: SamplerKind::Fps,
             points: 64,
@@ -93,12 +86,12 @@ mod tests {
     }
 
     #[test]
-    fn a_flag_that_says_nothing_to_the_sampler_is_an_error() {
+    fn flags_of_other_samplers_are_refused() {
         let points = SamplerArgs { points: Some(32), ..SamplerArgs::default() };
         let error = points.apply(None, SamplerSpec::default()).unwrap_err().to_string();
         assert_eq!(
             error,
-            "--points does not apply to the sampler all; it applies to first, random, fps, voxel, cpl"
+            "--points does not apply to the sampler all; it applies to first, random, fps, cpl"
         );
         let front = SamplerArgs { front: Some(FrontChoice::Own), ..SamplerArgs::default() };
         assert!(front.apply(Some(SamplerKind::Fps), SamplerSpec::default()).is_err());

@@ -2,16 +2,16 @@
 
 use std::sync::atomic::Ordering;
 
+use edgepuck_kernels::{
+    Best, EdgeScratch, Format, Kernels, PrefilterLevels, PrefilterScratch, Rows, Weight,
+};
+
 use super::{
     Block, Engine, GROUP, Group, Head, Pass, Run, Task, ThreadScratch, VECTOR_BLOCK, VECTOR_CHUNK,
 };
 use super::{lock, read, write};
-use crate::edge_conv::EdgeScratch;
-use crate::kernel::{Kernels, Rows};
-use crate::layers::Packed;
-use crate::precision::{F16_LARGEST, Format, Weight};
-use crate::prefilter::{Best, Levels, PrefilterScratch};
-use crate::team::Work;
+use crate::engine::team::Work;
+use crate::model::layers::Packed;
 
 impl<T: Format> Work for Engine<T> {
     fn chunk(&self, thread: usize, chunk: usize) {
@@ -52,7 +52,7 @@ impl<T: Format> Engine<T> {
         }
         let mut layers = self.route(pass, &feature, &folded);
         let mut next = layers.next();
-        self.round(&wide[..n * width], first.range, next, from);
+        self.round(&wide[..n * width], first.range, from);
         while let Some(layer) = next {
             next = layers.next();
             // The last layer is pooled by `pool_group`, never stored.
@@ -66,7 +66,7 @@ impl<T: Format> Engine<T> {
             if self.observing {
                 layer.seen.observe(&wide[..n * width]);
             }
-            self.round(&wide[..n * width], layer.range, next, to);
+            self.round(&wide[..n * width], layer.range, to);
             std::mem::swap(from, to);
         }
         let last = self.last(pass, &feature, &folded);
@@ -95,24 +95,12 @@ impl<T: Format> Engine<T> {
         Rows::new(edged, stride, rows.n())
     }
 
-    /// Rounds a layer's outputs to the input format of the layer `next`, and records range events.
-    pub(super) fn round(
-        &self,
-        wide: &[f32],
-        range: f32,
-        next: Option<&Packed<T>>,
-        out: &mut [T::Activation],
-    ) {
-        let met = T::narrow(self.kernels, wide, range, &mut out[..wide.len()]);
-        if met.clipped > 0 {
+    /// Rounds a layer's outputs to the input format of the next layer, and counts clipped values.
+    pub(super) fn round(&self, wide: &[f32], range: f32, out: &mut [T::Activation]) {
+        let clipped = T::narrow(self.kernels, wide, range, &mut out[..wide.len()]);
+        if clipped > 0 {
             // Relaxed suffices: `Team::run` synchronises before `events` reads the counters.
-            self.clipped.fetch_add(met.clipped, Ordering::Relaxed);
-        }
-        // `largest * gain` bounds every partial sum of the next layer, which fp16 kernels
-        // accumulate in fp16.
-        let gain = next.map_or(1.0, |layer| layer.gain.max(1.0));
-        if met.largest * gain > F16_LARGEST {
-            self.overflow.store(true, Ordering::Relaxed);
+            self.clipped.fetch_add(clipped, Ordering::Relaxed);
         }
     }
 
@@ -169,7 +157,7 @@ impl<T: Format> Engine<T> {
         let blocks = first..columns.n_panels().min(first + VECTOR_CHUNK);
         let mut out = lock(&self.vector_out[chunk]);
         let out = &mut out[..blocks.len() * VECTOR_BLOCK];
-        T::Stored::gemv(self.kernels)(&read(&self.vector), columns, blocks, out);
+        T::Weight::gemv(self.kernels)(&read(&self.vector), columns, blocks, out);
     }
 }
 
@@ -204,7 +192,7 @@ impl<S: Copy> Group<S> {
         &mut self,
         kernels: &Kernels,
         (last, group): (&Packed<T>, usize),
-        (rows, levels): (&Rows<'_, T::Activation>, &Levels),
+        (rows, levels): (&Rows<'_, T::Activation>, &PrefilterLevels),
         prefilter_scratch: &mut PrefilterScratch,
         first_row: usize,
     ) -> bool {

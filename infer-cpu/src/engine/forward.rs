@@ -3,14 +3,15 @@
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
+use edgepuck_kernels::{Format, Panels, Rows, Sum};
+
 use super::{
     Engine, GROUP, Head, Interleave, Pass, RUN_BLOCKS, RangeEvents, Run, SMALL_VECTOR, Task,
     VECTOR_BLOCK, VECTOR_CHUNK, block_points, lock, read, write,
 };
-use crate::kernel::{Panels, Rows, Sum};
-use crate::layers::Conv;
-use crate::precision::{Format, Matrix};
-use crate::team::{Team, Work};
+use crate::engine::team::{Team, Work};
+use crate::model::layers::Conv;
+use crate::model::layers::Matrix;
 
 /// Whether it takes fewer products to multiply the feature transform into the layer after it, for
 /// `n` points and a layer with this number of `outputs`.
@@ -289,7 +290,6 @@ impl<T: Format> Engine<T> {
         out: &mut [f32],
         stride: usize,
     ) {
-        let gemm = self.kernels.f32.as_ref().expect("invariant: every set has fp32 products");
-        (gemm.rows)(rows, panels, 0..panels.n_panels(), out, stride);
+        (self.kernels.f32.rows)(rows, panels, 0..panels.n_panels(), out, stride);
     }
 }

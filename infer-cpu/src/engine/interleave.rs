@@ -2,7 +2,7 @@
 //!
 //! Callers sort the points, so that a block would cover only one corner of the cloud. With steps of
 //! a golden section of the cloud, every block is a sample of the whole. The first blocks then come
-//! close to the largest products, which leaves less for the [`crate::prefilter`] to compute.
+//! close to the largest products, which leaves less for the prefilter to compute.
 
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Interleave {

@@ -13,18 +13,20 @@
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 
-use crate::edge_conv::{EdgeConv, EdgeScratch, LANES, Lanes, Neighborhood};
-use crate::kernel::{GEMV_NR, Kernels, Panels};
-use crate::layers::{Conv, Layers, Packed, Vector};
-use crate::precision::Format;
-pub use crate::prefilter::GROUP;
-use crate::prefilter::{Levels, PrefilterScratch};
+pub use edgepuck_kernels::GROUP;
+use edgepuck_kernels::{
+    EdgeConv, EdgeScratch, Format, GEMV_NR, Kernels, LANES, Lanes, Neighborhood, Panels,
+    PrefilterLevels, PrefilterScratch,
+};
+
+use crate::model::layers::{Conv, Layers, Packed, Vector};
 
 mod chunks;
 mod forward;
 mod interleave;
 mod route;
 mod sets;
+pub mod team;
 
 pub use forward::{Forward, Input, Scratch, folding_pays};
 use interleave::Interleave;
@@ -129,7 +131,7 @@ pub struct Engine<T: Format> {
 struct Block<T: Format> {
     features: Vec<T::Activation>,
     /// The features in levels, if `has_levels`.
-    levels: Levels,
+    levels: PrefilterLevels,
     has_levels: bool,
 }
 
@@ -158,7 +160,7 @@ struct ThreadScratch<T: Format> {
 pub struct RangeEvents {
     /// Activations above their calibrated range, which were clipped.
     pub clipped: u64,
-    /// Whether a sum or an activation may have left the range of fp16.
+    /// Whether a transform is not finite.
     pub overflow: bool,
 }
 
@@ -217,7 +219,7 @@ impl<T: Format> Engine<T> {
             // Blocks outlive a task: one thread computes a block, and all threads pool it.
             RwLock::new(Block {
                 features: vec![T::Activation::default(); BLOCK * hidden],
-                levels: Levels::with_room(if prefilters { BLOCK * hidden } else { 0 }),
+                levels: PrefilterLevels::with_room(if prefilters { BLOCK * hidden } else { 0 }),
                 has_levels: false,
             })
         };

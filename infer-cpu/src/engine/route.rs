@@ -2,10 +2,11 @@
 
 use std::sync::atomic::Ordering;
 
+use edgepuck_kernels::Format;
+
 use super::{Engine, Pass, read};
-use crate::layers::{Conv, First, Layers, Packed, Vector};
-use crate::network::{Network, TNet};
-use crate::precision::Format;
+use crate::model::layers::{Conv, First, Layers, Packed, Vector};
+use crate::model::network::{Network, TNet};
 
 /// The point-wise layers of a T-Net, if there is one.
 fn convs<T: Format>(net: &Option<TNet<Conv<T>, Vector<T>>>) -> &[Conv<T>] {

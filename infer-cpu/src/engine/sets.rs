@@ -4,18 +4,18 @@
 
 use std::sync::{Mutex, RwLock};
 
+use edgepuck_kernels::{
+    Format, Kernels, LANES, Lanes, NeighborPool, Neighborhood, PoolStep, Rows, TILE,
+};
+
 use super::chunks::block_rows;
 use super::{
     Engine, RUN_BLOCKS, Run, Scratch, Task, ThreadScratch, block_points, lock, read, write,
 };
-use crate::edge_conv::{LANES, Lanes, Neighborhood, TILE};
-use crate::kernel::{Kernels, Rows};
-use crate::layers::{Conv, Layers};
-use crate::network::SetAbstraction;
-use crate::precision::Format;
+use crate::engine::team::Team;
+use crate::model::layers::{Conv, Layers};
+use crate::model::network::SetAbstraction;
 use crate::sampler::{FarthestPoints, FpsStart};
-use crate::set_abstraction::{NeighborPool, PoolStep};
-use crate::team::Team;
 
 /// The working memory of all levels; empty for other networks.
 #[derive(Default)]
@@ -109,7 +109,7 @@ impl PoolInput {
             let begin = number * TILE;
             let points = first.max(begin)..last.min(begin + TILE);
             let features = &rows.data()[(points.start - first) * rows.stride()..];
-            kernels.pool(
+            (kernels.pool_neighbors)(
                 &self.pool,
                 PoolStep::Lift {
                     features: (features, rows.stride()),
@@ -134,15 +134,12 @@ impl PoolInput {
         maxima.fill([f32::NEG_INFINITY; LANES]);
         for (tile, products) in cloud.tiles().zip(tiles.iter()) {
             let (products, maxima) = (&read(products)[..], &mut *maxima);
-            kernels.pool(&self.pool, PoolStep::Raise { tile, products, centres, maxima });
+            (kernels.pool_neighbors)(
+                &self.pool,
+                PoolStep::Raise { tile, products, centres, maxima },
+            );
         }
-        kernels.pool(&self.pool, PoolStep::Finish { centres, maxima, out });
-    }
-}
-
-impl Kernels {
-    fn pool(&self, pool: &NeighborPool, step: PoolStep<'_>) {
-        (self.pool_neighbors)(pool, step);
+        (kernels.pool_neighbors)(&self.pool, PoolStep::Finish { centres, maxima, out });
     }
 }
 
@@ -200,7 +197,7 @@ impl<T: Format> Engine<T> {
             if self.observing {
                 seen.observe(&wide[..n * width]);
             }
-            self.round(&wide[..n * width], range, Some(layer), narrow);
+            self.round(&wide[..n * width], range, narrow);
             let gemm = T::gemm(self.kernels).expect("invariant: kernels fit the format");
             let rows = Rows::new(narrow, width, n);
             width = layer.width();

@@ -23,8 +23,8 @@ pub struct Observation<'a> {
     pub yaw_rad: f64,
     /// The position of the sensor, metres.
     pub sensor_m: [f64; 2],
-    /// The log-probability of each class, and the energy, if it was classified.
-    pub view: Option<(&'a [f64], f64)>,
+    /// The log-probability of each class, if it was classified.
+    pub view: Option<&'a [f64]>,
     /// The usual length of what it is recognised as by itself, metres.
     pub usual_length_m: Option<f32>,
 }

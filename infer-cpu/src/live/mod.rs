@@ -23,27 +23,32 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod arrival;
 mod counts;
-mod ego_motion;
 mod footprint;
 mod kalman;
 mod object;
 mod object_classifier;
+mod options;
 mod packet_clock;
 mod pipeline;
 #[cfg(feature = "mcap")]
 mod recorder;
+mod report;
 mod sensor;
+mod sensor_stream;
 mod stats;
 mod timeline;
 mod tracker;
 mod waiting;
 mod whole;
 
+pub use arrival::Arrival;
 pub use counts::Counts;
-pub use ego_motion::{EgoMotion, Pose};
-pub use object::{Object, PlacedBox, SCHEMA_VERSION};
-pub use pipeline::{Arrival, Decoded, LiveError, LiveOptions, Pipeline};
+pub use formats::geometry::{OrientedBox, Pose, Trajectory};
+pub use object::{Object, SCHEMA_VERSION};
+pub use options::{LiveError, LiveOptions};
+pub use pipeline::{Decoded, Pipeline};
 #[cfg(feature = "mcap")]
 pub use recorder::{RecordError, Recorder};
 pub use sensor::Flaw;

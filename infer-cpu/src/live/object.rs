@@ -1,5 +1,6 @@
 use std::sync::Arc;
 
+use formats::geometry::OrientedBox;
 use serde::{Serialize, Serializer};
 
 /// The version of the JSON form of [`Object`]. Removing a field or changing its meaning raises it;
@@ -61,24 +62,11 @@ pub struct Object {
     #[serde(serialize_with = "rounded")]
     pub latency_ms: Option<f64>,
     /// The box of the whole object: its near side is that of this cluster, and its size and direction
-    /// are from all clusters of the track. `None` if the class has no usual size.
-    pub whole_box: Option<PlacedBox>,
-}
-
-/// A box with a level base in the frame of an object.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-#[non_exhaustive]
-pub struct PlacedBox {
-    /// Its middle, metres.
-    #[serde(serialize_with = "rounded")]
-    pub centre_m: [f64; 3],
-    /// Length, width and height, metres.
-    #[serde(serialize_with = "rounded")]
-    pub size_m: [f64; 3],
-    /// The direction of the length, degrees counterclockwise from x, -180 to 180; that of the front once
-    /// the object has moved, if the motion of the sensor is known.
-    #[serde(serialize_with = "rounded")]
-    pub yaw_deg: f64,
+    /// are from all clusters of the track. `None` if the class has no usual size. Its direction is in
+    /// -pi..=pi: that of the front once the object has moved, if the motion of the sensor is known. In
+    /// JSON it has `centre_m`, `size_m` and `yaw_deg`.
+    #[serde(serialize_with = "box_in_degrees")]
+    pub whole_box: Option<OrientedBox>,
 }
 
 /// Numbers that are written in thousandths, such as millimetres: the noise of a sensor is ten times
@@ -111,4 +99,22 @@ fn rounded<T: Thousandths, S: Serializer>(x: &T, serializer: S) -> Result<S::Ok,
 
 fn name<S: Serializer>(name: &Option<Arc<str>>, serializer: S) -> Result<S::Ok, S::Error> {
     name.as_deref().serialize(serializer)
+}
+
+fn box_in_degrees<S: Serializer>(
+    of: &Option<OrientedBox>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    struct Written {
+        centre_m: [f64; 3],
+        size_m: [f64; 3],
+        yaw_deg: f64,
+    }
+    let written = of.map(|OrientedBox { centre_m, size_m, yaw_rad }| Written {
+        centre_m: centre_m.thousandths(),
+        size_m: size_m.thousandths(),
+        yaw_deg: yaw_rad.to_degrees().thousandths(),
+    });
+    written.serialize(serializer)
 }

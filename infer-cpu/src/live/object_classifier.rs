@@ -6,26 +6,26 @@ use std::sync::Arc;
 use edgepuck_segment::BestCut;
 
 use super::waiting::{Node, Tag, USUAL_NODES, Waiting};
-use crate::classifier::Classifier;
-use crate::classifier_team::ClassifierTeam;
+use crate::classify::classifier::Classifier;
+use crate::classify::prediction::{UNKNOWN, unknown_classes};
+use crate::classify::usual_size::usual_size_m;
+use crate::detect::MARGIN_OF_WHOLES;
+use crate::detect::cluster_classifier::ClusterClassifier;
 use crate::error::Error;
-use crate::prediction::{UNKNOWN, UnknownRule};
-use crate::rule::{MARGIN_OF_WHOLES, Rule};
-use crate::usual_size::usual_size_m;
 
 /// Classifies trees of clusters, chooses the best cut, and names tracks.
 pub struct ObjectClassifier {
-    team: ClassifierTeam,
+    clusters: ClusterClassifier,
     /// The names of the network's classes.
     pub classes: Vec<Arc<str>>,
-    unknown: UnknownRule,
+    /// For each class, whether its objects are unknown.
+    is_unknown: Vec<bool>,
     unknown_name: Arc<str>,
-    rule: Rule,
     best: BestCut,
     /// The log-probabilities of all classes for each classified node.
     log_probabilities: Vec<f64>,
-    /// For each node, where those are, and the energy.
-    views: Vec<Option<(Range<usize>, f64)>>,
+    /// For each node, where those are.
+    views: Vec<Option<Range<usize>>>,
     worths: Vec<f64>,
     is_known: Vec<bool>,
     /// The nodes of the best cut, in the order in which the beams passed them.
@@ -42,7 +42,10 @@ pub struct Chosen {
 /// The class and probability of a track.
 pub struct Fused {
     pub class: usize,
+    /// The name of the class, or `unknown`.
     pub answer: Arc<str>,
+    /// The name of the class, even if the track is unknown.
+    pub resembles: Arc<str>,
     pub probability: f64,
 }
 
@@ -52,10 +55,9 @@ impl ObjectClassifier {
         let n_classes = classifier.classes().len();
         Ok(Self {
             classes: classifier.classes().to_vec(),
-            unknown: UnknownRule::new(classifier.card(), classifier.classes()),
+            is_unknown: unknown_classes(classifier.card(), classifier.classes()),
             unknown_name: UNKNOWN.into(),
-            rule: Rule::new(&classifier),
-            team: ClassifierTeam::new(classifier)?,
+            clusters: ClusterClassifier::new(classifier)?,
             best: BestCut::with_capacity(USUAL_NODES),
             log_probabilities: Vec::with_capacity(USUAL_NODES * n_classes),
             views: Vec::with_capacity(USUAL_NODES),
@@ -67,8 +69,7 @@ impl ObjectClassifier {
 
     /// Classifies the nodes that have enough points, and chooses the best cut.
     pub fn classify(&mut self, waiting: &Waiting, min_points: usize) {
-        let Self { team, rule, best, log_probabilities, views, worths, is_known, chosen, .. } =
-            self;
+        let Self { clusters, best, log_probabilities, views, worths, is_known, chosen, .. } = self;
         let nodes = &waiting.nodes;
         log_probabilities.clear();
         views.clear();
@@ -87,18 +88,18 @@ impl ObjectClassifier {
             let Node { points, ground_z_m, .. } = &nodes[node];
             (&waiting.points[points.clone()], *ground_z_m)
         });
-        team.classify_many(clouds, |answer| {
+        clusters.classify(clouds, |worth, answer| {
             let Some(node) = asked.next() else { return };
+            worths[node] = worth;
             // A cluster has no view if the network overflows on it.
             let answer = answer.ok();
-            worths[node] = rule.worth(nodes[node].points.len(), answer);
             is_known[node] = answer.is_some_and(|answer| !answer.is_unknown);
             views[node] = answer.map(|answer| {
                 let start = log_probabilities.len();
                 let n_classes = answer.logits.len();
                 let all = (0..n_classes).map(|class| answer.log_probability(class));
                 log_probabilities.extend(all);
-                (start..start + n_classes, answer.energy)
+                start..start + n_classes
             });
         });
         chosen.clear();
@@ -116,28 +117,27 @@ impl ObjectClassifier {
         });
     }
 
-    /// The log-probabilities of all classes for a node, and the energy, if it was classified.
-    pub fn view(&self, node: usize) -> Option<(&[f64], f64)> {
-        let (range, energy) = self.views[node].as_ref()?;
-        Some((&self.log_probabilities[range.clone()], *energy))
+    /// The log-probabilities of all classes for a node, if it was classified.
+    pub fn view(&self, node: usize) -> Option<&[f64]> {
+        self.views[node].clone().map(|range| &self.log_probabilities[range])
     }
 
     /// The usual length and width of what a node is recognised as by itself, metres.
     pub fn usual_size_m(&self, node: usize) -> Option<[f32; 2]> {
-        let (view, _) = self.view(node).filter(|_| self.is_known[node])?;
+        let view = self.view(node).filter(|_| self.is_known[node])?;
         let (class, _) = view.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
         usual_size_m(&self.classes[class])
     }
 
-    /// The class of a track with these mean log-probabilities and this mean energy; `None` without
-    /// a view.
-    pub fn fused(&self, means: &[f64], energy: f64) -> Option<Fused> {
+    /// The class of a track with these mean log-probabilities; `None` without a view.
+    pub fn fused(&self, means: &[f64]) -> Option<Fused> {
         let (class, largest) = means.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
         let sum: f64 = means.iter().map(|mean| libm::exp(mean - largest)).sum();
-        let answer = match self.unknown.holds(class, energy) {
+        let answer = match self.is_unknown[class] {
             true => Arc::clone(&self.unknown_name),
             false => Arc::clone(&self.classes[class]),
         };
-        Some(Fused { class, answer, probability: 1.0 / sum })
+        let resembles = Arc::clone(&self.classes[class]);
+        Some(Fused { class, answer, resembles, probability: 1.0 / sum })
     }
 }

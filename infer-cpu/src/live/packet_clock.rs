@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn missing_late_and_repeated_packets_are_told_apart() {
+    fn missing_late_and_repeated_packets_are_distinguished() {
         let mut clock = PacketClock::new(Some(HOUR_US), false);
         let mut take = |stamp: f64| clock.take(stamp, 600.0, 50.0 + stamp * 1e-6).0;
         assert_eq!(take(1000.0), Succession::First);

@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 
 use edgepuck_ros_messages as ros;
 use edgepuck_ros_messages::{Message, Time};
+use formats::geometry::Pose;
 use mcap::records::MessageHeader;
 use mcap::{McapError, WriteOptions, Writer};
 
-use super::ego_motion::Pose;
 use super::object::Object;
 use super::pipeline::{Decoded, Pipeline};
 
@@ -255,11 +255,7 @@ fn message_object(object: &Object) -> ros::Object {
         size_m: object.size_m,
         yaw_deg: object.yaw_deg,
         last_s: object.last_s,
-        whole_box: object.whole_box.map(|whole| ros::WholeBox {
-            centre_m: whole.centre_m,
-            size_m: whole.size_m,
-            yaw_deg: whole.yaw_deg,
-        }),
+        whole_box: object.whole_box,
     }
 }
 
@@ -299,7 +295,7 @@ fn still() -> ros::Transform {
 fn placed(pose: &Pose) -> ros::Transform {
     let [x, y, z] = pose.position_m.to_array();
     let translation = ros::Vector3 { x, y, z };
-    let [x, y, z, w] = pose.world_from_sensor.to_array();
+    let [x, y, z, w] = pose.rotation.to_array();
     ros::Transform { translation, rotation: ros::Quaternion { x, y, z, w } }
 }
 
@@ -308,11 +304,11 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::live::{PlacedBox, SCHEMA_VERSION};
+    use crate::live::{OrientedBox, SCHEMA_VERSION};
 
     /// REP 103: no rotation is the quaternion 0, 0, 0, 1. The quaternion 0, 0, 0, 0 is invalid.
     #[test]
-    fn what_stands_still_is_not_turned() {
+    fn static_objects_are_not_rotated() {
         let ros::Transform { translation, rotation } = still();
         assert_eq!([translation.x, translation.y, translation.z], [0.0; 3]);
         assert_eq!([rotation.x, rotation.y, rotation.z, rotation.w], [0.0, 0.0, 0.0, 1.0]);
@@ -340,10 +336,10 @@ mod tests {
             first_s: 1.7e9,
             last_s: 1.7e9 + 0.25,
             latency_ms: None,
-            whole_box: Some(PlacedBox {
+            whole_box: Some(OrientedBox {
                 centre_m: [1.25, -2.5, 0.25],
                 size_m: [4.5, 1.875, 1.625],
-                yaw_deg: 167.5,
+                yaw_rad: 167.5f64.to_radians(),
             }),
         };
         for class in [object.class.clone(), None] {

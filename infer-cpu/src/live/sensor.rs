@@ -6,7 +6,7 @@ use formats::packets::PacketError;
 pub use formats::packets::{Decoder, Facts};
 use formats::velodyne;
 
-/// Why a payload is not the sensor's data, or its time is doubtful.
+/// Why a payload is not the sensor's data, or its time is implausible.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Flaw {

@@ -1,7 +1,8 @@
 use formats::returns::Return;
 
+use super::arrival::Arrival;
+use super::options::LiveOptions;
 use super::packet_clock::{PacketClock, Succession};
-use super::pipeline::{Arrival, LiveOptions};
 use super::sensor::Decoder;
 
 /// The times at which the packets of one sensor were sent, as a

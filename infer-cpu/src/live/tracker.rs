@@ -49,8 +49,6 @@ pub struct Track {
     n_whole: u64,
     /// Weighted means of the log-probabilities over all views; empty without a view.
     pub log_probabilities: Vec<f64>,
-    /// The weighted mean of the energy.
-    pub energy: f64,
     n_views: u64,
 }
 
@@ -146,14 +144,13 @@ impl Track {
         (self.last_s, self.last_whole_s) = (seen.time_s, seen.time_s);
         self.n_seen += 1;
         self.n_whole += 1;
-        let Some((log_probabilities, energy)) = seen.view else { return };
+        let Some(log_probabilities) = seen.view else { return };
         self.n_views += 1;
         self.log_probabilities.resize(log_probabilities.len(), 0.0);
         let weight = (1.0 / self.n_views as f64).max(LEAST_WEIGHT);
         for (mean, new) in self.log_probabilities.iter_mut().zip(log_probabilities) {
             *mean += weight * (new - *mean);
         }
-        self.energy += weight * (energy - self.energy);
     }
 }
 
@@ -220,7 +217,7 @@ impl Tracker {
         let is_short = seen.usual_length_m.is_some_and(|length_m| length_m < SHORT_M);
         let holds = |track: &Track| {
             let is_older = track.n_seen > n_seen && seen.time_s - track.last_whole_s <= PATIENCE_S;
-            let is_another = is_short && track.whole.placed().size_m[0] > f64::from(SHORT_M);
+            let is_another = is_short && track.whole.place.size_m[0] > f64::from(SHORT_M);
             let is_known = track.axes.is_some() && is_older && !is_another;
             is_known && track.whole.holds(seen.position_m, seen.size_m[0], track.way_m(seen.time_s))
         };
@@ -255,8 +252,9 @@ fn off_m(seen: &Observation<'_>) -> f64 {
 mod tests {
     use std::f64::consts::FRAC_PI_2;
 
+    use formats::geometry::OrientedBox;
+
     use super::*;
-    use crate::live::PlacedBox;
 
     fn seen(time_s: f64, x: f64, y: f64) -> Observation<'static> {
         Observation {
@@ -286,15 +284,16 @@ mod tests {
     /// A car of 4 m, of which only a door is seen in the second turn, at first; a person who leans on it,
     /// and something beside it.
     #[test]
-    fn a_piece_of_a_car_is_of_its_track_and_nothing_is_seen_twice_in_a_turn() {
+    fn a_piece_of_a_car_joins_its_track() {
         let mut tracker = Tracker::new(2);
-        let whole = PlacedBox { centre_m: [10.0, 0.0, 0.0], size_m: [4.0, 1.6, 1.5], yaw_deg: 0.0 };
+        let whole =
+            OrientedBox { centre_m: [10.0, 0.0, 0.0], size_m: [4.0, 1.6, 1.5], yaw_rad: 0.0 };
         let car = Observation { size_m: [4.0, 1.6], ..seen(0.0, 10.0, 0.0) };
         let track = tracker.observe(&car).unwrap();
         track.whole.fuse(0, &whole, [0.0; 2], None);
         let door = Observation { size_m: [0.9, 0.1], ..seen(0.1, 11.9, -0.7) };
         let track = tracker.observe(&door).unwrap();
-        assert!(track.id == 1 && track.is_piece && track.whole.placed() == whole);
+        assert!(track.id == 1 && track.is_piece && track.whole.place == whole);
         assert_eq!(track.velocity_m_s(), None);
         assert!(tracker.observe(&Observation { time_s: 0.1, ..car }).is_none());
         let person = Observation { usual_length_m: Some(0.8), ..seen(0.1, 11.0, 0.7) };
@@ -311,7 +310,7 @@ mod tests {
     #[test]
     fn the_box_of_an_object_goes_on_while_pieces_are_seen() {
         let mut tracker = Tracker::new(2);
-        let whole = |x, size_m| PlacedBox { centre_m: [x, 0.0, 0.0], size_m, yaw_deg: 0.0 };
+        let whole = |x, size_m| OrientedBox { centre_m: [x, 0.0, 0.0], size_m, yaw_rad: 0.0 };
         for t in [0.0, 0.1, 0.2] {
             let car = Observation { size_m: [4.0, 1.6], ..seen(t, 10.0 + 8.0 * t, 0.0) };
             let track = tracker.observe(&car).unwrap();
@@ -323,7 +322,7 @@ mod tests {
         let track = tracker.observe(&door).unwrap();
         let [vx, ..] = track.velocity_m_s().unwrap();
         assert!(track.id == 1 && track.is_piece && (vx - 8.0).abs() < 1.0, "{vx} m/s");
-        assert!((track.whole.placed().centre_m[0] - (11.6 + 0.1 * vx)).abs() < 1e-9);
+        assert!((track.whole.place.centre_m[0] - (11.6 + 0.1 * vx)).abs() < 1e-9);
     }
 
     #[test]
@@ -366,18 +365,17 @@ mod tests {
         let views = [[-2.0, -0.2], [-0.1, -3.0], [-0.1, -3.0]];
         let means = views.iter().enumerate().map(|(turn, view)| {
             let time_s = turn as f64 * 0.1;
-            let seen = Observation { view: Some((view, turn as f64)), ..seen(time_s, 1.0, 0.0) };
-            let track = tracker.observe(&seen).unwrap();
-            (track.log_probabilities.clone(), track.energy)
+            let seen = Observation { view: Some(view), ..seen(time_s, 1.0, 0.0) };
+            tracker.observe(&seen).unwrap().log_probabilities.clone()
         });
         let means: Vec<_> = means.collect();
-        assert_eq!(means[0], (vec![-2.0, -0.2], 0.0));
-        assert!((means[2].0[0] - -2.2 / 3.0).abs() < 1e-12 && (means[2].1 - 1.0).abs() < 1e-12);
+        assert_eq!(means[0], [-2.0, -0.2]);
+        assert!((means[2][0] - -2.2 / 3.0).abs() < 1e-12);
     }
 
     /// A parked car shows first a corner, then its side and then its rear.
     #[test]
-    fn what_is_hidden_of_a_car_moves_it_nowhere() {
+    fn an_occluded_part_of_a_car_does_not_move_it() {
         let mut tracker = Tracker::new(2);
         let views = [
             ([8.0, -5.0], [4.2, 1.8], 0.0),
@@ -406,14 +404,12 @@ mod tests {
     }
 
     #[test]
-    fn a_class_follows_the_views_of_two_seconds_and_none_of_an_object_before() {
+    fn a_class_follows_the_views_of_two_seconds() {
         let mut tracker = Tracker::new(1);
         let mut mean = |turn: u32, view: Option<f64>| {
-            let views = [view.unwrap_or_default()];
-            let view = view.map(|energy| (&views[..], energy));
+            let view = view.as_ref().map(std::slice::from_ref);
             let seen = Observation { view, ..seen(f64::from(turn) * 0.1, 1.0, 0.0) };
-            let track = tracker.observe(&seen).unwrap();
-            (track.log_probabilities.clone(), track.energy)
+            tracker.observe(&seen).unwrap().log_probabilities.clone()
         };
         (0..100).for_each(|turn| {
             mean(turn, Some(0.0));
@@ -423,18 +419,17 @@ mod tests {
         });
         // The latest of 20 views has a weight of 1/20 from then on.
         let expected = -(1.0 - 0.95f64.powi(20));
-        let (found, energy) = mean(119, Some(-1.0));
+        let found = mean(119, Some(-1.0));
         assert!((found[0] - expected).abs() < 1e-12, "{found:?} for {expected}");
-        assert!((energy - expected).abs() < 1e-12, "{energy} for {expected}");
         // Its memory goes to another object, which has no view yet.
-        assert_eq!(mean(200, None), (vec![], 0.0));
+        assert!(mean(200, None).is_empty());
     }
 
     /// The filter of a constant velocity lags behind an acceleration: in the steady state by
     /// a T (2 alpha - beta) / (2 beta), with alpha and beta from the tracking index (Kalata, "The
     /// tracking index", IEEE Transactions AES-20(2), 1984).
     #[test]
-    fn the_velocity_of_an_accelerating_car_lags_as_an_acceleration_of_3_m_s2_allows() {
+    fn the_velocity_of_an_accelerating_car_lags_as_derived() {
         let (acceleration, turn_s, off_m) = (3.0f64, 0.1f64, 0.1 + 0.05 * 1.0);
         let index = 3.0 * turn_s.powi(2) / off_m;
         let r = (4.0 + index - (8.0 * index + index.powi(2)).sqrt()) / 4.0;
@@ -466,7 +461,7 @@ mod tests {
     }
 
     #[test]
-    fn of_two_tracks_at_the_same_distance_a_cluster_is_of_the_one_of_its_size() {
+    fn equally_near_tracks_are_matched_by_size() {
         for (size_m, id) in [([0.6, 0.6], 1), ([4.2, 1.8], 2)] {
             let mut tracker = Tracker::new(2);
             tracker.observe(&Observation { size_m: [0.6, 0.6], ..seen(0.0, 20.0, 0.0) });

@@ -4,9 +4,8 @@ use std::ops::Range;
 use std::time::Instant;
 
 use edgepuck_segment::StreamCluster;
+use formats::geometry::Trajectory;
 use glam::Vec3;
-
-use super::ego_motion::{EgoMotion, Pose};
 
 /// The most clusters and points that are usually complete at once: those of the first turn, whose
 /// ground is known at its end. More take more memory.
@@ -38,19 +37,6 @@ pub struct Node {
     /// The time of the sensor's pose in whose frame the points are.
     pub pose_s: f64,
     pub turn: u64,
-}
-
-/// The motion of the sensor since its first packet.
-#[derive(Clone, Copy)]
-pub struct Motion<'a> {
-    pub motion: &'a EgoMotion,
-    pub start_s: f64,
-}
-
-impl Motion<'_> {
-    pub fn pose(&self, time_s: f64) -> Pose {
-        self.motion.pose(time_s, self.start_s)
-    }
 }
 
 impl Waiting {
@@ -88,16 +74,17 @@ impl Waiting {
         &mut self,
         cluster: &StreamCluster<'_, Tag>,
         turn: u64,
-        motion: Option<Motion<'_>>,
+        motion: Option<&Trajectory>,
     ) {
         let (start, n_nodes) = (self.points.len(), self.nodes.len());
         self.points.extend_from_slice(cluster.points);
         self.tags.extend_from_slice(cluster.tags);
         let pose_s = cluster.tags.iter().fold(f64::NEG_INFINITY, |last, tag| last.max(tag.time_s));
         if let Some(motion) = motion {
-            let pose = motion.pose(pose_s);
+            let pose = motion.at_unnormalized(pose_s);
             for (point, tag) in self.points[start..].iter_mut().zip(cluster.tags) {
-                let in_world = motion.pose(tag.time_s).to_world(Vec3::from(*point).as_dvec3());
+                let in_world =
+                    motion.at_unnormalized(tag.time_s).to_world(Vec3::from(*point).as_dvec3());
                 *point = pose.from_world(in_world).as_vec3().to_array();
             }
         }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
-use super::object::PlacedBox;
+use formats::geometry::OrientedBox;
 
 /// The least weights of the latest box in the mean size and in the mean direction: objects keep
 /// their sizes, but they and the sensor turn.
@@ -26,12 +26,10 @@ pub struct Whole {
     /// The class for which it holds.
     class: usize,
     n_seen: u64,
-    centre_m: [f64; 3],
-    size_m: [f64; 3],
+    /// The box, whose direction is that of the front if the object has moved.
+    pub place: OrientedBox,
     /// The mean cosine and sine of twice the direction: boxes do not tell front from rear.
     twice: [f64; 2],
-    /// The direction of the front if the object has moved, radians counterclockwise from x.
-    yaw_rad: f64,
 }
 
 impl Whole {
@@ -40,7 +38,7 @@ impl Whole {
     pub fn fuse(
         &mut self,
         class: usize,
-        seen: &PlacedBox,
+        seen: &OrientedBox,
         sensor_m: [f64; 2],
         velocity_m_s: Option<[f64; 3]>,
     ) {
@@ -49,40 +47,40 @@ impl Whole {
         let weight = |least: f64| (1.0 / self.n_seen as f64).max(least);
         let [size_weight, turn_weight] = [LEAST_SIZE_WEIGHT, LEAST_TURN_WEIGHT].map(weight);
         let turn_weight = if n_before > 0 { turn_weight.min(MOST_TURN_WEIGHT) } else { 1.0 };
-        let seen_rad = seen.yaw_deg.to_radians();
-        let (sin, cos) = libm::sincos(2.0 * seen_rad);
+        let (sin, cos) = libm::sincos(2.0 * seen.yaw_rad);
         for (mean, new) in self.twice.iter_mut().zip([cos, sin]) {
             *mean += turn_weight * (new - *mean);
         }
         let axis_rad = 0.5 * libm::atan2(self.twice[1], self.twice[0]);
         let fast = velocity_m_s.filter(|&[x, y, _]| libm::hypot(x, y) > FAST_M_S);
-        let ahead_rad = fast.map_or(self.yaw_rad, |[x, y, _]| libm::atan2(y, x));
+        let OrientedBox { centre_m, size_m: mean_m, yaw_rad } = &mut self.place;
+        let ahead_rad = fast.map_or(*yaw_rad, |[x, y, _]| libm::atan2(y, x));
         let is_rear = libm::cos(axis_rad - ahead_rad) < 0.0;
-        self.yaw_rad = if is_rear { axis_rad - PI.copysign(axis_rad) } else { axis_rad };
+        *yaw_rad = if is_rear { axis_rad - PI.copysign(axis_rad) } else { axis_rad };
         let [length_m, width_m, height_m] = seen.size_m;
-        let size_m = match libm::sin(seen_rad - self.yaw_rad).abs() < FRAC_1_SQRT_2 {
+        let size_m = match libm::sin(seen.yaw_rad - *yaw_rad).abs() < FRAC_1_SQRT_2 {
             true => [length_m, width_m, height_m],
             false => [width_m, length_m, height_m],
         };
-        let least = if size_m[0] > self.size_m[0] { LEAST_LENGTH_WEIGHT } else { 0.0 };
+        let least = if size_m[0] > mean_m[0] { LEAST_LENGTH_WEIGHT } else { 0.0 };
         let weights = [size_weight.max(least), size_weight, size_weight];
-        for ((mean, new), weight) in self.size_m.iter_mut().zip(size_m).zip(weights) {
+        for ((mean, new), weight) in mean_m.iter_mut().zip(size_m).zip(weights) {
             *mean += weight * (new - *mean);
         }
         // The near sides stay where they were seen.
-        self.centre_m = seen.centre_m;
-        let (sin, cos) = libm::sincos(self.yaw_rad);
+        *centre_m = seen.centre_m;
+        let (sin, cos) = libm::sincos(*yaw_rad);
         let [dx, dy] = [0, 1].map(|axis| seen.centre_m[axis] - sensor_m[axis]);
         for (side, [x, y]) in [[cos, sin], [-sin, cos]].into_iter().enumerate() {
-            let away_m = 0.5 * (self.size_m[side] - size_m[side]) * (dx * x + dy * y).signum();
-            self.centre_m[0] += away_m * x;
-            self.centre_m[1] += away_m * y;
+            let away_m = 0.5 * (mean_m[side] - size_m[side]) * (dx * x + dy * y).signum();
+            centre_m[0] += away_m * x;
+            centre_m[1] += away_m * y;
         }
     }
 
     /// Moves the box.
     pub fn advance(&mut self, by_m: [f64; 3]) {
-        for (centre, by) in self.centre_m.iter_mut().zip(by_m) {
+        for (centre, by) in self.place.centre_m.iter_mut().zip(by_m) {
             *centre += by;
         }
     }
@@ -90,21 +88,15 @@ impl Whole {
     /// Whether a piece of the object of this length may be at `position_m`, after the object has moved
     /// by `by_m`.
     pub fn holds(&self, position_m: [f64; 3], length_m: f64, by_m: [f64; 3]) -> bool {
-        let [dx, dy, dz] = [0, 1, 2].map(|i| position_m[i] - self.centre_m[i] - by_m[i]);
-        let (sin, cos) = libm::sincos(self.yaw_rad);
-        let off_m = [cos * dx + sin * dy, cos * dy - sin * dx, dz];
+        let OrientedBox { centre_m, size_m, .. } = self.place;
+        let off_m = self.place.along([0, 1, 2].map(|i| position_m[i] - centre_m[i] - by_m[i]));
         let is_near = |(off, size): (f64, f64)| off.abs() <= MARGIN_M + (0.5 + MARGIN_SHARE) * size;
-        let fits = length_m <= 2.0 * MARGIN_M + (1.0 + 2.0 * MARGIN_SHARE) * self.size_m[0];
-        self.is_known() && fits && off_m.into_iter().zip(self.size_m).all(is_near)
+        let fits = length_m <= 2.0 * MARGIN_M + (1.0 + 2.0 * MARGIN_SHARE) * size_m[0];
+        self.is_known() && fits && off_m.into_iter().zip(size_m).all(is_near)
     }
 
     pub fn is_known(&self) -> bool {
         self.n_seen > 0
-    }
-
-    pub fn placed(&self) -> PlacedBox {
-        let Self { centre_m, size_m, yaw_rad, .. } = *self;
-        PlacedBox { centre_m, size_m, yaw_deg: yaw_rad.to_degrees() }
     }
 }
 
@@ -112,14 +104,15 @@ impl Whole {
 mod tests {
     use super::*;
 
-    fn seen(x: f64, size_m: [f64; 2], yaw_deg: f64) -> PlacedBox {
-        PlacedBox { centre_m: [x, 0.0, 0.0], size_m: [size_m[0], size_m[1], 1.5], yaw_deg }
+    fn seen(x: f64, [length, width]: [f64; 2], yaw_deg: f64) -> OrientedBox {
+        let (centre_m, size_m) = ([x, 0.0, 0.0], [length, width, 1.5]);
+        OrientedBox { centre_m, size_m, yaw_rad: yaw_deg.to_radians() }
     }
 
-    fn fused(boxes: &[PlacedBox]) -> PlacedBox {
+    fn fused(boxes: &[OrientedBox]) -> OrientedBox {
         let mut whole = Whole::default();
         boxes.iter().for_each(|seen| whole.fuse(1, seen, [0.0; 2], None));
-        whole.placed()
+        whole.place
     }
 
     fn assert_near(found: f64, expected: f64) {
@@ -132,7 +125,7 @@ mod tests {
     fn the_near_side_stays_and_longer_boxes_count_more() {
         let lengths_m = [4.0, 4.4, 3.9, 4.5];
         let boxes = lengths_m.map(|length| seen(8.0 + length / 2.0, [length, length - 2.4], 0.0));
-        let PlacedBox { centre_m, size_m, .. } = fused(&boxes);
+        let OrientedBox { centre_m, size_m, .. } = fused(&boxes);
         assert_near(size_m[0], 4.3);
         assert_near(size_m[1], 1.8);
         assert_near(centre_m[0], 8.0 + 4.3 / 2.0);
@@ -140,21 +133,21 @@ mod tests {
         let mut whole = Whole::default();
         whole.fuse(1, &boxes[0], [0.0; 2], None);
         whole.fuse(2, &seen(9.0, [7.0, 2.5], 0.0), [0.0; 2], None);
-        assert_eq!(whole.placed().size_m, [7.0, 2.5, 1.5]);
+        assert_eq!(whole.place.size_m, [7.0, 2.5, 1.5]);
     }
 
     #[test]
-    fn directions_are_means_modulo_half_a_turn_and_an_odd_quarter_turn_changes_nothing() {
+    fn directions_are_means_modulo_half_a_turn() {
         let directed = |yaw_deg| seen(8.0, [4.0, 1.6], yaw_deg);
         // Of the doubled angles, 176 and 184 degrees, with the weights 0.6 and 0.4.
         let (cos, sin) = (4.0f64.to_radians().cos(), 0.2 * 4.0f64.to_radians().sin());
         let upright = fused(&[directed(88.0), directed(-88.0)]);
-        assert_near(upright.yaw_deg.abs(), 90.0 - 0.5 * sin.atan2(cos).to_degrees());
-        assert_near(fused(&[directed(10.0), directed(-80.0)]).yaw_deg, 10.0);
+        assert_near(upright.yaw_rad.to_degrees().abs(), 90.0 - 0.5 * sin.atan2(cos).to_degrees());
+        assert_near(fused(&[directed(10.0), directed(-80.0)]).yaw_rad.to_degrees(), 10.0);
         let mut boxes = [directed(10.0); 6];
-        boxes[5] = PlacedBox { size_m: [1.6, 4.0, 1.5], ..directed(-80.0) };
-        let PlacedBox { size_m, yaw_deg, .. } = fused(&boxes);
-        assert_near(yaw_deg, 10.0);
+        boxes[5] = OrientedBox { size_m: [1.6, 4.0, 1.5], ..directed(-80.0) };
+        let OrientedBox { size_m, yaw_rad, .. } = fused(&boxes);
+        assert_near(yaw_rad.to_degrees(), 10.0);
         assert_near(size_m[0], 4.0);
     }
 
@@ -163,20 +156,20 @@ mod tests {
     fn a_size_is_kept_and_a_direction_follows() {
         let mut boxes = vec![seen(8.0, [4.0, 1.6], 0.0); 200];
         boxes.push(seen(8.0, [4.0, 2.0], 8.0));
-        let PlacedBox { size_m, yaw_deg, .. } = fused(&boxes);
+        let OrientedBox { size_m, yaw_rad, .. } = fused(&boxes);
         assert_near(size_m[1], 1.6 + 0.05 * 0.4);
         let (sin, cos) = 16f64.to_radians().sin_cos();
-        assert_near(yaw_deg, 0.5 * (0.3 * sin).atan2(0.7 + 0.3 * cos).to_degrees());
+        assert_near(yaw_rad.to_degrees(), 0.5 * (0.3 * sin).atan2(0.7 + 0.3 * cos).to_degrees());
     }
 
     #[test]
-    fn what_has_moved_shows_its_front_also_when_it_stands() {
+    fn a_moved_object_keeps_its_front_when_it_stops() {
         let mut whole = Whole::default();
         for (velocity_m_s, yaw_deg) in
             [(None, 5.0), (Some([-3.0, 0.0, 0.0]), -175.0), (Some([1.0, 0.0, 0.0]), -175.0)]
         {
             whole.fuse(1, &seen(8.0, [4.0, 1.6], 5.0), [0.0; 2], velocity_m_s);
-            assert_near(whole.placed().yaw_deg, yaw_deg);
+            assert_near(whole.place.yaw_rad.to_degrees(), yaw_deg);
         }
     }
 

@@ -1,8 +1,9 @@
 //! Farthest point sampling: each chosen point is the one farthest from all points chosen before.
 
+use edgepuck_kernels::{Kernels, Soa};
+
 use super::FpsStart;
 use super::canonical::compare;
-use crate::kernel::{Kernels, Soa};
 
 /// Samples clouds, and reuses its memory for each.
 #[derive(Default)]
@@ -136,7 +137,7 @@ mod tests {
 
     use super::super::testing::{any_cloud, extremes, gather, shared_array, shuffled, uniform};
     use super::*;
-    use crate::kernel::{KernelName, available};
+    use edgepuck_kernels::{KernelName, available};
     use proptest::prelude::*;
 
     fn select(points: &[[f32; 3]], m: usize, start: FpsStart) -> Vec<u32> {

@@ -11,16 +11,13 @@ mod canonical;
 mod cpl;
 mod fps;
 mod hash;
-mod outliers;
 mod random;
 mod spec;
 #[cfg(test)]
 mod testing;
-mod voxel;
 
+use edgepuck_kernels::Kernels;
 use formats::streams::Stream;
-
-use crate::kernel::Kernels;
 
 pub(crate) use canonical::CanonicalOrder;
 #[doc(hidden)]
@@ -28,11 +25,8 @@ pub use cpl::CriticalPoints;
 #[doc(hidden)]
 pub use fps::FarthestPoints;
 #[doc(hidden)]
-pub use outliers::OutlierFilter;
-#[doc(hidden)]
 pub use random::RandomSubset;
 pub use spec::{FpsStart, FrontChoice, SamplerKind, SamplerSpec};
-use voxel::VoxelGrid;
 
 /// Errors of sampling.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -41,9 +35,6 @@ pub enum SamplerError {
     /// The number of points to keep is 0.
     #[error("expected a sampler that keeps 1 point or more, found 0")]
     NoPointsWanted,
-    /// The voxel size is not a positive number.
-    #[error("expected a voxel size above 0, found {0}")]
-    VoxelSize(f64),
     /// More points than a 32-bit index can count.
     #[error("expected at most 4,294,967,295 points, found {0}")]
     TooManyPoints(usize),
@@ -59,7 +50,6 @@ pub struct Sampler {
     selected: Vec<u32>,
     random: RandomSubset,
     fps: FarthestPoints,
-    voxel: VoxelGrid,
 }
 
 impl Sampler {
@@ -74,7 +64,6 @@ impl Sampler {
             selected: Vec::new(),
             random: RandomSubset::default(),
             fps: FarthestPoints::default(),
-            voxel: VoxelGrid::default(),
         })
     }
 
@@ -84,19 +73,14 @@ impl Sampler {
         &self.spec
     }
 
-    /// Changes the seed of random draws.
-    pub fn set_seed(&mut self, seed: u64) {
-        self.spec.seed = seed;
-    }
-
     /// The indices of the chosen points, each once. An empty cloud gives none.
     ///
     /// `all` and `first` keep the order of the cloud, `random` and `fps` return points in the order
-    /// of choice, and `voxel` returns them ascending by x, y, z.
+    /// of choice.
     ///
     /// # Errors
     /// [`SamplerError::NeedsFeatures`] for `cpl`; more points than a 32-bit index can count; for
-    /// `fps` and `voxel`, a coordinate that is not finite.
+    /// `fps`, a coordinate that is not finite.
     pub fn select(
         &mut self,
         points: &[[f32; 3]],
@@ -104,7 +88,7 @@ impl Sampler {
     ) -> Result<&[u32], SamplerError> {
         let n =
             u32::try_from(points.len()).map_err(|_| SamplerError::TooManyPoints(points.len()))?;
-        let Self { spec, selected, random, fps, voxel } = self;
+        let Self { spec, selected, random, fps } = self;
         match spec.kind {
             SamplerKind::All => keep_first(n, selected),
             SamplerKind::First => keep_first(n.min(spec.points.try_into().unwrap_or(n)), selected),
@@ -116,10 +100,6 @@ impl Sampler {
             SamplerKind::Fps => {
                 fps.select(points, spec.points, spec.fps_start, kernels, selected);
             }
-            SamplerKind::Voxel => match spec.voxel_size {
-                Some(size) => voxel.select_by_size(points, size, selected),
-                None => voxel.select_by_count(points, spec.points, selected),
-            },
             SamplerKind::Cpl => return Err(SamplerError::NeedsFeatures),
         }
         Ok(selected)
@@ -135,7 +115,7 @@ fn keep_first(n: u32, selected: &mut Vec<u32>) {
 mod tests {
     use super::testing::{extremes, uniform};
     use super::*;
-    use crate::kernel::KernelName;
+    use edgepuck_kernels::KernelName;
 
     fn select(spec: &SamplerSpec, points: &[[f32; 3]]) -> Result<Vec<u32>, SamplerError> {
         let kernels = KernelName::Scalar.kernels().unwrap();
@@ -159,8 +139,6 @@ mod tests {
                 let mut chosen = select(&spec(kind, m), &cloud).unwrap();
                 let n = match kind {
                     SamplerKind::All => 100,
-                    // A grid may have fewer cells.
-                    SamplerKind::Voxel if m < 100 => chosen.len().min(m),
                     _ => m.min(100),
                 };
                 assert_eq!(chosen.len(), n, "{kind} to {m}");
@@ -178,7 +156,7 @@ mod tests {
             for kind in kinds() {
                 let chosen = select(&spec(kind, 1000), &cloud).unwrap();
                 let expected = match kind {
-                    SamplerKind::Fps | SamplerKind::Voxel => n_distinct,
+                    SamplerKind::Fps => n_distinct,
                     _ => cloud.len(),
                 };
                 assert_eq!(chosen.len(), expected, "{kind}: {what}");
@@ -187,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn a_seed_decides_what_is_drawn() {
+    fn random_points_depend_on_the_seed() {
         let cloud = uniform(100, 1);
         let drawn = |seed| {
             let spec = SamplerSpec { seed, ..spec(SamplerKind::Random, 10) };
@@ -198,14 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn a_voxel_size_goes_before_a_number_of_points() {
-        let cloud = [[0.1; 3], [0.2; 3], [0.7; 3]];
-        let spec = SamplerSpec { voxel_size: Some(0.5), ..spec(SamplerKind::Voxel, 1) };
-        assert_eq!(select(&spec, &cloud).unwrap(), [0, 2]);
-    }
-
-    #[test]
-    fn what_cannot_be_sampled_is_an_error() {
+    fn invalid_specifications_fail() {
         let cloud = [[0.0; 3]];
         let error = select(&spec(SamplerKind::Cpl, 1), &cloud).unwrap_err();
         assert_eq!(error, SamplerError::NeedsFeatures);

@@ -19,8 +19,6 @@ formats::named! {
         Random = "random",
         /// M points by farthest point sampling.
         Fps = "fps",
-        /// One point for each cell of a grid.
-        Voxel = "voxel",
         /// A Critical Points Layer: the M points that win most of a max-pooling, or fewer.
         Cpl = "cpl",
     }
@@ -63,14 +61,12 @@ formats::named! {
 pub struct SamplerSpec {
     /// The method.
     pub kind: SamplerKind,
-    /// The number of points to keep, M; ignored by `all` and with a voxel size.
+    /// The number of points to keep, M; ignored by `all`.
     pub points: usize,
     /// The seed of random draws.
     pub seed: u64,
     /// The first point of `fps`.
     pub fps_start: FpsStart,
-    /// The edge of a voxel in the units of the cloud; if `None`, the grid is as fine as M allows.
-    pub voxel_size: Option<f64>,
     /// The layers whose features `cpl` pools.
     pub front: FrontChoice,
 }
@@ -82,7 +78,6 @@ impl Default for SamplerSpec {
             points: 1024,
             seed: 0,
             fps_start: FpsStart::default(),
-            voxel_size: None,
             front: FrontChoice::default(),
         }
     }
@@ -112,14 +107,11 @@ impl SamplerSpec {
     /// Checks the specification.
     ///
     /// # Errors
-    /// M is 0 but needed; a voxel size that is not above 0.
+    /// M is 0 but needed.
     pub fn check(&self) -> Result<(), SamplerError> {
-        let voxel_size = self.voxel_size.filter(|_| self.kind == SamplerKind::Voxel);
-        match (self.kind, voxel_size) {
-            (_, Some(size)) if size > 0.0 && size.is_finite() => Ok(()),
-            (_, Some(size)) => Err(SamplerError::VoxelSize(size)),
-            (SamplerKind::All, None) => Ok(()),
-            (_, None) if self.points == 0 => Err(SamplerError::NoPointsWanted),
+        match self.kind {
+            SamplerKind::All => Ok(()),
+            _ if self.points == 0 => Err(SamplerError::NoPointsWanted),
             _ => Ok(()),
         }
     }
@@ -130,35 +122,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_come_back_and_others_are_refused() {
-        let words = ["all", "first", "random", "fps", "voxel", "cpl"];
+    fn names_are_parsed_and_others_refused() {
+        let words = ["all", "first", "random", "fps", "cpl"];
         let kinds: Vec<SamplerKind> = words.iter().map(|word| word.parse().unwrap()).collect();
         assert_eq!(kinds, SamplerKind::ALL);
         assert_eq!(kinds.iter().map(ToString::to_string).collect::<Vec<_>>(), words);
         assert_eq!(
             "fsp".parse::<SamplerKind>().unwrap_err().to_string(),
-            "unknown sampler `fsp`, expected one of all, first, random, fps, voxel, cpl"
+            "unknown sampler `fsp`, expected one of all, first, random, fps, cpl"
         );
     }
 
     #[test]
-    fn a_specification_that_cannot_be_met_is_an_error() {
+    fn invalid_specifications_fail() {
         for kind in SamplerKind::ALL {
             let spec = SamplerSpec { kind, points: 0, ..SamplerSpec::default() };
             assert_eq!(spec.check().is_ok(), kind == SamplerKind::All, "{kind}");
             assert_eq!(SamplerSpec { points: 1, ..spec }.check(), Ok(()));
         }
-        for size in [0.0, -0.5, f64::NAN, f64::INFINITY] {
-            let kind = SamplerKind::Voxel;
-            let spec = SamplerSpec { kind, voxel_size: Some(size), ..SamplerSpec::default() };
-            assert!(matches!(spec.check(), Err(SamplerError::VoxelSize(_))), "{size}");
-        }
-    }
-
-    #[test]
-    fn a_given_voxel_size_needs_no_number_of_points() {
-        let kind = SamplerKind::Voxel;
-        let spec = SamplerSpec { kind, points: 0, voxel_size: Some(0.1), ..SamplerSpec::default() };
-        assert_eq!(spec.check(), Ok(()));
     }
 }

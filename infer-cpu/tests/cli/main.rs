@@ -11,8 +11,8 @@ mod models;
 mod program;
 #[cfg(feature = "mcap")]
 mod recordings;
+mod said;
 mod sample;
-mod streams;
 #[cfg(feature = "mcap")]
 #[path = "../support/street.rs"]
 #[allow(dead_code, reason = "the tests of the library use all of it")]

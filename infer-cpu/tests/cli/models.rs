@@ -40,15 +40,11 @@ fn bundled_models_are_known_by_name_in_any_folder() {
         assert_eq!(logits(model), logits("x.safetensors"));
         assert_eq!(folder.run(&format!("inspect {model}")).code, 0);
     }
-    let names =
-        "expected a model file, or one of edge-64, set-64, street-128, shapes-rotational-64";
-    let refused = folder.run("classify --model edge-65 c.xyz");
-    refused.assert_refused(1, &format!("error: edge-65: name: {names}"));
 }
 
 /// A data set of gen-dataset, by its manifest, and a scan without one, by its rings.
 #[test]
-fn without_a_name_scans_go_to_the_model_of_scans_that_knows_their_classes() {
+fn scans_of_known_classes_use_the_model_of_scans_by_default() {
     let folder = Folder::with_cloud(40);
     let vertex = |[x, y, z]: [f64; 3]| format!("{x} {y} {z} 1\n");
     let vertices: String = strip(40).into_iter().map(vertex).collect();
@@ -147,7 +143,7 @@ fn numbers_of_another_type_are_refused() {
 }
 
 #[test]
-fn a_model_that_is_cut_short_or_none_is_refused() {
+fn truncated_models_are_refused() {
     let folder = Folder::with_cloud(20);
     let path = folder.path("m.safetensors");
     let whole = fs::read(&path).unwrap();

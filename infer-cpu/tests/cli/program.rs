@@ -65,6 +65,17 @@ impl Folder {
         Ran::from_output(child.wait_with_output().unwrap())
     }
 
+    /// Checks that the program ends silently when the reader of its output does, such as `head`. The output
+    /// must exceed the buffer of a pipe.
+    pub fn assert_closed_pipe_is_success(&self, line: &str) {
+        let mut command = self.command(line);
+        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        drop(child.stdout.take());
+        let output = child.wait_with_output().unwrap();
+        let err = String::from_utf8_lossy(&output.stderr);
+        assert_eq!((output.status.code(), &*err), (Some(0), ""), "{line}");
+    }
+
     /// `classify` with the folder's model and one thread.
     pub fn classify(&self, line: &str) -> Ran {
         self.run(&format!("classify --model m.safetensors --threads 1 {line}"))

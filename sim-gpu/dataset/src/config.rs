@@ -1,5 +1,6 @@
 //! The settings of a dataset. The manifest keeps them in full.
 
+use edgepuck_mesh::frame::{Normalize, Unit, Up};
 use formats::hash::Hashing;
 use formats::rng::StreamKey;
 use formats::scan::AttributeSet;
@@ -9,11 +10,8 @@ use formats::vlp32c::Returns;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use sim_gpu::effects::Effects;
-use sim_gpu::internals::config::InvalidValue;
-use sim_gpu::internals::material::ColourSource;
-use sim_gpu::internals::mesh::frame::{Normalize, Unit, Up};
-use sim_gpu::internals::sensor::Views;
-use sim_gpu::internals::simplify::Simplify;
+use sim_gpu::errors::InvalidValue;
+use sim_gpu::sensors::Views;
 use sim_gpu::{Pose, Sensor};
 
 /// The settings of a dataset. With the meshes and the adapter, they decide every byte of it.
@@ -28,9 +26,6 @@ pub struct DatasetConfig {
     pub units: Unit,
     /// The meshes' upward axis; `None` is each format's default.
     pub up: Option<Up>,
-    /// How far meshes are simplified; not at all if `None`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub simplify: Option<Simplify>,
     /// The attributes of points besides their positions.
     pub attributes: AttributeSet,
     /// The formats in which each scan is written. NPZ must be among them.
@@ -56,10 +51,6 @@ pub struct DatasetConfig {
     /// The meshes' diffuse reflectivity, 0 to 1.
     #[serde(default = "white", skip_serializing_if = "is_white")]
     pub reflectivity: f64,
-    /// The source of the colours of OBJ meshes, which become reflectivities. Surfaces without
-    /// a colour have [`DatasetConfig::reflectivity`].
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub colours: Option<ColourSource>,
 }
 
 fn white() -> f64 {
@@ -112,18 +103,14 @@ formats::named! {
     #[derive(Serialize, Deserialize)]
     #[serde(rename_all = "kebab-case")]
     pub enum Layout: "layout" {
-        /// Text files of yanx27/Pointnet_Pointnet2_pytorch.
-        Yanx27 = "yanx27",
-        /// ModelNet40's HDF5 files.
-        ModelnetH5 = "modelnet-h5",
         /// Tars of samples, which [`make_tars`](crate::make_tars) writes.
         Webdataset = "webdataset",
     }
 }
 
 impl DatasetConfig {
-    /// The default settings for `sets`: meshes scaled to the unit sphere, clean scans as NPZ files,
-    /// and packed clouds of 1,024 points.
+    /// Settings for `sets`: meshes scaled to the unit sphere, clean scans as NPZ files, and packed clouds
+    /// of 1,024 points.
     #[must_use]
     pub fn new(sets: Vec<SetConfig>) -> Self {
         Self {
@@ -131,7 +118,6 @@ impl DatasetConfig {
             normalize: Normalize::default(),
             units: Unit::Metre,
             up: None,
-            simplify: None,
             attributes: AttributeSet::new(),
             formats: vec![ScanFormat::Npz],
             effects: Effects::default(),
@@ -143,7 +129,6 @@ impl DatasetConfig {
             returns: Returns::default(),
             hash: Hashing::default(),
             reflectivity: white(),
-            colours: None,
         }
     }
 
@@ -180,7 +165,7 @@ impl Viewpoints {
 }
 
 impl SetConfig {
-    /// The set `name` of `sensor`, at the viewpoints that its profile recommends.
+    /// The set `name` of `sensor`, at its usual viewpoints.
     #[must_use]
     pub fn new(name: &str, sensor: Sensor) -> Self {
         let viewpoints = Viewpoints::Views(sensor.profile().default_views());

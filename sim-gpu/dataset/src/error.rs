@@ -1,8 +1,8 @@
 use crate::record::MeshFailure;
 use formats::FormatError;
-use sim_gpu::internals::cast_error::CastError;
-use sim_gpu::internals::config::InvalidValue;
-use sim_gpu::internals::scan::ScanError;
+use sim_gpu::errors::CastError;
+use sim_gpu::errors::InvalidValue;
+use sim_gpu::errors::ScanError;
 use std::path::{Path, PathBuf};
 
 /// Why a dataset cannot be made, merged or verified. A mesh that cannot be scanned does not stop a

@@ -29,67 +29,58 @@
 //! ```
 
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+#![warn(clippy::print_stdout, clippy::print_stderr)]
 
 mod budget;
 mod clouds;
 mod config;
-mod corrupted;
 mod difference;
 mod error;
-mod export_layouts;
 mod finish;
-mod journal;
-mod layout;
+mod folder;
 mod make;
 mod manifest;
 mod merge;
 mod mesh;
 mod on_demand;
-mod packed_sets;
+mod pack;
 mod pipeline;
 mod plan;
 mod progress;
 mod publish;
 mod record;
-mod retract;
-mod surfaces;
+mod settings;
 mod tars;
 mod verify;
 mod view;
 
 pub use config::{DatasetConfig, Layout, SetConfig, Variant, Viewpoints};
-pub use corrupted::{Corrupted, CorruptedSet, ObjectCorruption, Written};
 pub use error::DatasetError;
-pub use export_layouts::check_layouts;
+pub use folder::DatasetFolder;
 pub use make::make;
-pub use manifest::{LayoutFile, LeftOut, Manifest, MeshPoses, PackedRecord, Poses, SetPoses};
+pub use manifest::{LeftOut, Manifest, MeshPoses, PackedRecord, Poses, SetPoses};
 pub use merge::merge;
 pub use on_demand::{Clouds, seed_of_epoch};
 pub use plan::{Begin, Plan};
 pub use progress::{Progress, Stage};
 pub use publish::{Publication, publish};
-pub use record::{Cloud, Entry, FileRecord, MeshFailure, MeshRecord, ScanRecord, VariantRecord};
-pub use surfaces::{SurfaceConfig, write_surfaces};
+pub use record::{Entry, FileRecord, MeshFailure, MeshRecord, ScanRecord, VariantRecord};
+pub use settings::{Around, NOISE_M, noisy, read_effects};
 pub use tars::{Cut, HandOver, PartManifest, PartRecord, Sample, TarRecord, Tars, make_tars};
 pub use verify::{Problem, Report, verify};
 
 // The types of the settings that are not of this crate.
+pub use edgepuck_mesh::frame::{Normalize, Unit, Up};
+pub use edgepuck_mesh::tree::{MeshEntry, discover};
 pub use formats::hash::Hashing;
 pub use formats::scan_file::ScanFormat;
 pub use formats::vlp32c::Returns;
-pub use sim_gpu::internals::material::ColourSource;
-pub use sim_gpu::internals::mesh::frame::{Normalize, Unit, Up};
-pub use sim_gpu::internals::mesh::tree::{MeshEntry, discover, doubts};
-pub use sim_gpu::internals::sensor::Views;
-pub use sim_gpu::internals::simplify::Simplify;
+pub use sim_gpu::sensors::Views;
 
 /// Parts of the library for Edgepuck's programs and tests, which may change in any version.
 #[doc(hidden)]
 pub mod internals {
     pub use crate::finish::finish;
-    pub use crate::journal::{Journal, Terms};
     pub use crate::merge::{Part, check_parts, link};
-    pub mod layout {
-        pub use crate::layout::*;
-    }
+    pub use crate::plan::Terms;
 }

@@ -3,15 +3,13 @@
 //! It has no times, speeds or numbers of threads, so that the same run gives the same bytes.
 
 use crate::config::{DatasetConfig, SetConfig, Viewpoints};
-use crate::error::DatasetError;
-use crate::journal::{Terms, digest, read_json, write_json};
-use crate::layout;
+use crate::plan::{Terms, digest};
 use crate::record::{Entry, FileRecord, MeshFailure, MeshRecord, VariantRecord};
+use edgepuck_mesh::frame::Normalize;
 use formats::hash::{FileHash, Hashing};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use sim_gpu::Pose;
-use sim_gpu::internals::mesh::frame::Normalize;
 use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
 
@@ -36,8 +34,8 @@ pub struct Manifest {
     pub poses: Vec<SetPoses>,
     /// The packed files: by set, variant and split.
     pub packed: Vec<PackedRecord>,
-    /// The files of other projects' layouts, sorted.
-    pub layout_files: Vec<LayoutFile>,
+    /// Always empty; manifests keep their form.
+    pub layout_files: [(); 0],
     /// Meshes that could not be scanned, sorted by entry.
     pub failures: Vec<MeshFailure>,
     /// Meshes that were scanned, sorted by entry.
@@ -98,41 +96,7 @@ pub struct LeftOut {
     pub points: u64,
 }
 
-/// A file of another project's layout.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct LayoutFile {
-    /// Its path from the dataset's folder, with forward slashes.
-    pub file: String,
-    /// The hash of its bytes, if the configuration asks for one.
-    #[serde(flatten)]
-    pub hash: Option<FileHash>,
-}
-
 impl Manifest {
-    /// Reads the manifest `file`.
-    ///
-    /// # Errors
-    /// [`DatasetError::NoManifest`] if the file does not exist; a manifest that cannot be read, is
-    /// of another tool, or holds a name that leads out of the folder.
-    pub fn read(file: &Path) -> Result<Self, DatasetError> {
-        if !file.exists() {
-            return Err(DatasetError::NoManifest { path: file.into() });
-        }
-        let manifest: Self = read_json(file)?;
-        match manifest.flaw() {
-            None => Ok(manifest),
-            Some(cause) => Err(DatasetError::malformed(file, cause)),
-        }
-    }
-
-    /// Writes it to `file`, atomically.
-    ///
-    /// # Errors
-    /// If the file cannot be written.
-    pub fn write(&self, file: &Path) -> Result<(), DatasetError> {
-        write_json(file, self)
-    }
-
     /// The conditions of the run that made the dataset.
     #[must_use]
     pub fn terms(&self) -> Terms {
@@ -170,8 +134,7 @@ impl Manifest {
         });
         variants.flat_map(|(entry, scan, written)| {
             written.files.iter().map(move |file| {
-                let (root, variant) = (Path::new(""), written.variant);
-                let path = layout::scan(root, &scan.set, variant, entry, scan.view, file.format);
+                let path = entry.scan_file(&scan.set, written.variant, scan.view, file.format);
                 (path, file, written)
             })
         })
@@ -181,7 +144,7 @@ impl Manifest {
         let meshes = self.meshes.iter().map(|mesh| &mesh.hash);
         let scans = self.scan_files().map(|(_, file, _)| &file.hash);
         let packed = self.packed.iter().map(|packed| &packed.hash);
-        meshes.chain(scans).chain(packed).chain(self.layout_files.iter().map(|file| &file.hash))
+        meshes.chain(scans).chain(packed)
     }
 
     /// Every mesh and its file, scanned or failed.
@@ -190,15 +153,18 @@ impl Manifest {
         self.meshes.iter().map(|m| (m.entry.clone(), m.source.as_str())).chain(failed)
     }
 
-    fn flaw(&self) -> Option<String> {
+    /// What makes it no manifest of this tool, or unsafe to follow.
+    pub(crate) fn flaw(&self) -> Option<String> {
         if self.tool != TOOL {
             return Some(format!("expected a dataset of `{TOOL}`, found one of `{}`", self.tool));
         }
         if let Some((number, of)) = self.shard.filter(|(number, of)| number >= of) {
             return Some(format!("expected a part below {of}, found {number}"));
         }
-        let hashing =
-            |hash: &Option<FileHash>| hash.as_ref().map_or(Hashing::None, FileHash::hashing);
+        let hashing = |hash: &Option<FileHash>| match hash {
+            Some(_) => Hashing::Sha256,
+            None => Hashing::None,
+        };
         if let Some(other) = self.hashes().map(hashing).find(|found| *found != self.config.hash) {
             let expected = self.config.hash;
             return Some(format!("expected the hash {expected} of every file, found {other}"));

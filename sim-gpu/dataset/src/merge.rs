@@ -2,8 +2,7 @@ use crate::config::DatasetConfig;
 use crate::difference::difference;
 use crate::error::DatasetError;
 use crate::finish::complete;
-use crate::journal::Journal;
-use crate::layout;
+use crate::folder::{DatasetFolder, remove};
 use crate::manifest::Manifest;
 use crate::record::Entry;
 use crate::verify::first_problem;
@@ -29,12 +28,12 @@ pub fn merge(shards: &[PathBuf], out: &Path) -> Result<Manifest, DatasetError> {
     check_parts(&shards.iter().map(Shard::part).collect::<Vec<_>>(), out)?;
     check_entries(&shards)?;
     for Shard { path, manifest, .. } in &shards {
-        if let Some(problem) = first_problem(path, manifest) {
+        if let Some(problem) = first_problem(DatasetFolder(path), manifest) {
             return Err(DatasetError::malformed(path, problem));
         }
     }
     let merged = shards.iter().try_for_each(|shard| link_scans(shard, out));
-    let merged = merged.and_then(|()| complete(out, union(shards)));
+    let merged = merged.and_then(|()| complete(DatasetFolder(out), union(shards)));
     if merged.is_err() {
         // The first error is returned; the files that are left have no manifest.
         let _ = empty(out);
@@ -65,10 +64,11 @@ pub struct Part<'a, Settings> {
 
 impl Shard {
     fn read(path: &Path) -> Result<Self, DatasetError> {
-        if Journal::at(path).exists() {
+        let folder = DatasetFolder(path);
+        if folder.is_begun() {
             return Err(DatasetError::Unfinished { path: path.into() });
         }
-        let manifest = Manifest::read(&layout::manifest(path))?;
+        let manifest = folder.manifest()?;
         let Some((number, of)) = manifest.shard else {
             return Err(DatasetError::malformed(
                 path,
@@ -189,7 +189,7 @@ fn union(parts: Vec<Shard>) -> Manifest {
 fn empty(out: &Path) -> Result<(), DatasetError> {
     let here = |error| DatasetError::io(out, error);
     for item in fs::read_dir(out).map_err(here)? {
-        layout::remove(&item.map_err(here)?.path())?;
+        remove(&item.map_err(here)?.path())?;
     }
     Ok(())
 }

@@ -1,29 +1,32 @@
-//! One mesh: from its file to the rays that are cast at it, and from the answers of the caster to
-//! its scans on disk.
+//! A mesh becomes scans in six steps: `read` the file, `frame` the mesh in the world, build its target, cast
+//! rays at it, apply the effects of each variant to the hits, and `write_files`.
+//!
+//! [`prepare`] has the steps before the casters, which cast at many meshes at once (`pipeline.rs`), and
+//! [`finish`] those after. [`Clouds`](crate::Clouds) does the same for one view at a time, in memory.
 
 use crate::clouds::Source;
 use crate::config::{DatasetConfig, SetConfig, Viewpoints};
 use crate::error::DatasetError;
-use crate::layout;
+use crate::pack::keep;
 use crate::plan::Plan;
 use crate::progress::{Progress, Stage};
-use crate::record::{Cloud, FileRecord, MeshFailure, MeshRecord, ScanRecord, VariantRecord};
+use crate::record::{FileRecord, MeshFailure, MeshRecord, ScanRecord, VariantRecord};
 use crate::view::{self, Rig, View};
-use formats::hash::Hashing;
+use edgepuck_mesh::LoadedMesh;
+use edgepuck_mesh::frame::{Normalize, Unit, Up, to_world};
+use edgepuck_mesh::tree::MeshEntry;
+use edgepuck_mesh::validate::triangle_stats;
+use formats::Scan;
+use formats::hash::{FileHash, Hashing};
+use formats::plausible::{Warning, mesh_size};
 use formats::scan_file::{ScanFormat, write_scan};
 use formats::vlp32c;
 use glam::{DAffine3, DVec3};
 use sim_gpu::Scene;
 use sim_gpu::internals::bvh::Builder;
 use sim_gpu::internals::job::{Cast, CastJob};
-use sim_gpu::internals::material::{Material, MaterialChoice, MaterialError, Materials};
-use sim_gpu::internals::mesh::frame::{Normalize, Unit, Up, to_world};
-use sim_gpu::internals::mesh::tree::MeshEntry;
-use sim_gpu::internals::mesh::validate::triangle_stats;
-use sim_gpu::internals::mesh::{LoadedMesh, NO_AREA, TriangleMesh};
 use sim_gpu::internals::ray::RayFrame;
 use sim_gpu::internals::scan::ObjectHits;
-use sim_gpu::internals::simplify::{Simplified, Viewpoint, resolved_m, simplified_surface};
 use sim_gpu::internals::target::{Surface, Target};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
@@ -50,35 +53,24 @@ pub(crate) struct Prepared<'a> {
 /// Reads the mesh of `entry` and aims every beam that may hit it.
 pub(crate) fn prepare<'a>(run: &Run<'a>, entry: &MeshEntry) -> Result<Prepared<'a>, MeshFailure> {
     let (config, progress) = (run.plan.config, run.progress);
-    let (mut record, mesh, kept) = progress.time(Stage::Read, || {
-        read(entry, config.up, config.units, config.normalize, config.hash)
+    let (record, surface) = progress.time(Stage::Read, || {
+        let loaded = read(entry, config.hash)?;
+        frame(entry, loaded, config.up, config.units, config.normalize)
     })?;
-    let materials = materials(entry, config)?;
-    warnings(&record, materials.as_ref()).for_each(|warning| progress.note(warning));
+    warnings(&record).for_each(|warning| progress.note(warning));
     let id = record.entry.id();
     let centre = DVec3::from_array(record.views_around);
     let views = run.rig.views(&id, centre);
-    let surface = match config.simplify {
-        None => Surface::new(mesh, kept),
-        Some(simplify) => {
-            let bound_m =
-                simplify.bound_m(|| resolved_m(&mesh, 1.0, &viewpoints(config, &id, centre)));
-            let surface = progress
-                .time(Stage::Build, || simplified_surface(mesh, kept, bound_m))
-                .map_err(|error| MeshFailure::new(entry, error))?;
-            record.simplified = Some(Simplified { bound_m, triangles: surface.len() as u64 });
-            surface
-        }
-    };
     let rays_of = |view: &View| {
         let frame = RayFrame::new(&surface, &DAffine3::from_translation(centre), view.pose());
         view.pattern().within(&frame.cone(view.pattern())).len()
     };
     let builder = Builder::for_rays(surface.len(), views.iter().map(rays_of).sum());
     let target = progress.time(Stage::Build, || Target::new(surface, builder));
-    let scene = view::scene(config, target, centre, materials);
+    let scene = view::scene(config, target, centre);
     let sensors_m: Vec<DVec3> = views.iter().map(|view| view.pose().position_m).collect();
-    doubts(&record.source, config, &scene, &sensors_m).for_each(|doubt| progress.note(doubt));
+    let notes = plausibility(&record.source, config, &scene, &sensors_m);
+    notes.into_iter().for_each(|note| progress.note(note));
     let placed = view::placed(&scene);
     let jobs: Vec<CastJob> =
         progress.time(Stage::Aim, || views.iter().map(|view| view.aim(&placed)).collect());
@@ -89,82 +81,59 @@ pub(crate) fn prepare<'a>(run: &Run<'a>, entry: &MeshEntry) -> Result<Prepared<'
     Ok(Prepared { record, views, jobs, scene })
 }
 
-/// What is probably wrong with the unit of a mesh, with the effects or with the place of a sensor.
-pub(crate) fn doubts(
+/// What is probably wrong with the size of a mesh, with the effects or with the place of a sensor.
+pub(crate) fn plausibility(
     source: &str,
     config: &DatasetConfig,
     scene: &Scene,
     sensors_m: &[DVec3],
-) -> impl Iterator<Item = String> {
-    let mesh = scene.instances().first().map(|instance| &instance.mesh);
-    let is_scaled = config.normalize != Normalize::None;
-    let size = mesh
-        .filter(|_| !is_scaled)
-        .and_then(|mesh| mesh.extent().doubtful_size(config.units))
-        .map(|doubt| format!("{doubt}; --units names another unit"));
-    let inside = mesh.is_some_and(|mesh| mesh.extent().surrounds(sensors_m)).then(|| {
+) -> Vec<String> {
+    let Some(instance) = scene.instances().first() else { return Vec::new() };
+    let (extent, is_scaled) = (instance.mesh.extent(), config.normalize != Normalize::None);
+    let size = mesh_size(extent.size_m(), config.units, "--units names another unit");
+    let effects = extent.hidden_by(&config.effects);
+    let inside = extent.surrounds(sensors_m).then(|| {
         let units = if is_scaled { "" } else { ", or another of --units" };
         let is_posed = |set: &SetConfig| matches!(set.viewpoints, Viewpoints::Poses(_));
         let place = match config.sets.iter().any(is_posed) {
             true => "poses outside of it",
             false => "a larger --distance",
         };
-        format!("a sensor stands inside its bounding box: expected {place}{units}")
+        Warning::SensorInside(format!("{place}{units}"))
     });
-    let effects = mesh.and_then(|mesh| mesh.extent().doubtful_effects(&config.effects));
-    size.into_iter().chain(effects).chain(inside).map(move |doubt| format!("{source}: {doubt}"))
+    let all = size.filter(|_| !is_scaled).into_iter().chain(effects).chain(inside);
+    all.map(|warning| warning.of(source).to_string()).collect()
 }
 
-/// What is doubtful about the files of a mesh, for the user.
-pub(crate) fn warnings<'a>(
-    record: &'a MeshRecord,
-    materials: Option<&'a Materials>,
-) -> impl Iterator<Item = String> + 'a {
-    let all = record.warnings.iter().chain(materials.into_iter().flat_map(|m| &m.warnings));
-    all.map(|warning| format!("warning: {}: {warning}", record.source))
+/// What is probably wrong with the file of a mesh, for the user.
+pub(crate) fn warnings(record: &MeshRecord) -> impl Iterator<Item = String> {
+    record.warnings.iter().map(|warning| format!("warning: {}: {warning}", record.source))
 }
 
-pub(crate) fn materials(
-    entry: &MeshEntry,
-    config: &DatasetConfig,
-) -> Result<Option<Materials>, MeshFailure> {
-    let otherwise = Material::diffuse(config.reflectivity);
-    let choice = MaterialChoice { colours: config.colours, ..MaterialChoice::default() };
-    let load = || Materials::load(&entry.path, &choice, otherwise);
-    config.colours.map(|_| load()).transpose().map_err(|error| match error {
-        MaterialError::Mesh(error) => MeshFailure::unreadable(entry, &error),
-        other => MeshFailure::new(entry, other),
-    })
-}
-
-/// Where the sensor of each set stands, from the `centre` of the mesh `id`.
-fn viewpoints<'a>(config: &'a DatasetConfig, id: &str, centre: DVec3) -> Vec<Viewpoint<'a>> {
-    let viewpoint = |set: &'a SetConfig| {
-        let poses = set.poses(config.seed, id, centre);
-        let positions = poses.iter().map(|pose| pose.position_m - centre).collect();
-        Viewpoint { sensor: set.sensor.profile(), positions }
-    };
-    config.sets.iter().map(viewpoint).collect()
-}
-
-/// Reads the mesh of `entry`; returns its record without scans, the mesh around the origin and the
-/// triangles that a ray can meet. The mesh stands where the record's `views_around` says.
+/// Reads the mesh of `entry`, and hashes its file.
 pub(crate) fn read(
     entry: &MeshEntry,
+    hashing: Hashing,
+) -> Result<(LoadedMesh, Option<FileHash>), MeshFailure> {
+    entry.load(hashing).map_err(|error| MeshFailure::unreadable(entry, &error))
+}
+
+/// The record of a mesh without scans, and the triangles that a ray can meet, around the origin. The mesh
+/// stands where the record's `views_around` says.
+pub(crate) fn frame(
+    entry: &MeshEntry,
+    (loaded, hash): (LoadedMesh, Option<FileHash>),
     up: Option<Up>,
     unit: Unit,
     normalize: Normalize,
-    hashing: Hashing,
-) -> Result<(MeshRecord, TriangleMesh, Vec<u32>), MeshFailure> {
-    let (loaded, hash) =
-        entry.load(hashing).map_err(|error| MeshFailure::unreadable(entry, &error))?;
+) -> Result<(MeshRecord, Surface), MeshFailure> {
     let LoadedMesh { mesh, format, dropped_faces, warnings } = loaded;
     let up = up.unwrap_or(format.default_up());
     let mesh = mesh.in_metres(unit);
     let world = to_world(&mesh, up, normalize);
     let stats = triangle_stats(&world.mesh);
     if stats.kept.is_empty() {
-        return Err(MeshFailure::new(entry, NO_AREA));
+        return Err(MeshFailure::new(entry, Warning::NoArea));
     }
     let (centre, views_around) = if normalize == Normalize::None {
         (DVec3::ZERO, world.centre)
@@ -182,59 +151,59 @@ pub(crate) fn read(
         triangles: mesh.triangles.len() as u64,
         dropped_faces: dropped_faces as u64,
         defects: stats.defects,
-        simplified: None,
         scans: Vec::new(),
         warnings,
     };
-    Ok((record, world.mesh, stats.kept))
+    Ok((record, Surface::new(world.mesh, stats.kept)))
 }
 
-/// Writes every scan of one mesh; returns its complete record.
-pub(crate) fn write(
+/// Makes every scan of a mesh of the answers of the caster to its jobs; returns its complete record.
+pub(crate) fn finish(
     run: &Run,
     prepared: Prepared,
     casts: &[Cast],
 ) -> Result<MeshRecord, DatasetError> {
-    let Prepared { mut record, views, jobs, scene } = prepared;
+    let (Prepared { mut record, views, jobs, scene }, progress) = (prepared, run.progress);
     let placed = view::placed(&scene);
     for ((view, job), cast) in views.iter().zip(&jobs).zip(casts) {
-        let hits = run.progress.time(Stage::Resolve, || view.resolve(job, cast));
-        run.progress.rays_decided_in_f64.fetch_add(hits.decided_in_f64 as u64, Relaxed);
-        let scan = write_view(run, &record, view, &ObjectHits::new(0, &placed, job, &hits))?;
-        record.scans.push(scan);
+        let hits = progress.time(Stage::Resolve, || view.resolve(job, cast));
+        progress.rays_decided_in_f64.fetch_add(hits.decided_in_f64 as u64, Relaxed);
+        let hits = ObjectHits::new(0, &placed, job, &hits);
+        let mut variants = Vec::new();
+        for &variant in &run.plan.config.variants {
+            let (scan, tally) = progress.time(Stage::Resolve, || view.scan(variant, &hits))?;
+            progress.scans.fetch_add(1, Relaxed);
+            progress.points.fetch_add(tally.points, Relaxed);
+            let source = Source { set: view.set, variant, entry: &record.entry, view: view.number };
+            let files = progress
+                .time(Stage::Write, || write_files(run.plan, source, view, &hits, &scan))?;
+            let cloud = keep(&run.kept, run.plan.config, source, &scan);
+            variants.push(VariantRecord { variant, tally, files, cloud });
+        }
+        record.scans.push(ScanRecord { set: view.set.name.clone(), view: view.number, variants });
     }
     Ok(record)
 }
 
-fn write_view(
-    run: &Run,
-    record: &MeshRecord,
+/// Writes a scan in all formats.
+fn write_files(
+    Plan { out, config, .. }: &Plan,
+    source: Source,
     view: &View,
     hits: &ObjectHits,
-) -> Result<ScanRecord, DatasetError> {
-    let Run { plan: Plan { out, config, .. }, progress, .. } = run;
-    let (set, entry) = (view.set, &record.entry);
-    let mut variants = Vec::new();
-    for &variant in &config.variants {
-        let (scan, tally) = progress.time(Stage::Resolve, || view.scan(variant, hits))?;
-        progress.scans.fetch_add(1, Relaxed);
-        progress.points.fetch_add(tally.points, Relaxed);
-        let write = |&format: &ScanFormat| -> Result<FileRecord, DatasetError> {
-            let path = layout::scan(out, &set.name, variant, entry, view.number, format);
-            let hash = match format {
-                ScanFormat::Pcap => {
-                    let (scan, revolution) = view.packets(variant, hits)?;
-                    vlp32c::write(&path, config.hash, &revolution, config.returns, &scan)?
-                }
-                _ => write_scan(&path, format, config.hash, &scan)?,
-            };
-            Ok(FileRecord { format, hash })
+    scan: &Scan,
+) -> Result<Vec<FileRecord>, DatasetError> {
+    let Source { set, variant, entry, view: number } = source;
+    let write = |&format: &ScanFormat| {
+        let path = out.join(entry.scan_file(&set.name, variant, number, format));
+        let hash = match format {
+            ScanFormat::Pcap => {
+                let (scan, revolution) = view.packets(variant, hits)?;
+                vlp32c::write(&path, config.hash, &revolution, config.returns, &scan)?
+            }
+            _ => write_scan(&path, format, config.hash, scan)?,
         };
-        let files = progress
-            .time(Stage::Write, || config.formats.iter().map(write).collect::<Result<_, _>>())?;
-        let source = Source { set, variant, entry, view: view.number };
-        let cloud = Cloud::keep(&run.kept, config, source, &scan);
-        variants.push(VariantRecord { variant, tally, files, cloud });
-    }
-    Ok(ScanRecord { set: set.name.clone(), view: view.number, variants })
+        Ok(FileRecord { format, hash })
+    };
+    config.formats.iter().map(write).collect()
 }

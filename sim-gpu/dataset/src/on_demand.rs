@@ -1,23 +1,23 @@
-use crate::clouds::Source;
+use crate::clouds::{Points, Source, draw, draw_rows};
 use crate::config::{DatasetConfig, Variant, Viewpoints};
 use crate::error::DatasetError;
-use crate::export_layouts::{MOST_VIEWS, check_views};
-use crate::mesh::{doubts, materials, read, warnings};
-use crate::record::{Cloud, Entry};
+use crate::mesh::{frame, plausibility, read, warnings};
+use crate::record::Entry;
+use crate::settings::MOST_VIEWS;
 use crate::view::{self, Rig, View, patterns};
+use edgepuck_mesh::tree::MeshEntry;
 use formats::hash::Hashing;
 use formats::scan::Attribute;
 use formats::streams::Stream;
 use formats::{Scan, Split};
 use glam::DVec3;
 use rayon::prelude::*;
+use sim_gpu::errors::InvalidValue;
 use sim_gpu::internals::bvh::Builder;
-use sim_gpu::internals::config::InvalidValue;
 use sim_gpu::internals::job::CastJob;
-use sim_gpu::internals::mesh::tree::MeshEntry;
 use sim_gpu::internals::scan::ObjectHits;
-use sim_gpu::internals::sensor::BeamPattern;
-use sim_gpu::internals::target::{Surface, Target};
+use sim_gpu::internals::target::Target;
+use sim_gpu::sensors::BeamPattern;
 use sim_gpu::{Caster, Scene};
 use std::collections::{BTreeSet, HashMap};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -39,11 +39,8 @@ pub struct Clouds {
     warnings: Mutex<Warnings>,
 }
 
-/// What is doubtful about the meshes: all that is known, and of it what was not told yet.
+/// Warnings about the meshes: all of them, and those that no call returned yet.
 type Warnings = (BTreeSet<String>, Vec<String>);
-
-/// The points of a cloud, in the unit sphere.
-type Points = Result<Vec<[f32; 3]>, DatasetError>;
 
 /// A mesh in memory.
 struct Ready {
@@ -66,8 +63,8 @@ impl Clouds {
     /// since labels are indices into their classes. Up to `cache_bytes` of meshes stay in memory.
     ///
     /// # Errors
-    /// If there is not exactly one set, if there are too many views, if the settings simplify meshes, or if
-    /// the effects do not fit the sensor.
+    /// If there is not exactly one set, if there are too many views, or if the effects do not
+    /// fit the sensor.
     pub fn new(
         config: DatasetConfig,
         meshes: &[MeshEntry],
@@ -78,14 +75,10 @@ impl Clouds {
             let cause = format!("expected one set, found {}", config.sets.len());
             return Err(InvalidValue::new("sets", cause));
         };
-        if config.simplify.is_some() {
-            let cause = "expected no simplification: meshes are read for one view at a time";
-            return Err(InvalidValue::new("simplify", cause));
-        }
         if let Viewpoints::Views(views) = &set.viewpoints {
             views.validate()?;
         }
-        check_views(&config)?;
+        config.check_views()?;
         config.effects.for_sensor(set.sensor.profile())?;
         let patterns = patterns(&config)?;
         let variant =
@@ -158,12 +151,12 @@ impl Clouds {
         attributes: &[Attribute],
     ) -> Result<Vec<Vec<f32>>, DatasetError> {
         let drawn = self.make_each(caster, seed, indices, |config, source, scan| {
-            Cloud::rows(config, source, &scan, attributes)
+            draw_rows(config, source, &scan, attributes)
         })?;
         drawn.into_iter().collect()
     }
 
-    /// What is doubtful about the meshes that were drawn, for the user: what no call returned before.
+    /// Warnings about the meshes that were drawn, which no call returned before.
     #[must_use]
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = self.warnings.lock().unwrap_or_else(PoisonError::into_inner);
@@ -179,10 +172,8 @@ impl Clouds {
         caster: &Caster,
         seed: u64,
         indices: &[usize],
-    ) -> Result<Vec<Points>, DatasetError> {
-        self.make_each(caster, seed, indices, |config, source, scan| {
-            Cloud::draw(config, source, &scan).map(|cloud| cloud.points)
-        })
+    ) -> Result<Vec<Result<Points, DatasetError>>, DatasetError> {
+        self.make_each(caster, seed, indices, |config, source, scan| draw(config, source, &scan))
     }
 
     /// The scans of those clouds, with a result for each.
@@ -293,21 +284,20 @@ impl Clouds {
             return Ok(ready);
         }
         let (entry, config) = (&self.meshes[number], &self.config);
-        let (record, mesh, kept) =
-            read(entry, config.up, config.units, config.normalize, Hashing::None)?;
-        let materials = materials(entry, config)?;
-        let mut told: Vec<String> = warnings(&record, materials.as_ref()).collect();
+        let loaded = read(entry, Hashing::None)?;
+        let (record, surface) = frame(entry, loaded, config.up, config.units, config.normalize)?;
+        let mut found: Vec<String> = warnings(&record).collect();
         // Rays are cast at it in every epoch, which pays for the better tree.
-        let target = Target::new(Surface::new(mesh, kept), Builder::Sah);
+        let target = Target::new(surface, Builder::Sah);
         let centre = DVec3::from_array(record.views_around);
-        let scene = view::scene(config, target, centre, materials);
+        let scene = view::scene(config, target, centre);
         // Tars have any number of views, more than memory can hold.
         let (id, first_views) = (record.entry.id(), 0..self.views().min(MOST_VIEWS) as u32);
         let pose = |view| config.sets[0].pose(config.seed, &id, centre, view);
         let sensors_m: Vec<DVec3> = first_views.map(|view| pose(view).position_m).collect();
-        told.extend(doubts(&record.source, config, &scene, &sensors_m));
+        found.extend(plausibility(&record.source, config, &scene, &sensors_m));
         let (known, new) = &mut *self.warnings.lock().unwrap_or_else(PoisonError::into_inner);
-        new.extend(told.into_iter().filter(|warning| known.insert(warning.clone())));
+        new.extend(found.into_iter().filter(|warning| known.insert(warning.clone())));
         let ready = Arc::new(Ready { entry: record.entry, centre, scene });
         lock().put(number, &ready);
         Ok(ready)

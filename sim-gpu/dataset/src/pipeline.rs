@@ -4,19 +4,19 @@
 
 use crate::budget::{Budget, Share};
 use crate::error::DatasetError;
-use crate::journal::Journal;
-use crate::mesh::{Prepared, Run, prepare, write};
+use crate::folder::DatasetFolder;
+use crate::mesh::{Prepared, Run, finish, prepare};
 use crate::plan::Plan;
 use crate::progress::{Progress, Stage};
 use crate::record::{Entry, MeshFailure, MeshRecord};
 use crate::view::{Rig, patterns};
 use crossbeam_channel::{Receiver, Sender, bounded};
+use edgepuck_mesh::tree::MeshEntry;
 use formats::hash::Hashing;
 use sim_gpu::Caster;
-use sim_gpu::internals::cast_error::CastError;
+use sim_gpu::errors::CastError;
 use sim_gpu::internals::caster::{Casting, OpenCaster};
 use sim_gpu::internals::job::{Cast, CastJob};
-use sim_gpu::internals::mesh::tree::MeshEntry;
 use std::collections::VecDeque;
 use std::sync::atomic::Ordering::{Relaxed, SeqCst};
 use std::sync::atomic::{AtomicBool, AtomicUsize};
@@ -42,7 +42,7 @@ type Scanned = (Vec<MeshRecord>, Vec<MeshFailure>);
 
 struct Shared<'a> {
     run: Run<'a>,
-    journal: Journal,
+    folder: DatasetFolder<'a>,
     /// The index of the next mesh to prepare.
     next: AtomicUsize,
     /// Whether an error ended the run.
@@ -63,7 +63,7 @@ pub(crate) fn scan_all(
     let rig = Rig { config: plan.config, patterns, cast_effects };
     let shared = Shared {
         run: Run { plan, rig, progress, kept: AtomicUsize::new(0) },
-        journal: Journal::at(plan.out),
+        folder: DatasetFolder(plan.out),
         next: AtomicUsize::new(0),
         stopped: AtomicBool::new(false),
         scanned: Mutex::default(),
@@ -120,7 +120,7 @@ impl<'a> Shared<'a> {
             if self.stopped.load(SeqCst) || progress.stop.load(SeqCst) {
                 return;
             }
-            match self.journal.find(&Entry::from(mesh)) {
+            match self.folder.find(&Entry::from(mesh)) {
                 Err(error) => return self.stop(error),
                 Ok(Some(record)) if is_current(&record, mesh, config.hash) => {
                     progress.meshes.fetch_add(1, Relaxed);
@@ -181,8 +181,8 @@ impl<'a> Shared<'a> {
             if self.stopped.load(SeqCst) {
                 continue;
             }
-            let record = write(&self.run, held.prepared, &casts);
-            match record.and_then(|record| self.journal.note(&record).map(|()| record)) {
+            let record = finish(&self.run, held.prepared, &casts);
+            match record.and_then(|record| self.folder.note(&record).map(|()| record)) {
                 Ok(record) => {
                     self.run.progress.meshes.fetch_add(1, Relaxed);
                     lock(&self.scanned).0.push(record);

@@ -1,5 +1,8 @@
 use crate::config::DatasetConfig;
-use sim_gpu::internals::mesh::tree::MeshEntry;
+use crate::record::Entry;
+use edgepuck_mesh::tree::MeshEntry;
+use serde::{Deserialize, Serialize};
+use sim_gpu::Caster;
 use std::path::Path;
 
 /// A dataset, or a part of one, to be made.
@@ -36,4 +39,41 @@ impl<'a> Plan<'a> {
     pub fn new(out: &'a Path, config: &'a DatasetConfig, meshes: &'a [MeshEntry]) -> Self {
         Self { out, config, meshes, part: None, begin: Begin::Fresh }
     }
+}
+
+/// The conditions of a run. A run is resumed only if they are equal.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Terms {
+    /// The tool's version.
+    pub version: String,
+    /// The settings of the dataset.
+    pub config: DatasetConfig,
+    /// The adapter's name.
+    pub adapter: String,
+    /// A digest of the entries of the meshes and of the names of their files.
+    pub meshes: String,
+    /// The part of the meshes: (number from 0, number of parts).
+    pub shard: Option<(u32, u32)>,
+}
+
+impl Terms {
+    /// The terms of a run over `meshes`, the part of `plan`.
+    pub(crate) fn new(plan: &Plan, meshes: &[MeshEntry], caster: &Caster) -> Self {
+        Self {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            config: plan.config.clone(),
+            adapter: caster.name().to_owned(),
+            meshes: digest(meshes.iter().map(|mesh| (mesh.into(), mesh.relative.as_str()))),
+            shard: plan.part,
+        }
+    }
+}
+
+/// A digest of the meshes of a run, which does not depend on the contents of their files.
+pub(crate) fn digest<'a>(meshes: impl Iterator<Item = (Entry, &'a str)>) -> String {
+    let mut lines: Vec<String> = meshes
+        .map(|(Entry { class, split, name }, source)| format!("{class}/{split}/{name} {source}\n"))
+        .collect();
+    lines.sort_unstable();
+    formats::hash::of_bytes(lines.concat().as_bytes())
 }

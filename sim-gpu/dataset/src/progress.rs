@@ -7,7 +7,7 @@ formats::named! {
     pub enum Stage: "stage" {
         /// Reading and parsing the file, hashing it, scaling it, validating it.
         Read = "read",
-        /// Simplifying, if the settings ask for it, and building the hierarchy.
+        /// Building the hierarchy.
         Build = "build",
         /// Aiming beams.
         Aim = "aim",

@@ -1,15 +1,16 @@
 use crate::config::Variant;
+use edgepuck_mesh::MeshError;
+use edgepuck_mesh::frame::Up;
+use edgepuck_mesh::tree::MeshEntry;
+use edgepuck_mesh::validate::MeshDefects;
 use formats::Split;
 use formats::hash::FileHash;
+use formats::plausible::Warning;
 use formats::scan_file::ScanFormat;
 use serde::{Deserialize, Serialize};
-use sim_gpu::internals::mesh::MeshError;
-use sim_gpu::internals::mesh::frame::Up;
-use sim_gpu::internals::mesh::tree::MeshEntry;
-use sim_gpu::internals::mesh::validate::MeshDefects;
-use sim_gpu::internals::scan::Tally;
-use sim_gpu::internals::simplify::Simplified;
+use sim_gpu::Tally;
 use std::fmt;
+use std::path::PathBuf;
 
 /// A mesh of a dataset. Lists are sorted by it.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -50,14 +51,11 @@ pub struct MeshRecord {
     /// Defects of the triangles and vertices.
     #[serde(flatten)]
     pub defects: MeshDefects,
-    /// The result of simplification, if the settings ask for it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub simplified: Option<Simplified>,
     /// Its scans: by set in the order of the configuration, then by view.
     pub scans: Vec<ScanRecord>,
-    /// What is doubtful about the file, for the user. Records that come from files have none.
+    /// What is probably wrong with the file. Records that come from files have none.
     #[serde(skip)]
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 fn is_origin(position: &[f64; 3]) -> bool {
@@ -88,17 +86,7 @@ pub struct VariantRecord {
     /// Its cloud, which waits in memory until it is packed. Records that come from files have
     /// none, nor do scans that exceed the memory for clouds: their scans are read again.
     #[serde(skip)]
-    pub cloud: Option<Cloud>,
-}
-
-/// The cloud of a scan, at the size and scale of packed clouds.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Cloud {
-    /// [`DatasetConfig::packed_points`](crate::DatasetConfig) points with mean 0 and largest
-    /// radius 1.
-    pub points: Vec<[f32; 3]>,
-    /// The surface's normal at each point, if a layout holds normals and the scan has them.
-    pub normals: Option<Vec<[f32; 3]>>,
+    pub cloud: Option<Vec<[f32; 3]>>,
 }
 
 /// One file of a scan.
@@ -159,5 +147,13 @@ impl Entry {
     #[must_use]
     pub fn id(&self) -> String {
         format!("{}/{}", self.class, self.name)
+    }
+
+    /// The file of a scan of it, from the dataset's folder.
+    #[must_use]
+    pub fn scan_file(&self, set: &str, variant: Variant, view: u32, format: ScanFormat) -> PathBuf {
+        let Self { class, split, name } = self;
+        let folder = PathBuf::from_iter([set, variant.name(), class, split.name()]);
+        folder.join(format!("{name}_v{view}.{format}"))
     }
 }

@@ -8,22 +8,19 @@
 //! interruption.
 
 use crate::error::DatasetError;
-use crate::export_layouts::check_layouts;
-use crate::journal::{read_json, write_json};
-use crate::layout;
+use crate::folder::{DatasetFolder, read_json, remove, write_json};
 use crate::manifest::TOOL;
 use crate::on_demand::Clouds;
 use crate::plan::{Begin, Plan};
 use crate::progress::Progress;
 use crate::record::MeshFailure;
-use crate::retract::retract;
+use edgepuck_mesh::tree::MeshEntry;
 use formats::webdataset::{append_file, end, npz_of_clouds, npz_of_scan};
 use formats::{Scan, Split, atomic};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sim_gpu::Caster;
-use sim_gpu::internals::config::InvalidValue;
-use sim_gpu::internals::mesh::tree::MeshEntry;
+use sim_gpu::errors::InvalidValue;
 use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -102,7 +99,7 @@ pub fn make_tars(
     caster: &Caster,
     progress: &Progress,
 ) -> Result<PartManifest, DatasetError> {
-    check_layouts(plan.config, &[])?;
+    plan.config.check()?;
     let part = plan.part.unwrap_or((0, 1));
     begin(plan, part)?;
     let made_by = made_by(plan, tars.cut, caster);
@@ -153,7 +150,8 @@ pub fn make_tars(
 /// of other parts stay, and so do those of the user.
 fn begin(plan: &Plan, part: (u32, u32)) -> Result<(), DatasetError> {
     let occupied = |what| DatasetError::Occupied { path: plan.out.to_owned(), what };
-    let others = [layout::manifest(plan.out), layout::journal(plan.out)];
+    let folder = DatasetFolder(plan.out);
+    let others = [folder.manifest_file(), folder.journal()];
     if let Some(path) = others.into_iter().find(|path| path.exists()) {
         return Err(DatasetError::InTheWay {
             path,
@@ -161,13 +159,13 @@ fn begin(plan: &Plan, part: (u32, u32)) -> Result<(), DatasetError> {
         });
     }
     if plan.begin == Begin::Overwrite {
-        retract(plan.out)?;
+        folder.retract()?;
     }
     for entry in std::fs::read_dir(plan.out).into_iter().flatten().flatten() {
         let is_own = entry.file_name().to_str().is_some_and(|name| is_of_part(name, part));
         match plan.begin {
             Begin::Fresh if is_own => return Err(occupied("tars")),
-            Begin::Overwrite if is_own => layout::remove(&entry.path())?,
+            Begin::Overwrite if is_own => remove(&entry.path())?,
             _ => {}
         }
     }
@@ -226,7 +224,7 @@ impl Maker<'_> {
                 return Ok(Some(record));
             }
             // Its tar is torn or gone.
-            layout::remove(&path)?;
+            remove(&path)?;
         }
         if self.is_stopped() {
             return Ok(None);

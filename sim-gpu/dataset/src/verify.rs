@@ -1,7 +1,5 @@
 use crate::error::DatasetError;
-use crate::finish::failure_lines;
-use crate::journal::{Journal, read_json};
-use crate::layout;
+use crate::folder::{DatasetFolder, failure_lines, folders, read_json};
 use crate::manifest::Manifest;
 use crate::tars::{self, PartManifest, RootManifest, root_file};
 use formats::cloud_file::read_cloud;
@@ -59,61 +57,66 @@ impl Report {
 /// [`DatasetError::Unfinished`] or [`DatasetError::NoManifest`]; a manifest that cannot be read.
 /// The report has the problems of all other files.
 pub fn verify(out: &Path) -> Result<Report, DatasetError> {
-    if root_file(out).exists() {
-        return verify_tars(out);
-    }
-    if is_unfinished(out) {
-        return Err(DatasetError::Unfinished { path: out.into() });
-    }
-    let manifest = Manifest::read(&layout::manifest(out))?;
-    let expected = expected_files(&manifest);
-    let mut problems = problems(out, &expected);
-    problems.extend(failures_problem(out, &manifest));
-    problems.extend(unexpected(out, &manifest, &expected));
+    let Contents { files, scans, clouds, hash, mut problems } = match root_file(out).exists() {
+        true => tars_contents(out)?,
+        false if is_unfinished(out) => return Err(DatasetError::Unfinished { path: out.into() }),
+        false => files_contents(DatasetFolder(out))?,
+    };
+    problems.extend(self::problems(out, &files));
     problems.sort();
-    Ok(Report {
-        files: expected.len(),
-        scans: manifest.meshes.iter().flat_map(|mesh| &mesh.scans).map(|s| s.variants.len()).sum(),
-        clouds: manifest.packed.iter().map(|packed| packed.clouds).sum(),
-        hash: manifest.config.hash,
-        problems,
-    })
+    Ok(Report { files: files.len(), scans, clouds, hash, problems })
 }
 
-/// The first file of `manifest`, by its path, that is not as it says in the folder `out`.
-pub(crate) fn first_problem(out: &Path, manifest: &Manifest) -> Option<Problem> {
-    problems(out, &expected_files(manifest)).into_iter().min()
+/// What the manifests of a folder say about it.
+struct Contents {
+    files: Vec<Expected>,
+    scans: usize,
+    clouds: u64,
+    hash: Hashing,
+    /// The problems besides those of `files`.
+    problems: Vec<Problem>,
 }
 
-fn verify_tars(out: &Path) -> Result<Report, DatasetError> {
-    let root: RootManifest = read_json(&root_file(out))?;
-    let clouds = root.parts.iter().map(|part| part.clouds).sum();
-    let (mut expected, mut unreadable) = (Vec::new(), Vec::new());
-    for part in root.parts {
-        let path = PathBuf::from(part.file);
-        match read_json::<PartManifest>(&out.join(&path)) {
-            Err(error) => unreadable.push(Problem { path, what: error.to_string() }),
-            Ok(manifest) => {
-                expected.push(Expected { path, hash: part.hash, holds: Holds::Anything });
-                expected.extend(manifest.tars.into_iter().map(|tar| Expected {
-                    path: tar.file.into(),
-                    hash: tar.hash,
-                    holds: Holds::Bytes(tar.bytes),
-                }));
-            }
-        }
+fn files_contents(folder: DatasetFolder) -> Result<Contents, DatasetError> {
+    let manifest = folder.manifest()?;
+    let files = expected_files(&manifest);
+    let mut problems = unexpected(folder.0, &manifest, &files);
+    problems.extend(failures_problem(folder, &manifest));
+    let scans = manifest.meshes.iter().flat_map(|mesh| &mesh.scans);
+    let scans = scans.map(|scan| scan.variants.len()).sum();
+    let clouds = manifest.packed.iter().map(|packed| packed.clouds).sum();
+    Ok(Contents { files, scans, clouds, hash: manifest.config.hash, problems })
+}
+
+fn tars_contents(out: &Path) -> Result<Contents, DatasetError> {
+    let RootManifest { config, parts, .. } = read_json(&root_file(out))?;
+    let clouds = parts.iter().map(|part| part.clouds).sum();
+    let mut files = Vec::new();
+    for part in parts {
+        let (holds, tars) = match read_json::<PartManifest>(&out.join(&part.file)) {
+            Ok(manifest) => (Holds::Anything, manifest.tars),
+            Err(error) => (Holds::NoManifest(error.to_string()), Vec::new()),
+        };
+        files.push(Expected { path: part.file.into(), hash: part.hash, holds });
+        files.extend(tars.into_iter().map(|tar| Expected {
+            path: tar.file.into(),
+            hash: tar.hash,
+            holds: Holds::Bytes(tar.bytes),
+        }));
     }
-    let files = expected.len() + unreadable.len();
-    let mut problems = problems(out, &expected);
-    problems.extend(unreadable);
-    problems.sort();
-    Ok(Report { files, scans: 0, clouds, hash: root.config.hash, problems })
+    Ok(Contents { files, scans: 0, clouds, hash: config.hash, problems: Vec::new() })
+}
+
+/// The first file of `manifest`, by its path, that is not as it says in `folder`.
+pub(crate) fn first_problem(folder: DatasetFolder, manifest: &Manifest) -> Option<Problem> {
+    problems(folder.0, &expected_files(manifest)).into_iter().min()
 }
 
 /// Whether a run in `out` was begun and not finished.
 pub(crate) fn is_unfinished(out: &Path) -> bool {
     // Beside a manifest, other files are the user's.
-    Journal::at(out).exists() || !layout::manifest(out).exists() && tars::is_unfinished(out)
+    let folder = DatasetFolder(out);
+    folder.is_begun() || !folder.manifest_file().exists() && tars::is_unfinished(out)
 }
 
 /// A file that a manifest names.
@@ -129,6 +132,8 @@ enum Holds {
     Clouds(u64),
     Bytes(u64),
     Anything,
+    /// Why it is no manifest.
+    NoManifest(String),
 }
 
 fn expected_files(manifest: &Manifest) -> Vec<Expected> {
@@ -142,12 +147,7 @@ fn expected_files(manifest: &Manifest) -> Vec<Expected> {
         hash: packed.hash.clone(),
         holds: Holds::Clouds(packed.clouds),
     });
-    let layouts = manifest.layout_files.iter().map(|file| Expected {
-        path: PathBuf::from(&file.file),
-        hash: file.hash.clone(),
-        holds: Holds::Anything,
-    });
-    scans.chain(packed).chain(layouts).collect()
+    scans.chain(packed).collect()
 }
 
 fn problems(out: &Path, expected: &[Expected]) -> Vec<Problem> {
@@ -168,36 +168,37 @@ impl Expected {
 
     fn flaw(&self, path: &Path) -> Option<String> {
         if let Some(recorded) = &self.hash {
-            match recorded.hashing().of_file(path) {
+            match Hashing::Sha256.of_file(path) {
                 Err(error) => return Some(error.to_string()),
                 Ok(Some(found)) if found != *recorded => {
-                    return Some(format!("was changed: its {found}, not {}", recorded.digits()));
+                    return Some(format!("was changed: its {found}, not {}", recorded.sha256));
                 }
                 Ok(_) => {}
             }
         }
-        let (found, expected, what) = match self.holds {
-            Holds::Points(ScanFormat::Csv, points) => (csv_points(path), points, "points"),
+        let (found, expected, what) = match &self.holds {
+            Holds::Points(ScanFormat::Csv, points) => (csv_points(path), *points, "points"),
             Holds::Points(ScanFormat::Pcd, points) => {
-                (read_cloud(path).map(|cloud| cloud.len() as u64), points, "points")
+                (read_cloud(path).map(|cloud| cloud.len() as u64), *points, "points")
             }
             Holds::Points(ScanFormat::Pcap, points) => {
                 return match velodyne::count_returns(path) {
                     Err(error) => Some(error.to_string()),
                     // Packets hold no return of a range that they cannot represent.
-                    Ok(returns) => (returns > points)
+                    Ok(returns) => (returns > *points)
                         .then(|| format!("holds {returns} returns of {points} points")),
                 };
             }
             Holds::Points(_, points) => {
-                (read_scan(path).map(|scan| scan.len() as u64), points, "points")
+                (read_scan(path).map(|scan| scan.len() as u64), *points, "points")
             }
             Holds::Clouds(clouds) => {
-                (read_labelled(path).map(|set| set.len() as u64), clouds, "clouds")
+                (read_labelled(path).map(|set| set.len() as u64), *clouds, "clouds")
             }
+            Holds::NoManifest(why) => return Some(why.clone()),
             // The hash was compared already.
             Holds::Bytes(_) | Holds::Anything if self.hash.is_some() => return None,
-            Holds::Bytes(bytes) => (size_of(path), bytes, "bytes"),
+            Holds::Bytes(bytes) => (size_of(path), *bytes, "bytes"),
             Holds::Anything => return read_through(path).err().map(|error| error.to_string()),
         };
         match found {
@@ -231,8 +232,8 @@ fn csv_points(path: &Path) -> Result<u64, FormatError> {
     count().map_err(|source| FormatError::io(path, source))
 }
 
-fn failures_problem(out: &Path, manifest: &Manifest) -> Option<Problem> {
-    let found = match std::fs::read(layout::failures(out)) {
+fn failures_problem(folder: DatasetFolder, manifest: &Manifest) -> Option<Problem> {
+    let found = match std::fs::read(folder.failures_file()) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Vec::new()),
         found => found,
     };
@@ -241,13 +242,13 @@ fn failures_problem(out: &Path, manifest: &Manifest) -> Option<Problem> {
         Ok(found) if found == failure_lines(&manifest.failures).as_bytes() => return None,
         Ok(_) => "does not list the manifest's failures".to_owned(),
     };
-    Some(Problem { path: layout::failures(Path::new("")), what })
+    Some(Problem { path: DatasetFolder(Path::new("")).failures_file(), what })
 }
 
 /// Files in the dataset's folders that the manifest does not name.
 fn unexpected(out: &Path, manifest: &Manifest, expected: &[Expected]) -> Vec<Problem> {
     let expected: BTreeSet<&Path> = expected.iter().map(|file| file.path.as_path()).collect();
-    let names: BTreeSet<String> = layout::folders(&manifest.config).into_iter().collect();
+    let names: BTreeSet<String> = folders(&manifest.config).into_iter().collect();
     let folders = names.into_iter().map(|name| out.join(name)).filter(|folder| folder.exists());
     let mut problems = Vec::new();
     for item in folders.flat_map(WalkDir::new) {

@@ -5,16 +5,16 @@ use crate::config::{DatasetConfig, SetConfig, Variant};
 use formats::Scan;
 use formats::vlp32c::Revolution;
 use glam::DVec3;
+use sim_gpu::Pose;
+use sim_gpu::Tally;
 use sim_gpu::effects::Effects;
-use sim_gpu::internals::config::InvalidValue;
+use sim_gpu::errors::InvalidValue;
 use sim_gpu::internals::job::{Cast, CastJob};
-use sim_gpu::internals::material::Materials;
-use sim_gpu::internals::packets;
-use sim_gpu::internals::pose::Pose;
 use sim_gpu::internals::resolve::{Hits, resolve};
-use sim_gpu::internals::scan::{ObjectHits, PlacedTarget, ScanRequest, Tally, assemble};
-use sim_gpu::internals::sensor::BeamPattern;
+use sim_gpu::internals::scan::{ObjectHits, PlacedTarget, ScanRequest, assemble};
 use sim_gpu::internals::target::Target;
+use sim_gpu::packets;
+use sim_gpu::sensors::BeamPattern;
 use sim_gpu::{Mesh, Scene};
 use std::slice::from_ref;
 use std::sync::Arc;
@@ -36,15 +36,10 @@ pub(crate) struct View<'a> {
 }
 
 /// The scene of a mesh: one instance, whose `target` is moved to `centre`.
-pub(crate) fn scene(
-    config: &DatasetConfig,
-    target: Target,
-    centre: DVec3,
-    materials: Option<Materials>,
-) -> Scene {
+pub(crate) fn scene(config: &DatasetConfig, target: Target, centre: DVec3) -> Scene {
     let mut scene = Scene::new();
     let id = scene.add(Mesh::from_target(target, centre), Pose::IDENTITY);
-    (scene[id].reflectivity, scene[id].materials) = (config.reflectivity, materials.map(Arc::new));
+    scene[id].reflectivity = config.reflectivity;
     scene
 }
 

@@ -1,5 +1,6 @@
 //! The boxes of a scene's objects, as detectors learn them.
 
+use formats::geometry::OrientedBox;
 use glam::{DQuat, DVec3};
 use sim_gpu::Scene;
 
@@ -14,12 +15,8 @@ use crate::sweep::Sweep;
 pub struct ObjectBox {
     /// The index of the object in [`DrawnScene::objects`].
     pub object: usize,
-    /// The middle of the box, metres.
-    pub centre_m: DVec3,
-    /// Length, width and height, metres.
-    pub size_m: DVec3,
-    /// Heading, radians counter-clockwise from x, in -pi..pi.
-    pub yaw_rad: f64,
+    /// The box, whose direction is the heading, in -pi..pi.
+    pub place: OrientedBox,
     /// The number of points on the object.
     pub n_points: u32,
     /// The share of the points that the sensor would have of the object alone, 0 to 1: the rest is
@@ -58,11 +55,15 @@ impl Stage {
             let heading = level_from_world * DQuat::from_rotation_z(placed.yaw_rad) * DVec3::X;
             let n_points = counts[object + 1];
             let alone = self.points_alone(scene, object)?;
+            let centre_m = level_from_world * (base_m + 0.5 * size_m.z * DVec3::Z);
+            let place = OrientedBox {
+                centre_m: centre_m.to_array(),
+                size_m: size_m.to_array(),
+                yaw_rad: libm::atan2(heading.y, heading.x),
+            };
             Ok(ObjectBox {
                 object,
-                centre_m: level_from_world * (base_m + 0.5 * size_m.z * DVec3::Z),
-                size_m,
-                yaw_rad: libm::atan2(heading.y, heading.x),
+                place,
                 n_points,
                 visible: f64::from(n_points) / f64::from(alone.max(n_points)),
             })

@@ -14,10 +14,10 @@ use formats::streams::Stream;
 use formats::vlp32c::{AZIMUTH_UNIT_DEG, Returns, Revolution, SEQUENCES_PER_PACKET};
 use glam::DVec3;
 use rayon::prelude::*;
-use sim_gpu::internals::config::InvalidValue;
-use sim_gpu::internals::packets;
+use sim_gpu::errors::InvalidValue;
 use sim_gpu::internals::scan::{ScanRequest, scan_objects};
-use sim_gpu::internals::sensor::{BeamPattern, Layout, Rotating, SensorProfile};
+use sim_gpu::packets;
+use sim_gpu::sensors::{BeamPattern, Layout, Rotating, SensorProfile};
 use sim_gpu::{Pose, Scene, Trajectory};
 
 use crate::error::SceneError;
@@ -265,13 +265,9 @@ fn check_head(sensor: &SensorProfile) -> Result<(), InvalidValue> {
         let cause = "expected a head that turns, which a drive needs, found another layout";
         return Err(InvalidValue::new("rotating", cause));
     };
-    let others = [
-        ("decimation", sensor.decimation.get() != 1),
-        ("rings", sensor.rings.is_some()),
-        ("sample", sensor.sample.is_some()),
-    ];
-    if let Some((key, _)) = others.into_iter().find(|(_, is_there)| *is_there) {
-        return Err(InvalidValue::new(key, "expected none in a drive, which fires all beams"));
+    if sensor.decimation.get() != 1 {
+        let cause = "expected none in a drive, which fires all beams";
+        return Err(InvalidValue::new("decimation", cause));
     }
     let per_turn = head.period_s() * 1e6 / head.sequence_us;
     let least = 2 * SEQUENCES_PER_PACKET;

@@ -1,8 +1,9 @@
+use edgepuck_assets::SCENE_RECIPES;
+use edgepuck_mesh::MeshError;
 use formats::FormatError;
-use sim_gpu::internals::cast_error::CastError;
-use sim_gpu::internals::config::{ConfigError, InvalidValue};
-use sim_gpu::internals::mesh::MeshError;
-use sim_gpu::internals::scan::ScanError;
+use sim_gpu::errors::CastError;
+use sim_gpu::errors::ScanError;
+use sim_gpu::errors::{ConfigError, InvalidValue};
 use std::path::PathBuf;
 
 /// An error in drawing, scanning or packing scenes.
@@ -13,6 +14,12 @@ pub enum SceneError {
     /// cannot be written.
     #[error(transparent)]
     Sim(#[from] sim_gpu::Error),
+    /// No recipe has this name or path.
+    #[error(
+        "{}: expected a recipe's file, or one of {}", .0.display(),
+        SCENE_RECIPES.map(|(name, _)| name).join(", ")
+    )]
+    NoRecipe(PathBuf),
     /// A user's mesh cannot be scaled to a height, because it is flat.
     #[error("{}: expected a mesh with a height, found all of it at one height", file.display())]
     FlatMesh {

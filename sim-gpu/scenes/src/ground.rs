@@ -1,9 +1,9 @@
 //! The ground: a rough slope with a road between two pavements.
 
+use edgepuck_mesh::TriangleMesh;
 use edgepuck_shapes::Sampler;
 use formats::rng::StreamKey;
 use glam::{DVec2, DVec3};
-use sim_gpu::internals::mesh::TriangleMesh;
 
 use crate::recipe;
 

@@ -4,7 +4,7 @@
 use edgepuck_shapes::Sampler;
 
 use crate::ground::{Ground, OWN_RADIUS_M, PAVEMENT_M};
-use crate::recipe::{Place, Recipe, Span};
+use crate::recipe::{Place, Recipe, SCALE, Span};
 use crate::stage::Stage;
 
 /// The strip at each edge of the road that lanes leave to parked cars, metres.
@@ -110,6 +110,6 @@ impl StreetSide<'_> {
     fn widest_m(&self, entry: usize) -> f64 {
         let width_m = |variant| self.stage.model(entry, variant).size_m.y;
         let widest_m = (0..self.stage.variants(entry)).map(width_m).fold(0.0, f64::max);
-        widest_m * self.stage.recipe().object[entry].scale.most
+        widest_m * SCALE.most
     }
 }

@@ -12,6 +12,7 @@
 //! with any number of threads.
 
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+#![warn(clippy::print_stdout, clippy::print_stderr)]
 
 mod boxes;
 mod clusters;

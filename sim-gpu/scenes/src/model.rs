@@ -4,14 +4,15 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
+use edgepuck_mesh::frame::{Normalize, to_world};
+use edgepuck_mesh::unit_frame::bounding_box;
+use edgepuck_mesh::{MeshFormat, TriangleMesh};
 use edgepuck_shapes::objects::{Object, ObjectKind, object, stand};
+use formats::plausible::Warning;
 use formats::streams::Stream;
 use glam::DVec3;
 use sim_gpu::Mesh;
 use sim_gpu::internals::bvh::Builder;
-use sim_gpu::internals::mesh::frame::{Normalize, to_world};
-use sim_gpu::internals::mesh::unit_frame::bounding_box;
-use sim_gpu::internals::mesh::{self, MeshFormat, TriangleMesh};
 use sim_gpu::internals::target::{Surface, Target};
 
 use crate::error::SceneError;
@@ -55,11 +56,11 @@ pub(crate) fn shared(mesh: TriangleMesh, builder: Builder) -> Mesh {
     Mesh::from_target(Target::new(Surface::new(mesh, kept), builder), DVec3::ZERO)
 }
 
-/// The files of the user's meshes, and what is doubtful about them.
+/// The files of the user's meshes, and what is probably wrong with them.
 #[derive(Default)]
 pub(crate) struct UserFiles {
     pub(crate) files: Vec<PathBuf>,
-    pub(crate) warnings: Vec<String>,
+    pub(crate) warnings: Vec<Warning>,
 }
 
 /// Reads the user's meshes for the entry `objects`, from a folder in `meshes`.
@@ -83,9 +84,8 @@ pub(crate) fn user_models(
     let span = objects.height_m.unwrap_or([1.0, 1.0].into());
     let stream = Stream::MeshHeights { folder: name }.key(seed);
     let models = files.iter().zip(0..).map(|(file, n)| {
-        let loaded = mesh::load(file)?;
-        let doubts = loaded.warnings.iter();
-        read.warnings.extend(doubts.map(|doubt| format!("{}: {doubt}", file.display())));
+        let loaded = edgepuck_mesh::load(file)?;
+        read.warnings.extend(loaded.warnings.into_iter().map(|it| it.of(file.display())));
         let world = to_world(&loaded.mesh, loaded.format.default_up(), Normalize::None);
         let model = Model::scaled(world.mesh, span.at(stream.unit(n)));
         let flat = || SceneError::FlatMesh { file: file.clone() };

@@ -7,7 +7,7 @@ use crate::footprint::Footprint;
 use crate::ground::{Ground, PAVEMENT_M};
 use crate::lanes::Lane;
 use crate::placed_object::PlacedObject;
-use crate::recipe::{Objects, Place, Span};
+use crate::recipe::{Objects, Place, SCALE, Span};
 use crate::stage::Stage;
 
 /// How many places are drawn for an object before it is left out.
@@ -102,7 +102,7 @@ impl<'a> Placer<'a> {
         (0..n)
             .map(|_| {
                 let variant = self.s.count(0, stage.variants(entry) as usize - 1) as u32;
-                let scale = DVec3::from_array([(); 3].map(|()| self.within(objects.scale)));
+                let scale = DVec3::from_array([(); 3].map(|()| self.within(SCALE)));
                 let half = (stage.model(entry, variant).size_m * scale / 2.0).truncate();
                 Unplaced { entry, variant, scale, half }
             })

@@ -2,11 +2,13 @@
 
 use std::path::Path;
 
+use edgepuck_assets::SCENE_RECIPES;
 use edgepuck_shapes::objects::ObjectKind;
 use serde::Deserialize;
 use sim_gpu::effects::Effects;
-use sim_gpu::internals::config::{self, ConfigError, InvalidValue, within};
-use sim_gpu::internals::sensor::SensorProfile;
+use sim_gpu::errors::{ConfigError, InvalidValue};
+use sim_gpu::sensors::SensorProfile;
+use sim_gpu::settings::{self, within};
 
 use crate::error::SceneError;
 
@@ -18,9 +20,6 @@ pub const OTHER: &str = "other";
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Recipe {
-    /// A description in one line.
-    #[serde(default)]
-    pub description: String,
     /// The number of different models of each built-in object.
     #[serde(default = "variants")]
     pub variants: u32,
@@ -84,18 +83,13 @@ pub struct Mount {
     pub sway_deg: Span,
 }
 
-/// A sensor and its errors.
+/// A sensor and its effects.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SensorChoice {
     /// The name of a built-in sensor, or the path of a profile relative to the recipe.
     pub profile: String,
-    /// The standard deviation of the range, metres; that of the profile by default.
-    pub noise_m: Option<f64>,
-    /// The probability that a return is lost.
-    #[serde(default)]
-    pub dropout: f64,
-    /// Further effects, such as the detection limit; none by default.
+    /// The effects, such as the detection limit. The noise is that of the profile by default.
     #[serde(default)]
     pub effects: Effects,
 }
@@ -117,9 +111,6 @@ pub struct Objects {
     /// The space to the next object in a row or a group, metres.
     #[serde(default = "gap")]
     pub gap_m: Span,
-    /// The scale factor, drawn for each axis.
-    #[serde(default = "scale")]
-    pub scale: Span,
     /// The speed along the street in a drive, metres a second; 0 by default. In a scene all
     /// objects stand.
     #[serde(default)]
@@ -154,6 +145,9 @@ formats::named! {
     }
 }
 
+/// The scale factor of each object, drawn for each axis.
+pub(crate) const SCALE: Span = Span { least: 0.94, most: 1.06 };
+
 /// A range of numbers, `[least, most]`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
 #[serde(from = "[f64; 2]")]
@@ -180,10 +174,6 @@ fn gap() -> Span {
 
 fn white() -> Span {
     [1.0, 1.0].into()
-}
-
-fn scale() -> Span {
-    [0.94, 1.06].into()
 }
 
 impl Default for Ground {
@@ -228,12 +218,25 @@ impl Span {
 const MOST_M: f64 = 1000.0;
 
 impl Recipe {
+    /// A built-in recipe by its name, or the one in a file.
+    ///
+    /// # Errors
+    /// There is neither, or the recipe is invalid.
+    pub fn resolve(name_or_file: &Path) -> Result<Self, SceneError> {
+        let built_in = SCENE_RECIPES.iter().find(|(name, _)| Path::new(name) == name_or_file);
+        match built_in {
+            Some((_, text)) => Self::parse(text, name_or_file),
+            None if name_or_file.exists() => Self::load(name_or_file),
+            None => Err(SceneError::NoRecipe(name_or_file.to_owned())),
+        }
+    }
+
     /// Reads the recipe in `file`.
     ///
     /// # Errors
     /// The file is missing or invalid; the error names the key and the cause.
     pub fn load(file: &Path) -> Result<Self, SceneError> {
-        Ok(config::read(file, Self::checked)?)
+        Ok(settings::read(file, Self::checked)?)
     }
 
     /// Parses the recipe `text`. Errors name `file`, which need not exist.
@@ -241,7 +244,7 @@ impl Recipe {
     /// # Errors
     /// The recipe is invalid; the error names the key and the cause.
     pub fn parse(text: &str, file: &Path) -> Result<Self, SceneError> {
-        Ok(config::parse(text, file, Self::checked)?)
+        Ok(settings::parse(text, file, Self::checked)?)
     }
 
     fn checked(self) -> Result<Self, Vec<InvalidValue>> {
@@ -276,16 +279,19 @@ impl Recipe {
             several("sensor", sensor.is_empty()),
             several("object", object.is_empty()),
         ];
-        let sensors = sensor.iter().enumerate();
-        let sensors = sensors.map(|(i, sensor)| sensor.check(&format!("sensor[{i}]")));
+        let sensors = sensor.iter().enumerate().map(|(i, sensor)| {
+            // A larger number was meant in millimetres.
+            let sigma_m = sensor.effects.noise.map_or(0.0, |noise| noise.sigma_m);
+            within(&format!("sensor[{i}].effects.noise.sigma_m"), sigma_m, 0.0..=1.0)
+        });
         let objects = object.iter().enumerate();
         let objects = objects.map(|(i, objects)| objects.check(&format!("object[{i}]")));
-        config::all(numbers.into_iter().chain(sensors).chain(objects))?;
+        settings::all(numbers.into_iter().chain(sensors).chain(objects))?;
         Ok(self)
     }
 
     /// Replaces the sensors by those with these `names`, unless `names` is empty. Sensors of the
-    /// recipe keep their noise, dropout and effects.
+    /// recipe keep their effects.
     pub fn use_sensors(&mut self, names: &[String]) {
         if names.is_empty() {
             return;
@@ -315,22 +321,6 @@ impl Recipe {
             .iter()
             .map(|sensor| SensorProfile::resolve_in(folder, &sensor.profile))
             .collect()
-    }
-}
-
-impl SensorChoice {
-    fn check(&self, key: &str) -> Result<(), InvalidValue> {
-        within(&format!("{key}.noise_m"), self.noise_m, 0.0..=1.0)?;
-        within(&format!("{key}.dropout"), self.dropout, 0.0..=1.0)?;
-        for (own, is_there) in
-            [("noise", self.effects.noise.is_some()), ("dropout", self.effects.dropout.is_some())]
-        {
-            if is_there {
-                let cause = "expected the sensor's own noise_m and dropout instead";
-                return Err(InvalidValue::new(format!("{key}.effects.{own}"), cause));
-            }
-        }
-        Ok(())
     }
 }
 
@@ -389,7 +379,6 @@ impl Objects {
         }
         self.distance_m.check(&at("distance_m"), 0.01, MOST_M)?;
         self.gap_m.check(&at("gap_m"), 0.0, MOST_M)?;
-        self.scale.check(&at("scale"), 0.01, 100.0)?;
         self.reflectivity.check(&at("reflectivity"), 0.0, 1.0)?;
         self.speed_m_s.check(&at("speed_m_s"), 0.0, 100.0)?;
         if self.moves() && !matches!(self.place, Place::Road | Place::Pavement) {

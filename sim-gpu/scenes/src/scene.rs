@@ -3,7 +3,7 @@ use std::f64::consts::TAU;
 use edgepuck_shapes::Sampler;
 use formats::streams::Stream;
 use glam::{DQuat, DVec2, DVec3};
-use sim_gpu::internals::pose::{Pose, Trajectory};
+use sim_gpu::{Pose, Trajectory};
 
 use crate::footprint::Footprint;
 use crate::ground::{Ground, OWN_RADIUS_M};

@@ -1,7 +1,7 @@
 //! The azimuths that the beams of a packet cover.
 
 use glam::{DVec2, DVec3};
-use sim_gpu::internals::sensor::BeamPattern;
+use sim_gpu::sensors::BeamPattern;
 
 /// An interval of azimuths in the sensor's frame.
 pub(crate) struct Sector {

@@ -3,12 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
+use formats::plausible::Warning;
 use formats::streams::Stream;
 use glam::{DQuat, DVec3};
-use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel};
+use sim_gpu::effects::{Effects, Intensity, Noise};
+use sim_gpu::errors::{ConfigError, InvalidValue};
 use sim_gpu::internals::caster::OpenCaster;
-use sim_gpu::internals::config::InvalidValue;
-use sim_gpu::internals::sensor::SensorProfile;
+use sim_gpu::sensors::SensorProfile;
 use sim_gpu::{Caster, Glass, InstanceId, Mesh, Pose, Scene, Sensor};
 
 use crate::error::SceneError;
@@ -67,14 +68,13 @@ impl Stage {
         let mut sensors = Vec::with_capacity(profiles.len());
         for (choice, profile) in recipe.sensor.iter().zip(profiles) {
             let typical_m = profile.noise.map_or(0.0, |noise| noise.sigma_m());
-            let sigma_m = choice.noise_m.unwrap_or(typical_m);
             let effects = Effects {
-                noise: Some(Noise { mean_m: 0.0, sigma_m, model: NoiseModel::Range }),
-                dropout: Some(Dropout { probability: choice.dropout }),
+                noise: choice.effects.noise.or(Some(Noise::along_range(typical_m))),
                 intensity: Some(Intensity),
                 ..choice.effects.clone()
             };
-            let in_file = |invalid: InvalidValue| SceneError::from(invalid.in_file(file));
+            let in_file =
+                |invalid: InvalidValue| SceneError::from(ConfigError::value(file, invalid));
             effects.for_sensor(&profile).map_err(in_file)?;
             let sensor = Sensor::from(profile);
             sensor.rays(&effects).map_err(in_file)?;
@@ -90,9 +90,9 @@ impl Stage {
         Ok(Self { classes, recipe, seed, sensors, models, user_files })
     }
 
-    /// What is doubtful about the files of the user's meshes.
+    /// What is probably wrong with the files of the user's meshes.
     #[must_use]
-    pub fn warnings(&self) -> &[String] {
+    pub fn warnings(&self) -> &[Warning] {
         &self.user_files.warnings
     }
 

@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
+use edgepuck_mesh::TriangleMesh;
 use formats::Scan;
 use formats::rng::StreamKey;
 use formats::scan::Attribute;
 use formats::streams::Stream;
 use glam::DVec3;
 use sim_gpu::internals::bvh::Builder;
-use sim_gpu::internals::mesh::TriangleMesh;
 use sim_gpu::internals::scan::{PlacedTarget, ScanRequest, scan_objects};
 use sim_gpu::{Effects, Scene, Sensor};
 

@@ -3,7 +3,7 @@ mod fuselage;
 mod jet;
 mod wing;
 
-use crate::primitives::{Builder, DVec3, Makes, Sampler};
+use crate::primitives::{Builder, DVec3, Makes, Sampler, dvec3};
 use details::{gear, jet_engine, propeller, struts};
 use fuselage::Fuselage;
 use jet::fighter;
@@ -30,7 +30,7 @@ fn liner(b: &mut Builder, s: &mut Sampler) {
     let sweep = s.uniform(0.15, 0.6);
     let high = s.chance(0.2);
     let wing = Wing {
-        root: DVec3::new(0.0, -0.12 * length_m, if high { 0.75 * r } else { -0.55 * r }),
+        root: dvec3(0.0, -0.12 * length_m, if high { 0.75 * r } else { -0.55 * r }),
         half_span_m: length_m * s.uniform(0.4, 0.56),
         root_chord_m: length_m * s.uniform(0.15, 0.23),
         taper: s.uniform(0.2, 0.4),
@@ -47,7 +47,7 @@ fn liner(b: &mut Builder, s: &mut Sampler) {
     tail(b, s, &body, t_tail);
     let engine_m = length_m * s.uniform(0.055, 0.09);
     if rear_engines {
-        let at = DVec3::new(1.45 * r, 0.27 * length_m, 0.45 * r);
+        let at = dvec3(1.45 * r, 0.27 * length_m, 0.45 * r);
         b.mirrored_x(|b| jet_engine(b, at, 0.3 * engine_m, 1.2 * engine_m));
     } else {
         engines(b, s, &wing, engine_m, high);
@@ -70,7 +70,7 @@ fn engines(b: &mut Builder, s: &mut Sampler, wing: &Wing, size_m: f64, high: boo
                 details::nacelle(b, front, 0.25 * size_m, 2.0 * size_m);
                 propeller(b, front, 1.1 * size_m, 4);
             } else {
-                let hung = nose - DVec3::new(0.0, 0.35 * size_m, 1.05 * radius_m);
+                let hung = nose - dvec3(0.0, 0.35 * size_m, 1.05 * radius_m);
                 jet_engine(b, hung, radius_m, 1.2 * size_m);
             }
         });
@@ -88,9 +88,9 @@ fn tail(b: &mut Builder, s: &mut Sampler, body: &Fuselage, t_tail: bool) {
     let stabilizer_chord_m = 0.75 * chord_m;
     let y = 0.47 * length_m - stabilizer_chord_m;
     let at = if t_tail {
-        root + DVec3::new(0.0, sweep * high_m, 0.97 * high_m)
+        root + dvec3(0.0, sweep * high_m, 0.97 * high_m)
     } else {
-        DVec3::new(0.0, y, root.z + 0.05 * high_m)
+        dvec3(0.0, y, root.z + 0.05 * high_m)
     };
     let stabilizer = Wing {
         root: at,
@@ -113,7 +113,7 @@ fn light(b: &mut Builder, s: &mut Sampler) {
     body.build(b);
     let high = s.chance(0.5);
     let wing = Wing {
-        root: DVec3::new(0.0, -0.2 * length_m, if high { 0.95 * r } else { -0.7 * r }),
+        root: dvec3(0.0, -0.2 * length_m, if high { 0.95 * r } else { -0.7 * r }),
         half_span_m: length_m * s.uniform(0.5, 0.75),
         root_chord_m: length_m * s.uniform(0.16, 0.24),
         taper: s.uniform(0.45, 1.0),
@@ -126,7 +126,7 @@ fn light(b: &mut Builder, s: &mut Sampler) {
         struts(b, &wing, -0.8 * r);
     }
     if !high || s.chance(0.4) {
-        details::canopy(b, DVec3::new(0.0, -0.06 * length_m, 0.75 * r), r, 0.13 * length_m);
+        details::canopy(b, dvec3(0.0, -0.06 * length_m, 0.75 * r), r, 0.13 * length_m);
     }
     let t_tail = s.chance(0.15);
     tail(b, s, &body, t_tail);
@@ -148,7 +148,7 @@ fn biplane(b: &mut Builder, s: &mut Sampler) {
     let r = body.radius_m();
     body.build(b);
     let lower = Wing {
-        root: DVec3::new(0.0, -0.25 * length_m, -0.7 * r),
+        root: dvec3(0.0, -0.25 * length_m, -0.7 * r),
         half_span_m: length_m * s.uniform(0.45, 0.62),
         root_chord_m: length_m * s.uniform(0.15, 0.2),
         taper: s.uniform(0.8, 1.0),
@@ -158,7 +158,7 @@ fn biplane(b: &mut Builder, s: &mut Sampler) {
     };
     let gap_m = r * s.uniform(2.2, 3.0);
     let stagger_m = -s.uniform(0.0, 0.08) * length_m;
-    let upper = Wing { root: lower.root + DVec3::new(0.0, stagger_m, gap_m), ..lower };
+    let upper = Wing { root: lower.root + dvec3(0.0, stagger_m, gap_m), ..lower };
     lower.build(b);
     upper.build(b);
     for station in [0.12, 0.75] {
@@ -176,9 +176,9 @@ fn glider(b: &mut Builder, s: &mut Sampler) {
         Fuselage { slender: s.uniform(9.0, 12.0), nose: 0.2, tail: 0.65, length_m, upsweep: 0.5 };
     let r = body.radius_m();
     body.build(b);
-    details::canopy(b, DVec3::new(0.0, -0.3 * length_m, 0.55 * r), 0.75 * r, 0.12 * length_m);
+    details::canopy(b, dvec3(0.0, -0.3 * length_m, 0.55 * r), 0.75 * r, 0.12 * length_m);
     let wing = Wing {
-        root: DVec3::new(0.0, -0.15 * length_m, 0.6 * r),
+        root: dvec3(0.0, -0.15 * length_m, 0.6 * r),
         half_span_m: length_m * s.uniform(0.9, 1.4),
         root_chord_m: length_m * s.uniform(0.1, 0.15),
         taper: s.uniform(0.3, 0.6),
@@ -198,7 +198,7 @@ fn glider(b: &mut Builder, s: &mut Sampler) {
 fn flying_wing(b: &mut Builder, s: &mut Sampler) {
     let half_span_m = s.uniform(8.0, 26.0);
     let wing = Wing {
-        root: DVec3::new(0.0, -0.3 * half_span_m, 0.0),
+        root: dvec3(0.0, -0.3 * half_span_m, 0.0),
         half_span_m,
         root_chord_m: half_span_m * s.uniform(0.45, 0.65),
         taper: s.uniform(0.12, 0.3),
@@ -214,9 +214,8 @@ fn flying_wing(b: &mut Builder, s: &mut Sampler) {
         length_m: 1.05 * wing.root_chord_m,
         upsweep: 0.0,
     };
-    let middle = wing.root + 0.5 * wing.root_chord_m * DVec3::Y;
-    b.shifted(middle, |b| body.build(b));
-    let hump = wing.leading_edge(0.16) + DVec3::new(0.0, 0.1, 0.04) * half_span_m;
+    b.shifted(wing.root + 0.5 * wing.root_chord_m * DVec3::Y, |b| body.build(b));
+    let hump = wing.leading_edge(0.16) + dvec3(0.0, 0.1, 0.04) * half_span_m;
     b.mirrored_x(|b| details::nacelle(b, hump, 0.04 * half_span_m, 0.35 * half_span_m));
     if s.chance(0.4) {
         wing.winglets(b, 0.15 * half_span_m);

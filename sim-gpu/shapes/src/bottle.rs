@@ -1,7 +1,4 @@
-use crate::primitives::{
-    Builder, DAffine3, DVec3, Profile, Sampler, Section, Vessel, Wall, block, cylinder, frustum,
-    smooth_tube,
-};
+use crate::primitives::*;
 
 struct Form {
     body_m: f64,
@@ -111,8 +108,7 @@ fn cap(b: &mut Builder, s: &mut Sampler, f: &Form) {
 
 fn cork(b: &mut Builder, s: &mut Sampler, f: &Form) {
     let high_m = f.height_m * s.uniform(0.04, 0.1);
-    let base = (f.height_m - 0.5 * high_m) * DVec3::Z;
-    frustum(b, base, [0.8 * f.neck_m, 0.95 * f.neck_m], high_m);
+    frustum(b, (f.height_m - 0.5 * high_m) * DVec3::Z, [0.8 * f.neck_m, 0.95 * f.neck_m], high_m);
 }
 
 /// A soap pump: collar, stem and a spout to the front.
@@ -123,7 +119,7 @@ fn pump(b: &mut Builder, s: &mut Sampler, f: &Form) {
     cylinder(b, 0.97 * f.height_m * DVec3::Z, 1.15 * f.neck_m, 0.06 * f.height_m);
     cylinder(b, f.height_m * DVec3::Z, thin_m, top_m - f.height_m);
     let points = [(0.4 * thin_m, 0.0), (-0.6 * reach_m, 0.01), (-reach_m, -0.05)];
-    let points = points.map(|(y, z)| DVec3::new(0.0, y, top_m + z * f.height_m));
+    let points = points.map(|(y, z)| dvec3(0.0, y, top_m + z * f.height_m));
     smooth_tube(b, &points, 2, 1.3 * thin_m);
 }
 
@@ -132,13 +128,12 @@ fn trigger(b: &mut Builder, s: &mut Sampler, f: &Form) {
     let size_m = f.body_m * s.uniform(0.7, 1.0);
     let z = f.height_m + 0.25 * size_m;
     cylinder(b, 0.96 * f.height_m * DVec3::Z, 1.1 * f.neck_m, 0.05 * f.height_m);
-    let head = DVec3::new(0.45 * size_m, 1.7 * size_m, 0.5 * size_m);
-    block(b, DVec3::new(0.0, -0.3 * size_m, z), head);
+    block(b, dvec3(0.0, -0.3 * size_m, z), dvec3(0.45 * size_m, 1.7 * size_m, 0.5 * size_m));
     let lever = [(-0.7, -0.1), (-0.8, -0.6), (-1.05, -1.0)];
-    let lever = lever.map(|(y, dz)| DVec3::new(0.0, y * size_m, z + dz * size_m));
+    let lever = lever.map(|(y, dz)| dvec3(0.0, y * size_m, z + dz * size_m));
     smooth_tube(b, &lever, 2, 0.1 * size_m);
     let forwards = DAffine3::from_rotation_x(std::f64::consts::FRAC_PI_2);
-    b.turned(DVec3::new(0.0, -1.1 * size_m, z), forwards, |b| {
+    b.turned(dvec3(0.0, -1.1 * size_m, z), forwards, |b| {
         cylinder(b, DVec3::ZERO, 0.15 * size_m, 0.25 * size_m);
     });
 }
@@ -154,5 +149,5 @@ fn handle(b: &mut Builder, s: &mut Sampler, f: &Form) {
         (reach_m, 0.5 * (high_m + low_m)),
         (0.92 * f.body_m, low_m),
     ];
-    smooth_tube(b, &points.map(|(x, z)| DVec3::new(x, 0.0, z)), 3, 0.12 * f.body_m);
+    smooth_tube(b, &points.map(|(x, z)| dvec3(x, 0.0, z)), 3, 0.12 * f.body_m);
 }

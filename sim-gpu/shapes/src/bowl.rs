@@ -1,4 +1,4 @@
-use crate::primitives::{Builder, DVec3, Profile, Sampler, Section, Vessel, Wall, smooth, tube};
+use crate::primitives::{Builder, Profile, Sampler, Section, Vessel, Wall, dvec3, smooth, tube};
 
 /// Builds a bowl. Deep bowls have the proportions of cups or vases.
 pub fn build(b: &mut Builder, s: &mut Sampler) {
@@ -59,10 +59,10 @@ fn lugs(b: &mut Builder, s: &mut Sampler, rim_m: f64, height_m: f64) {
     let side_m = 0.3 * rim_m;
     let z = 0.85 * height_m;
     let points = [
-        DVec3::new(0.8 * rim_m, -side_m, z),
-        DVec3::new(out_m, -0.6 * side_m, z),
-        DVec3::new(out_m, 0.6 * side_m, z),
-        DVec3::new(0.8 * rim_m, side_m, z),
+        dvec3(0.8 * rim_m, -side_m, z),
+        dvec3(out_m, -0.6 * side_m, z),
+        dvec3(out_m, 0.6 * side_m, z),
+        dvec3(0.8 * rim_m, side_m, z),
     ];
     let path = smooth(b, &points, 3);
     b.mirrored_x(|b| tube(b, &path, 0.06 * rim_m));

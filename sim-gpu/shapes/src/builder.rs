@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DVec3, dvec3};
 
-use sim_gpu::internals::mesh::TriangleMesh;
+use edgepuck_mesh::TriangleMesh;
 
 /// A mesh under construction.
 ///
@@ -87,12 +87,12 @@ impl Builder {
     /// Runs `build` twice, the second time mirrored at the plane x = 0.
     pub fn mirrored_x(&mut self, build: impl Fn(&mut Self)) {
         build(self);
-        self.place(DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0)), build);
+        self.place(DAffine3::from_scale(dvec3(-1.0, 1.0, 1.0)), build);
     }
 
     pub fn mirrored_y(&mut self, build: impl Fn(&mut Self)) {
         build(self);
-        self.place(DAffine3::from_scale(DVec3::new(1.0, -1.0, 1.0)), build);
+        self.place(DAffine3::from_scale(dvec3(1.0, -1.0, 1.0)), build);
     }
 
     /// The number of segments of a circle of `radius_m`, at least `least`.
@@ -164,7 +164,7 @@ mod tests {
     fn a_pole_makes_a_fan_and_a_wrapped_row_closes() {
         let ring: Vec<DVec3> = (0..5)
             .map(|k| (f64::from(k) * std::f64::consts::TAU / 5.0).sin_cos())
-            .map(|(y, x)| DVec3::new(x, y, 0.0))
+            .map(|(y, x)| dvec3(x, y, 0.0))
             .collect();
         let mut builder = Builder::new(1.0, 1.0);
         builder.grid(&[ring, vec![DVec3::Z]], true);
@@ -183,10 +183,10 @@ mod tests {
     fn mirroring_adds_the_same_part_on_the_other_side() {
         let mut builder = Builder::new(1.0, 1.0);
         builder.mirrored_x(|b| {
-            b.grid(&[vec![DVec3::X, DVec3::X * 2.0], vec![DVec3::new(1.0, 1.0, 0.0)]], false);
+            b.grid(&[vec![DVec3::X, DVec3::X * 2.0], vec![dvec3(1.0, 1.0, 0.0)]], false);
         });
         let (mesh, _) = builder.finish();
-        assert_eq!(mesh.vertices[4], DVec3::new(-2.0, 0.0, 0.0));
+        assert_eq!(mesh.vertices[4], dvec3(-2.0, 0.0, 0.0));
         assert_eq!(mesh.triangles.len(), 2);
     }
 }

@@ -1,9 +1,7 @@
 mod back;
 mod base;
 
-use crate::primitives::{
-    Builder, DVec2, DVec3, Sampler, bar, block_between, cushion, outline, prism, rod, smooth, tube,
-};
+use crate::primitives::*;
 
 /// The seat of a chair that faces -y. All other parts are fitted to it.
 struct Seat {
@@ -40,7 +38,7 @@ impl Seat {
         let top_m = if tall { s.uniform(0.6, 0.8) } else { s.uniform(0.34, 0.52) };
         let shape = s.pick(&[Board, Board, Rounded, Cushion, Cushion, Round]);
         let thick_m = if shape == Cushion { s.uniform(0.06, 0.14) } else { s.uniform(0.015, 0.05) };
-        Self { half: DVec2::new(width_m, depth_m) / 2.0, top_m, thick_m, shape }
+        Self { half: dvec2(width_m, depth_m) / 2.0, top_m, thick_m, shape }
     }
 
     fn under_m(&self) -> f64 {
@@ -106,21 +104,21 @@ fn arms(b: &mut Builder, s: &mut Sampler, seat: &Seat) {
     let kind = s.pick(&[Arms::Posts, Arms::Posts, Arms::Loop, Arms::Bent]);
     let mid_m = seat.top_m - 0.5 * seat.thick_m;
     let end = match kind {
-        Arms::Loop => DVec3::new(seat.side_m(rear), rear, mid_m),
-        Arms::Posts | Arms::Bent => DVec3::new(x, rear, z),
+        Arms::Loop => dvec3(seat.side_m(rear), rear, mid_m),
+        Arms::Posts | Arms::Bent => dvec3(x, rear, z),
     };
     let points = [
-        DVec3::new(seat.side_m(front), front, mid_m),
-        DVec3::new(x, front - 0.04, 0.5 * (z + mid_m)),
-        DVec3::new(x, 0.5 * front, z),
+        dvec3(seat.side_m(front), front, mid_m),
+        dvec3(x, front - 0.04, 0.5 * (z + mid_m)),
+        dvec3(x, 0.5 * front, z),
         end,
     ];
     let path = smooth(b, &points, 3);
     b.mirrored_x(|b| {
         if kind == Arms::Posts {
-            bar(b, DVec3::new(x, front, z), DVec3::new(x, rear, z), wide_m, 0.02);
+            bar(b, dvec3(x, front, z), dvec3(x, rear, z), wide_m, 0.02);
             for y in [0.8 * front, 0.45 * seat.half.y] {
-                rod(b, DVec3::new(seat.side_m(y), y, mid_m), DVec3::new(x, y, z), [r, r]);
+                rod(b, dvec3(seat.side_m(y), y, mid_m), dvec3(x, y, z), [r, r]);
             }
         } else {
             tube(b, &path, r);
@@ -144,15 +142,15 @@ fn club_chair(b: &mut Builder, s: &mut Sampler) {
         cushion(b, (low + high) / 2.0, high - low, soft_m);
     };
     let base_top_m = seat_m - 0.12;
-    let base = DVec3::new(half_m, 0.95 * deep_m, base_top_m);
-    block_between(b, DVec3::new(-base.x, -base.y, feet_m), base);
+    let base = dvec3(half_m, 0.95 * deep_m, base_top_m);
+    block_between(b, dvec3(-base.x, -base.y, feet_m), base);
     soft(b, [-inner_m, -deep_m, base_top_m], [inner_m, 0.6 * deep_m, seat_m]);
     soft(b, [-half_m, 0.55 * deep_m, feet_m], [half_m, deep_m + 0.06, back_top_m]);
     b.mirrored_x(|b| {
         soft(b, [inner_m, -deep_m, feet_m], [half_m, deep_m, arm_top_m]);
         for y in [-0.8 * deep_m, 0.8 * deep_m] {
             let x = half_m - 0.06;
-            rod(b, DVec3::new(x, y, 0.0), DVec3::new(x, y, feet_m + 0.02), [0.015, 0.025]);
+            rod(b, dvec3(x, y, 0.0), dvec3(x, y, feet_m + 0.02), [0.015, 0.025]);
         }
     });
 }

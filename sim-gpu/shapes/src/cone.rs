@@ -1,9 +1,6 @@
 use std::f64::consts::PI;
 
-use crate::primitives::{
-    Builder, DAffine3, DVec2, DVec3, Makes, Profile, Sampler, Section, Vessel, Wall, ellipsoid,
-    outline, prism,
-};
+use crate::primitives::*;
 
 pub const MAKES: Makes =
     &[(3, plain), (2, traffic_cone), (1, party_hat), (1, ice_cream), (1, funnel)];
@@ -42,8 +39,7 @@ fn traffic_cone(b: &mut Builder, s: &mut Sampler) {
     let rounded = outline::rounded_rectangle(half, 0.3 * plate_m, b.around(0.3 * plate_m, 12) / 4);
     let octagon = outline::ellipse(half * 1.08, 8);
     let disc = outline::ellipse(half, b.around(plate_m, 12));
-    let plate = s.pick(&[square, rounded, octagon, disc]);
-    prism(b, &plate, 0.0, thick_m, s.uniform(0.85, 1.0));
+    prism(b, &s.pick(&[square, rounded, octagon, disc]), 0.0, thick_m, s.uniform(0.85, 1.0));
     let radius = |share: f64| foot_m + share * (tip_m - foot_m);
     let mut profile = Profile::from(foot_m, 0.9 * thick_m);
     for collar in 0..s.count(0, 3) {

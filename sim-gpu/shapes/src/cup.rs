@@ -1,6 +1,4 @@
-use crate::primitives::{
-    Builder, DVec2, DVec3, Profile, Sampler, Section, Vessel, Wall, outline, smooth, sweep,
-};
+use crate::primitives::*;
 
 struct Body {
     rim_m: f64,
@@ -119,11 +117,11 @@ fn handle(b: &mut Builder, s: &mut Sampler, body: &Body) {
     let (is_smooth, between) =
         s.weighted(&[(2, (true, round)), (1, (true, ear)), (1, (false, angular))]);
     let points = [vec![root(above)], between, vec![root(below)]].concat();
-    let points: Vec<_> = points.iter().map(|&(r, z)| DVec3::new(r, 0.0, z)).collect();
+    let points: Vec<_> = points.iter().map(|&(r, z)| dvec3(r, 0.0, z)).collect();
     let path = if is_smooth { smooth(b, &points, 3) } else { points };
     let thick_m = body.rim_m * s.uniform(0.07, 0.14);
     let wide_m = thick_m * s.uniform(1.0, 2.0);
     // The path lies in the plane y = 0, so a section's x is level across it.
-    let section = outline::superellipse(DVec2::new(wide_m, thick_m), 2.5, b.around(thick_m, 6));
+    let section = outline::superellipse(dvec2(wide_m, thick_m), 2.5, b.around(thick_m, 6));
     sweep(b, &path, &section);
 }

@@ -7,7 +7,7 @@ use glam::{DQuat, DVec3};
 
 use super::class::{FAMILIES, ShapeClass};
 use crate::primitives::{Builder, Sampler};
-use sim_gpu::internals::mesh::TriangleMesh;
+use edgepuck_mesh::TriangleMesh;
 
 pub const MIN_TRIANGLES: usize = 200;
 const MAX_TRIANGLES: usize = 50_000;

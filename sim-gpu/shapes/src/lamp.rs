@@ -2,10 +2,7 @@ mod shade;
 
 use std::f64::consts::{PI, TAU};
 
-use crate::primitives::{
-    Builder, DAffine3, DVec2, DVec3, Makes, Profile, Sampler, Section, Vessel, Wall, block,
-    cylinder, ellipsoid, frustum, rod, smooth_tube,
-};
+use crate::primitives::*;
 use shade::shade;
 
 pub const MAKES: Makes = &[
@@ -75,8 +72,7 @@ fn tripod(b: &mut Builder, s: &mut Sampler) {
     let r = height_m * s.uniform(0.007, 0.016);
     for leg in 0..3 {
         let out = DVec2::from_angle((leg as f64 + 0.25) / 3.0 * TAU);
-        let top = (0.1 * reach_m * out).extend(joint_m);
-        rod(b, (reach_m * out).extend(0.0), top, [r, r]);
+        rod(b, (reach_m * out).extend(0.0), (0.1 * reach_m * out).extend(joint_m), [r, r]);
     }
     cylinder(b, 0.97 * joint_m * DVec3::Z, 0.2 * reach_m, 0.04 * height_m);
     cylinder(b, joint_m * DVec3::Z, r, height_m - joint_m);
@@ -90,11 +86,11 @@ fn arc_lamp(b: &mut Builder, s: &mut Sampler) {
     let reach_m = height_m * s.uniform(0.35, 0.75);
     let drop_m = height_m * s.uniform(0.15, 0.35);
     let shapes = [(0.0, 0.0), (0.02, 0.5), (0.25, 0.9), (0.6, 1.0), (1.0, 1.0 - drop_m / height_m)];
-    let points = shapes.map(|(y, z)| DVec3::new(0.0, -y * reach_m, z * height_m));
+    let points = shapes.map(|(y, z)| dvec3(0.0, -y * reach_m, z * height_m));
     smooth_tube(b, &points, 3, height_m * s.uniform(0.006, 0.012));
     cylinder(b, DVec3::ZERO, 0.1 * height_m, 0.04 * height_m);
     let radius_m = height_m * s.uniform(0.08, 0.14);
-    b.shifted(DVec3::new(0.0, -reach_m, 0.0), |b| {
+    b.shifted(dvec3(0.0, -reach_m, 0.0), |b| {
         shade(b, s, height_m - drop_m, radius_m, 0.9 * radius_m);
     });
 }
@@ -126,11 +122,11 @@ fn desk_lamp(b: &mut Builder, s: &mut Sampler) {
     if s.chance(0.75) {
         frustum(b, DVec3::ZERO, [foot_m, 0.9 * foot_m], 0.08 * arm_m);
     } else {
-        block(b, 0.04 * arm_m * DVec3::Z, DVec3::new(1.6 * foot_m, 1.6 * foot_m, 0.08 * arm_m));
+        block(b, 0.04 * arm_m * DVec3::Z, dvec3(1.6 * foot_m, 1.6 * foot_m, 0.08 * arm_m));
     }
     let shoulder = 0.06 * arm_m * DVec3::Z;
-    let elbow = shoulder + arm_m * DVec3::new(0.0, libm::sin(back_rad), libm::cos(back_rad));
-    let over = DVec3::new(0.0, -libm::cos(over_rad), libm::sin(over_rad));
+    let elbow = shoulder + arm_m * dvec3(0.0, libm::sin(back_rad), libm::cos(back_rad));
+    let over = dvec3(0.0, -libm::cos(over_rad), libm::sin(over_rad));
     let wrist = elbow + arm_m * s.uniform(0.7, 1.05) * over;
     let twin = s.chance(0.5);
     for side in if twin { vec![-1.0, 1.0] } else { vec![0.0] } {
@@ -139,7 +135,7 @@ fn desk_lamp(b: &mut Builder, s: &mut Sampler) {
         rod(b, elbow + aside, wrist + aside, [r, r]);
     }
     for joint in [shoulder, elbow, wrist] {
-        ellipsoid(b, joint, DVec3::new(3.6 * r, 2.2 * r, 2.2 * r));
+        ellipsoid(b, joint, dvec3(3.6 * r, 2.2 * r, 2.2 * r));
     }
     let tilt_rad = s.uniform(-0.7, 0.1);
     let size_m = arm_m * s.uniform(0.25, 0.4);
@@ -155,7 +151,7 @@ fn gooseneck(b: &mut Builder, s: &mut Sampler) {
     let mut points = vec![DVec3::ZERO, 0.5 * (height_m - bend_m) * DVec3::Z];
     for k in 0..5 {
         let (sin, cos) = libm::sincos(k as f64 / 4.0 * 0.85 * PI);
-        points.push(DVec3::new(0.0, -bend_m * (1.0 - cos), height_m - bend_m + bend_m * sin));
+        points.push(dvec3(0.0, -bend_m * (1.0 - cos), height_m - bend_m + bend_m * sin));
     }
     smooth_tube(b, &points, 2, 0.012 * height_m + 0.003);
     frustum(b, DVec3::ZERO, [foot_m, foot_m * s.uniform(0.6, 1.0)], 0.2 * foot_m);

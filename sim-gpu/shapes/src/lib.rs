@@ -8,6 +8,7 @@
 //! a classifier must learn shapes instead of sizes.
 
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
+#![warn(clippy::print_stdout, clippy::print_stderr)]
 
 mod airplane;
 mod bottle;
@@ -42,9 +43,9 @@ pub use write::{write_obj, write_off};
 use formats::streams::Stream;
 
 use class::FAMILIES;
+use edgepuck_mesh::TriangleMesh;
 use finish::Finish;
 use primitives::build_one;
-use sim_gpu::internals::mesh::TriangleMesh;
 
 /// Generates shape number `instance` of `class` under `seed`.
 ///

@@ -2,10 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::primitives::{
-    Builder, DVec2, DVec3, Profile, Sampler, Section, bar, block_between, cylinder, ellipsoid,
-    loft, outline, rod, smooth_tube, tube,
-};
+use crate::primitives::*;
 
 pub struct Legs {
     kind: LegKind,
@@ -44,8 +41,8 @@ impl Legs {
 
     /// The point on the floor of the leg with this top.
     pub fn foot(&self, top: DVec3) -> DVec3 {
-        let out = DVec2::new(top.x, top.y).normalize_or_zero() * self.splay * top.z;
-        DVec3::new(top.x + out.x, top.y + out.y, 0.0)
+        let out = dvec2(top.x, top.y).normalize_or_zero() * self.splay * top.z;
+        dvec3(top.x + out.x, top.y + out.y, 0.0)
     }
 
     /// Adds one leg from `top` to the floor, leaning away from the z axis.
@@ -90,7 +87,7 @@ fn curved_leg(b: &mut Builder, top: DVec3, r: f64) {
 }
 
 fn hairpin(b: &mut Builder, top: DVec3, foot: DVec3, r: f64) {
-    let across = DVec3::new(-top.y, top.x, 0.0).normalize_or(DVec3::X) * 0.1 * top.z;
+    let across = dvec3(-top.y, top.x, 0.0).normalize_or(DVec3::X) * 0.1 * top.z;
     for side in [-1.0, 1.0] {
         rod(b, foot, top + side * across, [r, r]);
     }
@@ -100,7 +97,7 @@ fn hairpin(b: &mut Builder, top: DVec3, foot: DVec3, r: f64) {
 /// the height, if given.
 pub fn four_legs(b: &mut Builder, legs: &Legs, half: DVec2, top_m: f64, stretcher: Option<f64>) {
     let tops = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
-        .map(|(x, y)| DVec3::new(x * half.x, y * half.y, top_m));
+        .map(|(x, y)| dvec3(x * half.x, y * half.y, top_m));
     for top in tops {
         legs.build(b, top);
     }
@@ -140,8 +137,7 @@ pub fn star_pedestal(b: &mut Builder, s: &mut Sampler, reach_m: f64, height_m: f
     let hub_m = height_m * s.uniform(0.15, 0.3);
     let castor_m = if castors { 0.1 * reach_m } else { 0.0 };
     for arm in 0..n_arms {
-        let turn_rad = (arm as f64 + 0.25) / n_arms as f64 * TAU;
-        let out = DVec2::from_angle(turn_rad).extend(0.0);
+        let out = DVec2::from_angle((arm as f64 + 0.25) / n_arms as f64 * TAU).extend(0.0);
         let tip = reach_m * out + (2.0 * castor_m + 0.5 * arm_m) * DVec3::Z;
         bar(b, hub_m * DVec3::Z, tip, arm_m, arm_m);
         if castors {
@@ -157,24 +153,22 @@ pub fn star_pedestal(b: &mut Builder, s: &mut Sampler, reach_m: f64, height_m: f
 pub fn crossed_legs(b: &mut Builder, half: DVec2, top_m: f64, width_m: f64) {
     for [side, lean] in [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]] {
         let x = side * half.x + lean * 0.3 * width_m;
-        let from = DVec3::new(x, -lean * half.y, 0.0);
-        bar(b, from, DVec3::new(x, lean * half.y, top_m), width_m, width_m);
+        bar(b, dvec3(x, -lean * half.y, 0.0), dvec3(x, lean * half.y, top_m), width_m, width_m);
     }
-    let end = DVec3::new(half.x, 0.0, 0.5 * top_m);
-    rod(b, end * DVec3::new(-1.0, 1.0, 1.0), end, [0.3 * width_m; 2]);
+    let end = dvec3(half.x, 0.0, 0.5 * top_m);
+    rod(b, end * dvec3(-1.0, 1.0, 1.0), end, [0.3 * width_m; 2]);
 }
 
 /// Two runners of tube, left and right, on the floor.
 pub fn sledge(b: &mut Builder, half: DVec2, top_m: f64, radius_m: f64) {
     let corners = [(1.0, top_m), (1.08, radius_m), (-1.08, radius_m), (-1.0, top_m)]
-        .map(|(y, z)| DVec3::new(half.x, y * half.y, z));
+        .map(|(y, z)| dvec3(half.x, y * half.y, z));
     b.mirrored_x(|b| corners.windows(2).for_each(|ends| tube(b, ends, radius_m)));
 }
 
 /// Two side panels across the whole depth.
 pub fn side_panels(b: &mut Builder, half: DVec2, top_m: f64, thickness_m: f64) {
     b.mirrored_x(|b| {
-        let low = DVec3::new(half.x - thickness_m, -half.y, 0.0);
-        block_between(b, low, DVec3::new(half.x, half.y, top_m));
+        block_between(b, dvec3(half.x - thickness_m, -half.y, 0.0), dvec3(half.x, half.y, top_m));
     });
 }

@@ -2,9 +2,7 @@ mod desk;
 
 use desk::desk;
 
-use crate::primitives::{
-    Builder, DAffine3, DVec2, DVec3, Sampler, bar, block, block_between, cap, outline, prism,
-};
+use crate::primitives::*;
 use crate::supports::{
     Legs, crossed_legs, disc_pedestal, four_legs, side_panels, sledge, star_pedestal,
 };
@@ -47,7 +45,7 @@ impl Top {
         let width_m = s.log_uniform(0.35, 1.0);
         let shape = s.weighted(&[(3, Rectangle), (1, Rounded), (1, Soft), (1, Round), (1, Oval)]);
         let ratio = if shape == Round { 1.0 } else { s.log_uniform(1.0, 2.6) };
-        let half = DVec2::new(0.5 * width_m, 0.5 * width_m * ratio);
+        let half = dvec2(0.5 * width_m, 0.5 * width_m * ratio);
         let thick_m = s.log_uniform(0.01, 0.07);
         let glass = s.chance(0.12);
         Self { half, height_m, thick_m: if glass { 0.0 } else { thick_m }, shape }
@@ -95,17 +93,17 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
     let inner = top.legs_half(thick_m);
     match support {
         Panels => {
-            let half = DVec2::new(0.96 * top.half.y, 0.95 * top.half.x);
+            let half = dvec2(0.96 * top.half.y, 0.95 * top.half.x);
             turned(b, |b| side_panels(b, half, top.under_m(), thick_m));
             back_panel(b, s, &top, inner.y);
         }
         Trestle => trestle(b, s, &top),
         Desk => desk(b, s, &top),
         Crossed => turned(b, |b| {
-            crossed_legs(b, DVec2::new(0.8 * inner.y, inner.x), top.under_m(), thick_m);
+            crossed_legs(b, dvec2(0.8 * inner.y, inner.x), top.under_m(), thick_m);
         }),
         Sledge => turned(b, |b| {
-            sledge(b, DVec2::new(inner.y, 0.9 * inner.x), top.under_m(), 0.5 * thick_m);
+            sledge(b, dvec2(inner.y, 0.9 * inner.x), top.under_m(), 0.5 * thick_m);
         }),
         Disc => disc_pedestal(b, s, reach_m, top.under_m()),
         Star => star_pedestal(b, s, reach_m, top.under_m()),
@@ -149,8 +147,8 @@ fn apron(b: &mut Builder, s: &mut Sampler, top: &Top, half: DVec2) {
     let thin_m = 0.02;
     let z = top.under_m() - 0.5 * high_m;
     for side in [-1.0, 1.0] {
-        block(b, DVec3::new(side * half.x, 0.0, z), DVec3::new(thin_m, 2.0 * half.y, high_m));
-        block(b, DVec3::new(0.0, side * half.y, z), DVec3::new(2.0 * half.x, thin_m, high_m));
+        block(b, dvec3(side * half.x, 0.0, z), dvec3(thin_m, 2.0 * half.y, high_m));
+        block(b, dvec3(0.0, side * half.y, z), dvec3(2.0 * half.x, thin_m, high_m));
     }
 }
 
@@ -158,8 +156,8 @@ fn back_panel(b: &mut Builder, s: &mut Sampler, top: &Top, half_y_m: f64) {
     if s.chance(0.6) {
         let low_m = top.height_m * s.uniform(0.0, 0.6);
         let x = top.half.x * s.pick(&[0.0, 0.8]);
-        let low = DVec3::new(x - 0.01, -half_y_m, low_m);
-        block_between(b, low, DVec3::new(x + 0.01, half_y_m, top.under_m()));
+        let low = dvec3(x - 0.01, -half_y_m, low_m);
+        block_between(b, low, dvec3(x + 0.01, half_y_m, top.under_m()));
     }
 }
 
@@ -171,7 +169,7 @@ fn trestle(b: &mut Builder, s: &mut Sampler, top: &Top) {
     let splayed = s.chance(0.5);
     let z = top.height_m * s.uniform(0.25, 0.5);
     for side in [-1.0, 1.0] {
-        let at = |x: f64, z: f64| DVec3::new(x, side * y_m, z);
+        let at = |x: f64, z: f64| dvec3(x, side * y_m, z);
         if splayed {
             for lean in [-1.0, 1.0] {
                 let rung = at(lean * reach_m * (1.0 - 0.7 * z / top.under_m()), z);
@@ -180,11 +178,10 @@ fn trestle(b: &mut Builder, s: &mut Sampler, top: &Top) {
                 bar(b, at(lean * reach_m, 0.0), high, wide_m, wide_m);
             }
         } else {
-            block(b, at(0.0, 0.5 * wide_m), DVec3::new(2.0 * reach_m, wide_m, wide_m));
-            block(b, at(0.0, 0.5 * top.under_m()), DVec3::new(2.0 * wide_m, wide_m, top.under_m()));
+            block(b, at(0.0, 0.5 * wide_m), dvec3(2.0 * reach_m, wide_m, wide_m));
+            block(b, at(0.0, 0.5 * top.under_m()), dvec3(2.0 * wide_m, wide_m, top.under_m()));
         }
-        let beam = DVec3::new(2.0 * reach_m, wide_m, wide_m);
-        block(b, at(0.0, top.under_m() - 0.5 * wide_m), beam);
+        block(b, at(0.0, top.under_m() - 0.5 * wide_m), dvec3(2.0 * reach_m, wide_m, wide_m));
     }
-    bar(b, DVec3::new(0.0, -y_m, z), DVec3::new(0.0, y_m, z), 0.6 * wide_m, wide_m);
+    bar(b, dvec3(0.0, -y_m, z), dvec3(0.0, y_m, z), 0.6 * wide_m, wide_m);
 }

@@ -4,8 +4,8 @@ use glam::DVec3;
 
 use super::finish::{Finish, MIN_TRIANGLES};
 use crate::primitives::Builder;
-use sim_gpu::internals::mesh::TriangleMesh;
-use sim_gpu::internals::mesh::unit_frame::bounding_box;
+use edgepuck_mesh::TriangleMesh;
+use edgepuck_mesh::unit_frame::bounding_box;
 
 const MAX_TRIALS: usize = 10;
 /// A mesh with this fraction of the wanted triangles is good enough.
@@ -33,8 +33,7 @@ pub fn fit(finish: &Finish, build: impl Fn(&mut Builder)) -> Builder {
         let n = trial.n_triangles() as f64;
         // The number of triangles grows with the inverse square of the edge. Aim a little below the
         // target.
-        let step = (n / (0.98 * target)).sqrt();
-        edge_m *= step.clamp(0.25, 4.0);
+        edge_m *= (n / (0.98 * target)).sqrt().clamp(0.25, 4.0);
         if n <= target && trial.n_triangles() > best.n_triangles() {
             best = trial;
         }

@@ -5,9 +5,9 @@ mod soundness;
 use rayon::prelude::*;
 
 use super::{ShapeClass, generate};
-use sim_gpu::internals::mesh::TriangleMesh;
+use edgepuck_mesh::TriangleMesh;
 
-const INSTANCES: u32 = 200;
+const INSTANCES: u32 = 100;
 const SEED: u64 = 11;
 
 /// Runs the assertions `holds` on many shapes of every class, on all cores.

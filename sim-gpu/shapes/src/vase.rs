@@ -1,9 +1,6 @@
 use std::f64::consts::TAU;
 
-use crate::primitives::{
-    Builder, DAffine3, DVec2, DVec3, Profile, Sampler, Section, Vessel, Wall, sheet, smooth,
-    smooth_tube, tube,
-};
+use crate::primitives::*;
 
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
@@ -111,7 +108,7 @@ fn handles(b: &mut Builder, s: &mut Sampler, form: &Form) {
         (out_m, 0.5 * (form.neck_at + form.belly_at) + 0.05),
         (0.97 * form.belly_m, form.belly_at),
     ];
-    let path = smooth(b, &points.map(|(x, z)| DVec3::new(x, 0.0, form.at(z))), 3);
+    let path = smooth(b, &points.map(|(x, z)| dvec3(x, 0.0, form.at(z))), 3);
     b.mirrored_x(|b| tube(b, &path, thick_m));
 }
 
@@ -137,6 +134,6 @@ fn leaf(b: &mut Builder, size_m: f64) {
     sheet(b, [size_m, 0.4 * size_m], |u, v| {
         let width = 0.4 * (u * (1.0 - u)).sqrt();
         let bend = 0.6 * u - 0.9 * u * u;
-        size_m * DVec3::new(u, (2.0 * v - 1.0) * width, bend)
+        size_m * dvec3(u, (2.0 * v - 1.0) * width, bend)
     });
 }

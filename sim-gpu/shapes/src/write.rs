@@ -1,9 +1,9 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use edgepuck_mesh::TriangleMesh;
 use formats::{FormatError, atomic};
 use glam::DVec3;
-use sim_gpu::internals::mesh::TriangleMesh;
 
 /// Writes `mesh` as ASCII OFF, with the shortest decimal numbers that give the same f64. The file
 /// is complete or absent.
@@ -47,11 +47,12 @@ fn push_line(text: &mut String, line: std::fmt::Arguments<'_>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::dvec3;
     use std::fs;
 
     fn tetrahedron() -> TriangleMesh {
         TriangleMesh {
-            vertices: vec![DVec3::ZERO, DVec3::X, DVec3::Y * 0.1, DVec3::new(0.0, 0.0, 1e-6)],
+            vertices: vec![DVec3::ZERO, DVec3::X, DVec3::Y * 0.1, dvec3(0.0, 0.0, 1e-6)],
             triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]],
         }
     }

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use edgepuck_shapes::{ShapeClass, generate, write_obj, write_off};
 use sha2::{Digest, Sha256};
 
-/// The seed of the committed meshes; `gen-shapes` gives the same meshes with it.
+/// The seed of the committed meshes; `gen-dataset --save-meshes` gives the same meshes with it.
 const SEED: u64 = 1;
 
 /// The committed meshes: path under `assets/meshes`, class, instance. The numbers in names start at

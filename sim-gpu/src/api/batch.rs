@@ -33,8 +33,8 @@ pub struct Moves<'a> {
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Batch {
-    /// Metres; infinite where no return comes back. Of dual returns, the strongest, or the second
-    /// strongest if that is the last.
+    /// Metres; infinite where no return comes back. With dual returns: the strongest, or the second
+    /// strongest if the strongest is also the last.
     pub range_m: Vec<f32>,
     /// The number of the instance; [`NO_OBJECT`] where no return comes back, or one from the air.
     pub object: Vec<u32>,

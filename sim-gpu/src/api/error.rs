@@ -2,10 +2,9 @@
 
 use crate::cast_error::CastError;
 use crate::config::{ConfigError, InvalidValue};
-use crate::material::MaterialError;
-use crate::mesh::MeshError;
 use crate::scan::ScanError;
-use crate::simplify::NotBuilt;
+use edgepuck_mesh::MeshError;
+use edgepuck_mesh::material::MaterialError;
 use formats::FormatError;
 
 /// Why a mesh, a sensor or a scene cannot be read, scanned or saved. The message names the file,
@@ -28,9 +27,6 @@ pub enum Error {
     /// The adapter is missing or failed.
     #[error(transparent)]
     Cast(#[from] CastError),
-    /// A mesh is to be simplified by a program that was built without simplification.
-    #[error(transparent)]
-    NotBuilt(#[from] NotBuilt),
     /// A scan cannot be saved.
     #[error(transparent)]
     Format(#[from] FormatError),

@@ -4,15 +4,16 @@ use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
 
+use formats::plausible::Warning;
 use glam::{DAffine3, DVec3};
 
 use super::{Error, Instance, InstanceId, Mesh, Scene};
 use crate::config::{InvalidValue, within};
-use crate::import::{Format, Import};
-use crate::material::Materials;
-use crate::mesh::frame::{Up, z_up};
-use crate::mesh::{AssembledMesh, Assembly, BaseColour};
 use crate::pose::Pose;
+use edgepuck_mesh::frame::{Up, z_up};
+use edgepuck_mesh::import::{Format, Import};
+use edgepuck_mesh::material::Materials;
+use edgepuck_mesh::{AssembledMesh, Assembly, BaseColour};
 
 /// Where a file's instances stand, and what they are called.
 #[doc(hidden)]
@@ -29,12 +30,10 @@ pub struct FilePlace {
 impl Scene {
     /// Adds what stands in a glTF file (`.glb`, `.gltf`) or a robot (`.urdf`) where the file has it: each
     /// node, or geometry of a link, is an instance with its name; its label is the name of the mesh, or
-    /// of the link. Instances of one mesh share it. Animated nodes have trajectories.
+    /// of the link. Instances of one mesh share it. Animations are not applied.
     ///
-    /// Poses and animations are those of the file, turned z up: trajectories are within 0.1 mm and
-    /// 0.0001 radians of them, and exact where only one node above a mesh moves, in lines or steps. A node
-    /// that mirrors or shears its mesh has a mesh of its own, turned as the file has it: its pose is its
-    /// place.
+    /// Poses are those of the file, turned z up. A node that mirrors or shears its mesh has a mesh of
+    /// its own, turned as the file has it: its pose is its place.
     ///
     /// # Errors
     /// The file cannot be read: with the node, accessor, link or joint; `import` does not fit it.
@@ -58,7 +57,9 @@ impl Scene {
             let found = path.display();
             InvalidValue::new("file", format!("expected .glb, .gltf or .urdf, found {found}"))
         })?;
-        format.check(import)?;
+        if let Some((name, of)) = format.foreign_setting(import) {
+            return Err(InvalidValue::new(name, format!("expected it only for {of}")).into());
+        }
         let upright_from_file = upright_from_file(place.up.unwrap_or(format.default_up()));
         let Assembly { meshes, parts, colours, mut warnings } =
             format.load(path, import, place.world_from_upright * upright_from_file)?;
@@ -76,14 +77,14 @@ impl Scene {
                 (Some((pose, scale)), Some(mesh)) => (mesh.clone(), pose, scale),
                 (Some((pose, scale)), None) => {
                     let mesh = upright(&upright_from_file)?;
-                    let mesh = mesh.with_warnings(path, &std::mem::take(&mut warnings));
+                    let mesh = mesh.with_warnings(path, std::mem::take(&mut warnings));
                     shared[part.mesh] = Some(mesh.clone());
                     (mesh, pose, scale)
                 }
                 (None, _) => {
                     let turned = DAffine3::from_mat3(part.world_from_mesh.matrix3);
                     let mesh = upright(&turned)?;
-                    let mesh = mesh.with_warnings(path, &std::mem::take(&mut warnings));
+                    let mesh = mesh.with_warnings(path, std::mem::take(&mut warnings));
                     (mesh, Pose::at(of_upright.translation.to_array()), DVec3::ONE)
                 }
             };
@@ -91,7 +92,6 @@ impl Scene {
             let (reflectivity, materials) = looks[part.mesh].clone();
             self[id] = Instance {
                 scale,
-                motion: part.motion,
                 name: Some(names.free(place.prefix.clone() + &part.name)),
                 label: part.label,
                 reflectivity,
@@ -118,13 +118,11 @@ type Look = (f64, Option<Arc<Materials>>);
 fn looks(
     meshes: &[AssembledMesh],
     colours: &[BaseColour],
-    warnings: &mut Vec<String>,
+    warnings: &mut Vec<Warning>,
 ) -> Result<Vec<Look>, InvalidValue> {
     for BaseColour { name, luminance, has_image } in colours {
         within(&format!("material {name:?}: luminance"), *luminance, 0.0..=1.0)?;
-        warnings.extend(
-            has_image.then(|| format!("material {name:?}: its image is left out of base colours")),
-        );
+        warnings.extend(has_image.then(|| Warning::ImageOfMaterial(name.clone())));
     }
     let look = |mesh: &AssembledMesh| {
         let of = |number: &Option<usize>| number.map_or(1.0, |number| colours[number].luminance);
@@ -215,13 +213,13 @@ mod tests {
         let ids = scene.add_file(&file, &import).unwrap();
         let materials = scene[ids[0]].materials.as_ref().unwrap();
         // 0.2126 + 0.0722 / 2, by the weights of BT.709.
-        let found = [0, 1].map(|triangle| materials.at(triangle, || DVec3::ZERO).reflectivity);
+        let found = [0, 1].map(|triangle| materials.of_triangle(triangle).reflectivity);
         assert_eq!(found.map(|x| (1e9 * x).round()), [248_700_000.0, 1e9]);
         assert!((scene[ids[2]].reflectivity - 0.2487).abs() < 1e-9);
     }
 
     #[test]
-    fn poses_of_another_unit_or_order_are_doubted() {
+    fn poses_of_another_unit_or_order_are_warnings() {
         let folder = tempfile::tempdir().unwrap();
         let write = |name: &str, text| fs::write(folder.path().join(name), text).unwrap();
         write("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
@@ -232,7 +230,8 @@ mod tests {
                     [[sensor]]\nprofile = \"vlp16\"\ntrajectory = \"b.tum\"\n";
         write("scene.toml", text);
         let scene = Scene::read(folder.path().join("scene.toml")).unwrap();
-        let [speed, head] = scene.warnings()[..] else { panic!("{:?}", scene.warnings()) };
+        let found: Vec<String> = scene.warnings().iter().map(ToString::to_string).collect();
+        let [speed, head] = &found[..] else { panic!("{found:?}") };
         assert!(speed.starts_with("object \"a\" moves at 5000 m/s at 0 s: "), "{speed}");
         assert!(head.starts_with("sensor \"vlp16\" stands on its head: "), "{head}");
     }

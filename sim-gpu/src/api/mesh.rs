@@ -2,10 +2,11 @@
 
 use super::Error;
 use crate::bvh::Builder;
-use crate::mesh::frame::{Normalize, Unit, Up, WorldMesh, to_world, z_up};
-use crate::mesh::unit_frame::bounding_box;
-use crate::mesh::{LoadedMesh, TriangleMesh, check, flat, load, load_bytes};
 use crate::target::{Surface, Target};
+use edgepuck_mesh::frame::{Normalize, Unit, Up, WorldMesh, to_world, z_up};
+use edgepuck_mesh::unit_frame::bounding_box;
+use edgepuck_mesh::{LoadedMesh, TriangleMesh, check, flat, load, load_bytes};
+use formats::plausible::Warning;
 use glam::{DAffine3, DVec3};
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
@@ -39,7 +40,7 @@ pub struct Mesh {
     ready: Arc<OnceLock<Ready>>,
     centre: DVec3,
     scale: f64,
-    warnings: Vec<String>,
+    warnings: Vec<Warning>,
 }
 
 /// A mesh that can be cast at.
@@ -73,7 +74,7 @@ impl Mesh {
     pub fn from_bytes(name: &str, bytes: &[u8]) -> Result<Self, Error> {
         let name = Path::new(name);
         let LoadedMesh { mesh, format, warnings, .. } = load_bytes(name, bytes)?;
-        Ok(Self::upright(mesh, format.default_up()).with_warnings(name, &warnings))
+        Ok(Self::upright(mesh, format.default_up()).with_warnings(name, warnings))
     }
 
     /// As [`Mesh::read`], of a file whose upward axis or unit may be another.
@@ -81,7 +82,7 @@ impl Mesh {
     pub fn read_in(path: &Path, up: Option<Up>, unit: Unit) -> Result<Self, Error> {
         let LoadedMesh { mesh, format, warnings, .. } = load(path)?;
         let mesh = Self::upright(mesh.in_metres(unit), up.unwrap_or(format.default_up()));
-        Ok(mesh.with_warnings(path, &warnings))
+        Ok(mesh.with_warnings(path, warnings))
     }
 
     /// A mesh of these vertices, `[n][3]` in metres, z up, and these triangles, `[m][3]` indices of
@@ -126,13 +127,6 @@ impl Mesh {
         self.normalized(Normalize::UnitSphere)
     }
 
-    /// The same mesh with the centre of its bounding box at the origin and its longest side 2
-    /// long, as in ModelNet40-C.
-    #[must_use]
-    pub fn unit_box(&self) -> Self {
-        self.normalized(Normalize::Bbox)
-    }
-
     /// The vertices, metres, `[n]`.
     #[must_use]
     pub fn vertices(&self) -> &[DVec3] {
@@ -165,16 +159,15 @@ impl Mesh {
         self.scale
     }
 
-    /// What is doubtful about the file that it was read from, such as polygons that cross
-    /// themselves: a line each, with the file.
+    /// What is probably wrong with the file that it was read from, such as polygons that cross
+    /// themselves: with the file.
     #[must_use]
-    pub fn warnings(&self) -> &[String] {
+    pub fn warnings(&self) -> &[Warning] {
         &self.warnings
     }
 
-    pub(super) fn with_warnings(mut self, file: &Path, warnings: &[String]) -> Self {
-        let file = file.display();
-        self.warnings.extend(warnings.iter().map(|warning| format!("{file}: {warning}")));
+    pub(super) fn with_warnings(mut self, file: &Path, warnings: Vec<Warning>) -> Self {
+        self.warnings.extend(warnings.into_iter().map(|warning| warning.of(file.display())));
         self
     }
 
@@ -258,7 +251,7 @@ impl TryFrom<TriangleMesh> for Mesh {
     type Error = Error;
 
     fn try_from(mesh: TriangleMesh) -> Result<Self, Error> {
-        let wrong = |error: crate::mesh::ParseError| {
+        let wrong = |error: edgepuck_mesh::ParseError| {
             crate::config::InvalidValue::new("mesh", error.to_string())
         };
         check(&mesh).map_err(wrong)?;

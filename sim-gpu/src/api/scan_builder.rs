@@ -176,7 +176,7 @@ impl<'a> ScanBuilder<'a> {
         check_start("start_s", self.start_s)?;
         if let Some(motion) = &self.motion {
             let times_s = [self.start_s, self.start_s + rays.last_s()];
-            check_motion("trajectory", self.sensor.profile(), motion, times_s)?;
+            check_motion("trajectory", motion, times_s)?;
         }
         Ok(Prepared { effects, caster, rays })
     }
@@ -215,7 +215,7 @@ impl<'a> ScanBuilder<'a> {
             let Instance { scale, reflectivity, retroreflection, .. } = *instance;
             check_object(key, scale.to_array(), reflectivity, retroreflection)?;
             within(&key("glass.returned"), instance.glass.as_ref().map(|g| g.returned), 0.0..=1.0)?;
-            let n_faces = instance.materials.as_ref().map(|materials| materials.len());
+            let n_faces = instance.materials.as_ref().map(|materials| materials.n_triangles());
             let n_triangles = instance.mesh.target().surface.triangles().len();
             if let Some(found) = n_faces.filter(|found| *found != n_triangles) {
                 let cause =

@@ -2,16 +2,15 @@
 
 use super::{Error, Mesh, Sensor};
 use crate::effects::Effects;
-use crate::import::{Format, Import};
-use crate::material::Materials;
 use crate::pose::{Pose, Trajectory};
 use crate::scan::{Glass, PlacedTarget};
 use crate::scene::SceneFile;
-use crate::simplify::Simplified;
+use edgepuck_mesh::import::{Format, Import};
+use edgepuck_mesh::material::Materials;
+use formats::plausible::Warning;
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, AttributeSet};
 use glam::{DAffine3, DVec3};
-use std::collections::HashSet;
 use std::ops::{Index, IndexMut};
 use std::path::Path;
 use std::sync::Arc;
@@ -52,8 +51,8 @@ pub struct Scene {
     /// Seed of all random numbers; 0 by default.
     pub seed: u64,
     instances: Vec<Instance>,
-    /// What is doubtful about the trajectories of its file.
-    pub(super) doubts: Vec<String>,
+    /// What is probably wrong with the trajectories of its file.
+    pub(super) warnings: Vec<Warning>,
 }
 
 /// The handle of an [`Instance`] of a [`Scene`]: `scene[id]` is the instance.
@@ -85,9 +84,6 @@ pub struct Instance {
     pub glass: Option<Glass>,
     /// The materials of its faces, in place of its reflectivity; one for all by default.
     pub materials: Option<Arc<Materials>>,
-    /// What simplification made of the mesh, where a scene's file asks for it.
-    #[doc(hidden)]
-    pub simplified: Option<Simplified>,
 }
 
 /// A sensor at a place in a scene.
@@ -126,7 +122,7 @@ impl Scene {
             attributes: attributes.into(),
             seed: 0,
             instances: Vec::new(),
-            doubts: Vec::new(),
+            warnings: Vec::new(),
         }
     }
 
@@ -169,14 +165,18 @@ impl Scene {
         &self.instances
     }
 
-    /// What is doubtful about the files of its meshes and materials, each line once with the file, and
-    /// about the trajectories of its file.
+    /// What is probably wrong with the files of its meshes, each warning once with the file, and with
+    /// the trajectories of its file.
     #[must_use]
-    pub fn warnings(&self) -> Vec<&str> {
+    pub fn warnings(&self) -> Vec<&Warning> {
         let all = self.instances.iter().flat_map(|instance| instance.mesh.warnings());
-        let all = all.chain(&self.doubts);
-        let mut told = HashSet::new();
-        all.map(String::as_str).filter(|warning| told.insert(*warning)).collect()
+        let mut found: Vec<&Warning> = Vec::new();
+        for warning in all.chain(&self.warnings) {
+            if !found.contains(&warning) {
+                found.push(warning);
+            }
+        }
+        found
     }
 
     /// The handles of the instances, in their order.
@@ -259,7 +259,6 @@ impl Instance {
             retroreflection: 0.0,
             glass: None,
             materials: None,
-            simplified: None,
         }
     }
 

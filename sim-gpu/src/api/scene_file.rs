@@ -1,18 +1,14 @@
-//! From a scene's file to the scene: meshes and materials are read, meshes are simplified.
+//! From a scene's file to the scene: meshes and materials are read.
 
 use super::import::FilePlace;
 use super::{Error, Instance, Mesh, MountedSensor, Scene, Sensor};
-use crate::bvh::Builder;
-use crate::config::InvalidValue;
-use crate::import::Import;
-use crate::material::{Material, Materials};
-use crate::mesh::frame::{Normalize, to_world};
-use crate::mesh::validate::triangle_stats;
-use crate::mesh::{LoadedMesh, TriangleMesh, load};
 use crate::pose::Pose;
 use crate::scene::{SceneFile, SceneObject, SceneSensor};
-use crate::simplify::{Simplified, Simplify, Viewpoint, resolved_m, simplified_surface};
-use crate::target::Target;
+use edgepuck_mesh::frame::Normalize;
+use edgepuck_mesh::import::Import;
+use edgepuck_mesh::material::{Material, Materials};
+use edgepuck_mesh::{LoadedMesh, load};
+use formats::plausible::{motion_of, scene_mesh_size};
 use glam::{DAffine3, DVec3};
 use std::sync::Arc;
 
@@ -28,20 +24,17 @@ impl TryFrom<&SceneFile> for Scene {
         let objects = file.objects.iter().map(|it| ("object", &it.name, &it.motion));
         let sensors = file.sensors.iter().map(|it| ("sensor", &it.name, &it.motion));
         for (kind, name, motion) in objects.chain(sensors) {
-            let doubts = motion
-                .iter()
-                .flat_map(|it| it.doubts(&format!("{kind} {name:?}"), kind == "sensor"));
-            scene.doubts.extend(doubts);
+            let what = format!("{kind} {name:?}");
+            let warnings = motion.iter().flat_map(|it| motion_of(&what, kind == "sensor", it));
+            scene.warnings.extend(warnings);
         }
-        for (i, object) in file.objects.iter().enumerate() {
+        for object in &file.objects {
             if let Some(import) = &object.import {
-                scene.add_object(object, import, &format!("object[{i}]"))?;
+                scene.add_object(object, import)?;
                 continue;
             }
-            let (mesh, simplified) = mesh(file, object)?;
+            let mesh = mesh(object)?;
             let materials = materials(object)?;
-            let warnings = materials.as_ref().map_or(&[][..], |materials| &materials.warnings);
-            let mesh = mesh.with_warnings(&object.mesh, warnings);
             let pose = Pose { position_m: object.position_m, rotation: object.rotation };
             let id = scene.add(mesh, pose);
             scene[id] = Instance {
@@ -52,7 +45,6 @@ impl TryFrom<&SceneFile> for Scene {
                 reflectivity: object.reflectivity,
                 retroreflection: object.retroreflection,
                 materials: materials.map(Arc::new),
-                simplified,
                 ..scene[id].clone()
             };
         }
@@ -62,12 +54,7 @@ impl TryFrom<&SceneFile> for Scene {
 
 impl Scene {
     /// Adds the instances of an object that is a file with more than one mesh.
-    fn add_object(
-        &mut self,
-        object: &SceneObject,
-        import: &Import,
-        key: &str,
-    ) -> Result<(), Error> {
+    fn add_object(&mut self, object: &SceneObject, import: &Import) -> Result<(), Error> {
         let metres = DAffine3::from_scale(DVec3::splat(object.units.metres()));
         let place = FilePlace {
             up: object.up,
@@ -76,14 +63,7 @@ impl Scene {
         };
         for id in self.add_file_at(&object.mesh, import, &place)? {
             let instance = &mut self[id];
-            if let (Some(_), Some(name)) =
-                (object.motion.as_ref().zip(instance.motion.as_ref()), &instance.name)
-            {
-                let cause =
-                    format!("cannot stand beside the animation of the file, which moves {name}");
-                return Err(InvalidValue::new(format!("{key}.trajectory"), cause).into());
-            }
-            instance.motion = instance.motion.take().or_else(|| object.motion.clone());
+            instance.motion = object.motion.clone();
             instance.label = object.label.clone().or_else(|| instance.label.take());
             if !import.base_colours {
                 instance.reflectivity = object.reflectivity;
@@ -105,62 +85,19 @@ fn materials(object: &SceneObject) -> Result<Option<Materials>, Error> {
     let otherwise =
         Material { reflectivity: object.reflectivity, retroreflection: object.retroreflection };
     let load = || Materials::load(&object.mesh, &object.materials, otherwise);
-    Ok((!object.materials.is_plain()).then(load).transpose()?)
+    Ok((!object.materials.is_empty()).then(load).transpose()?)
 }
 
-/// The mesh of `object`, and what simplification made of it if it was asked for.
-fn mesh(file: &SceneFile, object: &SceneObject) -> Result<(Mesh, Option<Simplified>), Error> {
+/// The mesh of `object`, with the warnings of its file.
+fn mesh(object: &SceneObject) -> Result<Mesh, Error> {
     let LoadedMesh { mesh, format, mut warnings, .. } = load(&object.mesh)?;
     let mesh = mesh.in_metres(object.units);
     let up = object.up.unwrap_or(format.default_up());
     let normalize = object.normalize.unwrap_or(Normalize::None);
-    let (mesh, simplified) = match file.simplify_of(object) {
-        None => (Mesh::upright(mesh, up).normalized(normalize), None),
-        Some(simplify) => {
-            let world = to_world(&mesh, up, normalize);
-            // A mesh that is not scaled keeps its own origin.
-            let centre = if normalize == Normalize::None { world.centre } else { DVec3::ZERO };
-            let (target, simplified) = simplified(file, object, simplify, world.mesh, centre)?;
-            (Mesh::from_target(target, centre), Some(simplified))
-        }
-    };
+    let mesh = Mesh::upright(mesh, up).normalized(normalize);
     if normalize == Normalize::None {
-        let doubt = mesh.extent().doubtful_unit(object.units);
-        warnings.extend(doubt.map(|doubt| doubt + "; `units` of the object names another unit"));
+        let remedy = "`units` of the object names another unit";
+        warnings.extend(scene_mesh_size(mesh.extent().size_m(), object.units, remedy));
     }
-    Ok((mesh.with_warnings(&object.mesh, &warnings), simplified))
-}
-
-fn simplified(
-    file: &SceneFile,
-    object: &SceneObject,
-    simplify: Simplify,
-    mesh: TriangleMesh,
-    centre: DVec3,
-) -> Result<(Target, Simplified), Error> {
-    let world_from_mesh = object.world_from_object() * DAffine3::from_translation(centre);
-    let kept = triangle_stats(&mesh).kept;
-    let bound_m = simplify.bound_m(|| resolved_by(file, object, &mesh, &world_from_mesh));
-    // No length of the mesh is longer in the world than by its largest factor.
-    let surface = simplified_surface(mesh, kept, bound_m / object.scale.max_element())?;
-    let simplified = Simplified { bound_m, triangles: surface.len() as u64 };
-    Ok((Target::new(surface, Builder::Sah), simplified))
-}
-
-/// What the scene's sensors can tell apart on `mesh`, in metres.
-fn resolved_by(
-    file: &SceneFile,
-    object: &SceneObject,
-    mesh: &TriangleMesh,
-    world_from_mesh: &DAffine3,
-) -> f64 {
-    let mesh_from_world = world_from_mesh.inverse();
-    let viewpoints = file.sensors.iter().map(|sensor| Viewpoint {
-        sensor: &sensor.sensor,
-        positions: vec![mesh_from_world.transform_point3(sensor.pose.position_m)],
-    });
-    let viewpoints: Vec<Viewpoint> = viewpoints.collect();
-    // No distance in the world is shorter than by the mesh's least factor.
-    let least = object.scale.min_element();
-    resolved_m(mesh, least.recip(), &viewpoints) * least
+    Ok(mesh.with_warnings(&object.mesh, warnings))
 }

@@ -66,8 +66,8 @@ pub struct TwoWide {
     pub triangles: Vec<LeafTriangle>,
 }
 
-/// The tree of shaders over more triangles than this is dropped once the CPU's is made of it, and
-/// built again if a GPU casts: it takes some 90 bytes a triangle.
+/// Above this number of triangles, the GPU's tree (90 bytes a triangle) is freed once the CPU's is built
+/// from it, and built again if a GPU casts.
 const KEPT_UP_TO: usize = 1 << 20;
 
 /// As small as its numbers: to sort many of them takes most of the time of a build.

@@ -304,6 +304,7 @@ fn in_toml(expected: &str) -> String {
         "f32" | "f64" => return "a number".to_owned(),
         "a boolean" => return "true or false".to_owned(),
         "a sequence" => return "a list".to_owned(),
+        "path string" => return "a file's path".to_owned(),
         "a map" => return "a table".to_owned(),
         other if other.starts_with("struct ") => return "a table".to_owned(),
         other => return other.replace("an array", "a list"),

@@ -1,6 +1,11 @@
 //! Traces incoherent rays, several at once, one step of each in turn: while one waits for memory,
 //! the others proceed. Kocberber, Falsafi, Grot, "Asynchronous memory access chaining", VLDB 2015.
 
+#![allow(
+    unsafe_code,
+    reason = "an instruction that fetches memory; its block says why it is sound"
+)]
+
 use super::traverse::{Along, Instructions, Nearest, Prepared};
 use crate::bvh::{Stack, WideBvh, WideChild, step};
 use crate::ray::TraceRay;

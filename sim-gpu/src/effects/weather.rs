@@ -18,9 +18,6 @@ pub struct Weather {
     /// can be distinguished from the sky.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fog_visibility_m: Option<f64>,
-    /// The model of the strength of fog's returns.
-    #[serde(default, skip_serializing_if = "FogModel::is_default")]
-    pub fog_model: FogModel,
     /// The visibility in haze by Koschmieder's law, metres. Haze weakens returns and gives none
     /// itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -32,26 +29,6 @@ pub struct Weather {
     /// `gen-dataset`, which cuts clouds of single objects out of scans without such returns.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub empty_beams: Option<bool>,
-}
-
-formats::named! {
-    /// The model of the strength of fog's returns.
-    #[derive(Default, Serialize, Deserialize)]
-    #[serde(rename_all = "kebab-case")]
-    pub enum FogModel: "fog model" {
-        /// The power that the fog scatters back, whatever is behind it.
-        #[default]
-        Physical = "physical",
-        /// The simulation of Hahner et al. (ICCV 2021): proportional to the surface behind the
-        /// fog, with a factor that its authors chose by eye.
-        Hahner = "hahner",
-    }
-}
-
-impl FogModel {
-    fn is_default(&self) -> bool {
-        *self == Self::default()
-    }
 }
 
 /// A box of dust or spray, along the world's axes.
@@ -89,10 +66,6 @@ impl Weather {
     /// # Errors
     /// On the first that is not finite or out of its bounds.
     pub fn validate(&self) -> Result<(), InvalidValue> {
-        if self.fog_visibility_m.is_none() && !self.fog_model.is_default() {
-            let cause = "expected fog_visibility_m, whose fog it describes, found none";
-            return Err(InvalidValue::new("effects.weather.fog_model", cause));
-        }
         within("effects.weather.rain_mm_h", self.rain_mm_h, 0.0..=MOST_MM_H)?;
         within("effects.weather.snow_mm_h", self.snow_mm_h, 0.0..=MOST_MM_H)?;
         within("effects.weather.fog_visibility_m", self.fog_visibility_m, VISIBILITIES_M)?;

@@ -226,11 +226,11 @@ mod tests {
     use crate::cpu;
     use crate::effects::{Dropout, Intensity, Noise, NoiseModel};
     use crate::job::{Aim, Culling};
-    use crate::mesh::TriangleMesh;
     use crate::pose::Pose;
     use crate::ray::{AMBIGUOUS, RayFrame};
     use crate::sensor::SensorProfile;
     use crate::target::{Surface, Target};
+    use edgepuck_mesh::TriangleMesh;
     use formats::rng::StreamKey;
     use glam::{DAffine3, DVec3};
     use test_support::need;

@@ -10,9 +10,7 @@ use super::request::ScanRequest;
 use crate::config::InvalidValue;
 use crate::effects::Effects;
 use crate::pose::Pose;
-use crate::sensor::{SensorProfile, polar_angle_rad};
 use crate::weather::Medium;
-use formats::rng::StreamKey;
 use formats::scan::{Attribute, Scan};
 use glam::{DQuat, DVec3};
 
@@ -30,38 +28,21 @@ pub fn assemble(
     let receiver = Receiver::new(request, cast_effects, objects)?;
     let nearest = nearest_per_ray(objects, request.pattern.len());
     let mut points = Vec::with_capacity(nearest.len());
-    let mut tally = measure(&receiver, &nearest, |r| points.push(Point::of(&receiver, r)));
-    post_process(request, &mut points);
+    let mut tally = measure(&receiver, &nearest, |r| points.push(r));
     tally.points = points.len() as u64;
     if receiver.air.is_some() {
-        let is_of_air = |p: &&Point| matches!(p.r.source, Source::Air { .. });
+        let is_of_air = |r: &&Return| matches!(r.source, Source::Air { .. });
         tally.scattered = points.iter().filter(is_of_air).count() as u64;
     }
     let start = request.pose_at_start();
     let origin = origin_for(start.position_m);
-    let position = |p: &Point| f32x3(position(&receiver, &start, p, origin));
+    let position = |r: &Return| f32x3(position(&receiver, &start, r, origin));
     let scan = Scan {
         origin: origin.to_array(),
         positions: points.iter().map(position).collect(),
         ..Scan::default()
     };
     Ok((with_attributes(scan, &receiver, &points), tally))
-}
-
-/// A return on its way into a scan.
-#[derive(Clone, Copy)]
-pub(super) struct Point {
-    pub r: Return,
-    /// The measured point relative to the sensor, in world axes.
-    from_sensor: DVec3,
-}
-
-impl Point {
-    pub fn of(receiver: &Receiver, r: Return) -> Self {
-        let from_start = from_start(receiver, &r);
-        let start = receiver.start(receiver.ray_of(r.source));
-        Self { r, from_sensor: start.map_or(from_start, |start| from_start + start) }
-    }
 }
 
 /// The origin of positions: zero near the world's, else whole metres near the sensor.
@@ -71,16 +52,18 @@ fn origin_for(position_m: DVec3) -> DVec3 {
 
 /// Where a point is stored, relative to `origin`, metres. The sensor was at `start` when the scan
 /// began.
-fn position(receiver: &Receiver, start: &Pose, point: &Point, origin: DVec3) -> DVec3 {
-    let request = receiver.request;
+fn position(receiver: &Receiver, start: &Pose, r: &Return, origin: DVec3) -> DVec3 {
+    let (request, ray) = (receiver.request, receiver.ray_of(r.source));
+    let from_start = from_start(receiver, r);
+    let from_sensor = receiver.start(ray).map_or(from_start, |start| from_start + start);
     if request.motion.is_none() {
-        return point.from_sensor + (start.position_m - origin);
+        return from_sensor + (start.position_m - origin);
     }
-    let pose = request.pose_at(receiver.ray_of(point.r.source));
+    let pose = request.pose_at(ray);
     if request.deskew {
-        return point.from_sensor + (pose.position_m - origin);
+        return from_sensor + (pose.position_m - origin);
     }
-    let in_sensor = pose.rotation.inverse() * point.from_sensor;
+    let in_sensor = pose.rotation.inverse() * from_sensor;
     start.rotation * in_sensor + (start.position_m - origin)
 }
 
@@ -107,37 +90,13 @@ pub(super) fn nearest_per_ray(objects: &[ObjectHits], n_rays: usize) -> Vec<HitI
     nearest.into_iter().map(|(_, id)| id).filter(|&id| id != NO_HIT).collect()
 }
 
-/// Applies the rings and the sampling of points that a sensor's profile may ask for.
-pub(super) fn post_process(request: &ScanRequest, points: &mut Vec<Point>) {
-    let SensorProfile { rings, sample, .. } = request.sensor;
-    if let (Some(sample), Some(_)) = (sample, rings) {
-        let drawn = sample.draw_before_rings(points.len() as u32, request.stream);
-        *points = drawn.iter().map(|&i| points[i as usize]).collect();
-    }
-    if let Some(rings) = rings {
-        let polar = |p: &Point| polar_angle_rad(p.from_sensor);
-        let first_rad = points.iter().map(polar).fold(f64::INFINITY, f64::min);
-        points.retain_mut(|p| {
-            let range_m = p.from_sensor.length();
-            let snapped = rings.snap_to_ring(p.from_sensor / range_m, first_rad);
-            p.from_sensor = snapped.unwrap_or_default() * range_m;
-            snapped.is_some()
-        });
-    }
-    if let Some(sample) = sample {
-        let [low, high] = request.stream.0;
-        let drawn = sample.draw(points.len() as u32, StreamKey([!low, high]));
-        *points = drawn.iter().map(|&i| points[i as usize]).collect();
-    }
-}
-
-fn with_attributes(mut scan: Scan, receiver: &Receiver, points: &[Point]) -> Scan {
+fn with_attributes(mut scan: Scan, receiver: &Receiver, points: &[Return]) -> Scan {
     let (request, pattern) = (receiver.request, receiver.pattern());
-    let ray = |p: &Point| receiver.ray_of(p.r.source);
+    let ray = |p: &Return| receiver.ray_of(p.source);
     for attribute in &request.attributes {
         match attribute {
             Attribute::Range => {
-                scan.range_m = column(points, |p| range_m(receiver, &p.r));
+                scan.range_m = column(points, |p| range_m(receiver, p));
             }
             Attribute::Beam => scan.beam = column(points, |p| pattern.beam_of(ray(p))),
             Attribute::Ring => scan.ring = column(points, |p| pattern.ring[ray(p) as usize]),
@@ -146,38 +105,38 @@ fn with_attributes(mut scan: Scan, receiver: &Receiver, points: &[Point]) -> Sca
             }
             Attribute::Triangle => {
                 let triangle = |id| receiver.hit(id).triangle;
-                scan.triangle = column(points, |p| surface(&p.r).map_or(NONE, triangle));
+                scan.triangle = column(points, |p| surface(p).map_or(NONE, triangle));
             }
             Attribute::Object => {
-                scan.object = column(points, |p| object(receiver, &p.r));
+                scan.object = column(points, |p| object(receiver, p));
             }
             Attribute::Intensity => {
-                scan.intensity = column(points, |p| intensity(receiver, &p.r));
+                scan.intensity = column(points, |p| intensity(receiver, p));
             }
-            Attribute::Power => scan.power = column(points, |p| p.r.power),
-            Attribute::Reflectivity => scan.reflectivity = column(points, |p| p.r.reflectivity),
-            Attribute::Return => scan.return_number = column(points, |p| p.r.number),
+            Attribute::Power => scan.power = column(points, |p| p.power),
+            Attribute::Reflectivity => scan.reflectivity = column(points, |p| p.reflectivity),
+            Attribute::Return => scan.return_number = column(points, |p| p.number),
             Attribute::Sensor => {
-                let at = |p: &Point| request.pose_at(ray(p)).position_m;
+                let at = |p: &Return| request.pose_at(ray(p)).position_m;
                 let origin = DVec3::from_array(scan.origin);
                 scan.sensor_m = column(points, |p| f32x3(at(p) - origin));
             }
             Attribute::Attitude => {
-                let at = |p: &Point| request.pose_at(ray(p)).rotation;
+                let at = |p: &Return| request.pose_at(ray(p)).rotation;
                 // The quaternion of the two that turns by at most half a turn.
                 let shorter = |q: DQuat| if q.w < 0.0 { -q } else { q };
                 scan.attitude_rad = column(points, |p| f32x3(shorter(at(p)).to_scaled_axis()));
             }
             Attribute::Medium => {
-                scan.medium = column(points, |p| match p.r.source {
+                scan.medium = column(points, |p| match p.source {
                     Source::Surface { .. } => Medium::Surface as u8,
                     Source::Air { medium, .. } => medium as u8,
                 });
             }
             Attribute::Normal => {
                 scan.normal = column(points, |p| {
-                    let normal = |id| normal(receiver, id, from_start(receiver, &p.r));
-                    surface(&p.r).map_or([0.0; 3], normal)
+                    let normal = |id| normal(receiver, id, from_start(receiver, p));
+                    surface(p).map_or([0.0; 3], normal)
                 });
             }
         }
@@ -213,7 +172,7 @@ pub(super) fn object(receiver: &Receiver, r: &Return) -> u32 {
     surface(r).map_or(NONE, |id| receiver.object(id).object)
 }
 
-fn column<T>(points: &[Point], value: impl Fn(&Point) -> T) -> Option<Vec<T>> {
+fn column<T>(points: &[Return], value: impl Fn(&Return) -> T) -> Option<Vec<T>> {
     Some(points.iter().map(value).collect())
 }
 
@@ -230,13 +189,13 @@ pub(super) fn intensity(receiver: &Receiver, r: &Return) -> f32 {
         let hit = receiver.hit(id);
         let normal = unit_normal(object, pattern, hit);
         let cosine = normal.dot(receiver.direction(hit.beam)).abs().min(1.0);
-        return (cosine * object.material(pattern, hit).reflectivity) as f32;
+        return (cosine * object.material(hit).reflectivity) as f32;
     }
     let HitEffects { intensity, .. } =
         HitEffects::of_hit(receiver.cast_effects, pattern, object, id);
     // Casters took the reflectivity of an object with materials for 1.
     match object.materials {
-        Some(_) => intensity * object.material(pattern, receiver.hit(id)).reflectivity as f32,
+        Some(_) => intensity * object.material(receiver.hit(id)).reflectivity as f32,
         None => intensity,
     }
 }

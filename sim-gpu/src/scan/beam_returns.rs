@@ -1,6 +1,6 @@
 //! What a sensor reports of each beam, without points: for learning loops, which want ranges.
 
-use super::assemble::{Point, intensity, nearest_per_ray, object, post_process, range_m};
+use super::assemble::{intensity, nearest_per_ray, object, range_m};
 use super::measure::{Return, measure};
 use super::object_hits::ObjectHits;
 use super::receiver::Receiver;
@@ -37,24 +37,15 @@ pub fn each_return(
     let receiver = Receiver::new(request, cast_effects, objects)?;
     let nearest = nearest_per_ray(objects, request.pattern.len());
     let asks_for_intensity = request.attributes.contains(&Attribute::Intensity);
-    let mut give = |r: &Return| {
+    measure(&receiver, &nearest, |r: Return| {
         each(BeamReturn {
             beam: request.pattern.beam_of(receiver.ray_of(r.source)),
-            object: object(&receiver, r),
-            range_m: range_m(&receiver, r),
+            object: object(&receiver, &r),
+            range_m: range_m(&receiver, &r),
             is_second: r.is_second,
-            intensity: if asks_for_intensity { intensity(&receiver, r) } else { 0.0 },
+            intensity: if asks_for_intensity { intensity(&receiver, &r) } else { 0.0 },
             power: r.power,
         });
-    };
-    if request.sensor.rings.is_none() && request.sensor.sample.is_none() {
-        measure(&receiver, &nearest, |r| give(&r));
-        return Ok(());
-    }
-    // Which of these sensors' returns are reported depends on all of them.
-    let mut points = Vec::new();
-    measure(&receiver, &nearest, |r| points.push(Point::of(&receiver, r)));
-    post_process(request, &mut points);
-    points.iter().for_each(|point| give(&point.r));
+    });
     Ok(())
 }

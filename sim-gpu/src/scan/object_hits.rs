@@ -2,10 +2,10 @@
 
 use super::request::{Glass, PlacedTarget};
 use crate::job::CastJob;
-use crate::material::{Material, Materials};
 use crate::motion::Motion;
 use crate::resolve::{Hit, Hits};
 use crate::sensor::BeamPattern;
+use edgepuck_mesh::material::{Material, Materials};
 use glam::DAffine3;
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
@@ -70,17 +70,10 @@ impl<'a> ObjectHits<'a> {
         self.job.motion.is_some()
     }
 
-    pub(super) fn material(&self, pattern: &BeamPattern, hit: &Hit) -> Material {
+    pub(super) fn material(&self, hit: &Hit) -> Material {
         let (reflectivity, retroreflection) = (self.job.reflectivity.into(), self.retroreflection);
-        let Some(materials) = self.materials else {
-            return Material { reflectivity, retroreflection };
-        };
-        let barycentric = || {
-            let ray = self.job.beam(pattern, hit.beam);
-            let surface = &self.job.target.surface;
-            surface.barycentric(hit.triangle, ray.origin + hit.range_m * ray.direction)
-        };
-        materials.at(hit.triangle, barycentric)
+        let one = Material { reflectivity, retroreflection };
+        self.materials.map_or(one, |materials| materials.of_triangle(hit.triangle))
     }
 }
 

@@ -12,8 +12,8 @@
 
 use crate::cpu::random::{Purpose, normal_deviate, random_bits};
 use crate::effects::Detection;
-use crate::material::Material;
 use crate::sensor::DetectionLimit;
+use edgepuck_mesh::material::Material;
 use formats::rng::StreamKey;
 
 /// Calibrated reflectivities: percent for diffuse surfaces, the rest of a byte for

@@ -161,7 +161,7 @@ impl<'a> Receiver<'a> {
 
     fn signal(&self, id: HitId, normals: &mut Normals) -> Signal {
         let (object, hit) = (self.object(id), self.hit(id));
-        let material = object.material(self.pattern(), hit);
+        let material = object.material(hit);
         let cosine = || normals.at(id, object, self.pattern()).dot(self.direction(hit.beam)).abs();
         let mut brightness = power::brightness(material, cosine);
         if let Some(share) = self.ray_share {
@@ -189,14 +189,8 @@ impl<'a> Receiver<'a> {
         } else {
             lit().map(|hit| hit.range_m).fold(0.0, f64::max).min(limits.max_m)
         };
-        let in_clear_air = |echo: &Echo| {
-            let transmission = air.transmission(origin, direction, echo.range_m);
-            if transmission > 0.0 { echo.signal.brightness / transmission } else { 0.0 }
-        };
-        let brightness =
-            if air.asks_for_brightness() { echoes.iter().map(in_clear_air).sum() } else { 0.0 };
         let stream = self.request.stream;
-        let along = AirBeam { origin, direction, end_m, brightness, stream, number: beam };
+        let along = AirBeam { origin, direction, end_m, stream, number: beam };
         let mut draw = 0;
         air.scatter(&along, |scattered| {
             let Scattered { range_m, power, brightness, medium } = scattered;

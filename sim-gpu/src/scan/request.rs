@@ -4,12 +4,12 @@ use crate::aim::{Culling, aim};
 use crate::config::InvalidValue;
 use crate::effects::Effects;
 use crate::job::CastJob;
-use crate::material::Materials;
 use crate::motion::Motion;
 use crate::pose::{Pose, Trajectory};
 use crate::ray::RayFrame;
 use crate::sensor::{BeamPattern, SensorProfile};
 use crate::target::Target;
+use edgepuck_mesh::material::Materials;
 use formats::rng::StreamKey;
 use formats::scan::{Attribute, AttributeSet};
 use formats::streams::{StartTime, Stream};
@@ -60,7 +60,7 @@ pub struct PlacedTarget<'a> {
     pub stream: Option<StreamKey>,
     /// Its panes; none by default.
     pub glass: Option<Glass>,
-    /// As [`Material::retroreflection`](crate::material::Material::retroreflection); default 0.
+    /// As [`Material::retroreflection`](edgepuck_mesh::material::Material::retroreflection); default 0.
     pub retroreflection: f64,
     /// The materials of its triangles, instead of its reflectivity and retroreflection, if any.
     pub materials: Option<&'a Materials>,

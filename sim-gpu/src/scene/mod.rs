@@ -1,20 +1,21 @@
 //! Scenes in TOML: objects, sensors, effects and attributes.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use formats::scan::{Attribute, AttributeSet};
+use formats::scan::AttributeSet;
 use glam::{DAffine3, DQuat, DVec3};
 
 use crate::config::{self, ConfigError, InvalidValue};
 use crate::effects::Effects;
-use crate::import::Import;
-use crate::material::MaterialChoice;
-use crate::mesh::frame::{Normalize, Unit, Up};
 use crate::pose::{Pose, Trajectory};
 use crate::sensor::SensorProfile;
-use crate::simplify::Simplify;
+use edgepuck_mesh::frame::{Normalize, Unit, Up};
+use edgepuck_mesh::import::Import;
+use edgepuck_mesh::material::Material;
 
+mod material_table;
 mod table;
 
 pub use table::check_object;
@@ -36,8 +37,6 @@ pub struct SceneFile {
     pub effects: Effects,
     /// The attributes of points besides positions.
     pub attributes: AttributeSet,
-    /// The simplification of meshes; objects may differ.
-    pub simplify: Option<Simplify>,
 }
 
 /// An object of a scene.
@@ -67,13 +66,10 @@ pub struct SceneObject {
     pub scale: DVec3,
     /// The part of the light that it returns at vertical incidence, 0..=1. Default 1.
     pub reflectivity: f64,
-    /// As [`Material::retroreflection`](crate::material::Material::retroreflection); default 0.
+    /// As [`Material::retroreflection`]; default 0.
     pub retroreflection: f64,
-    /// The materials of its faces, for OBJ only; by default a single one.
-    pub materials: MaterialChoice,
-    /// The simplification of the mesh. `None`, the default, takes the scene's; `Some(None)`, `false`
-    /// in TOML, switches it off.
-    pub simplify: Option<Option<Simplify>>,
+    /// The materials of its faces by name, for OBJ only; by default a single one.
+    pub materials: BTreeMap<String, Material>,
 }
 
 /// A sensor of a scene.
@@ -118,10 +114,10 @@ impl SceneFile {
                 let wrong = [attributes.err(), objects.err(), sensors.err()];
                 let mut wrong: Vec<_> = wrong.into_iter().flatten().flatten().collect();
                 // Sensors may share a broken profile.
-                let mut told = std::collections::HashSet::new();
+                let mut known = std::collections::HashSet::new();
                 wrong.retain(|it| {
                     let is_file = it.key.ends_with(".profile") && !it.cause.starts_with("expected");
-                    !is_file || told.insert(it.cause.clone())
+                    !is_file || known.insert(it.cause.clone())
                 });
                 return Err(wrong);
             }
@@ -141,53 +137,7 @@ impl SceneFile {
             }
         }
 
-        let scene = Self {
-            seed: table.seed,
-            objects,
-            sensors,
-            effects,
-            attributes,
-            simplify: table.simplify,
-        };
-        scene.check_triangles()?;
-        Ok(scene)
-    }
-}
-
-impl SceneFile {
-    /// The simplification of the mesh of `object`.
-    #[must_use]
-    pub fn simplify_of(&self, object: &SceneObject) -> Option<Simplify> {
-        object.simplify.unwrap_or(self.simplify).filter(|_| object.import.is_none())
-    }
-
-    /// Whether any mesh is simplified.
-    #[must_use]
-    pub fn simplifies(&self) -> bool {
-        self.objects.iter().any(|object| self.simplify_of(object).is_some())
-    }
-
-    /// Checks that triangle numbers are not an attribute of simplified meshes.
-    pub fn check_triangles(&self) -> Result<(), InvalidValue> {
-        if self.simplifies() && self.attributes.contains(&Attribute::Triangle) {
-            let cause = "a simplified mesh does not have the file's triangles, so that the \
-                         attribute `triangle` cannot name them";
-            return Err(InvalidValue::new("simplify", cause));
-        }
-        let moves = self.sensors.iter().any(|sensor| sensor.motion.is_some())
-            || self.objects.iter().any(|object| object.motion.is_some());
-        if moves && self.simplifies() {
-            let cause = "what a sensor resolves of a mesh changes where one of them moves";
-            return Err(InvalidValue::new("simplify", cause));
-        }
-        let differ = |object: &SceneObject| {
-            self.simplify_of(object).is_some() && !object.materials.is_plain()
-        };
-        if let Some(i) = self.objects.iter().position(differ) {
-            let cause = "a simplified mesh does not have the file's faces, which name materials";
-            return Err(InvalidValue::new(format!("object[{i}].materials"), cause));
-        }
-        Ok(())
+        Ok(Self { seed: table.seed, objects, sensors, effects, attributes })
     }
 }
 

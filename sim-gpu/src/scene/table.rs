@@ -13,15 +13,14 @@ use serde::de::value::SeqAccessDeserializer;
 use serde::de::{SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
 
+use super::material_table::MaterialTable;
 use super::{SceneObject, SceneSensor};
 use crate::config::{self, InvalidValue, one_of, positive, within};
 use crate::effects::Effects;
-use crate::import::{Format, Import};
-use crate::material::{ColourSource, MaterialChoice, MaterialTable};
-use crate::mesh::frame::{Normalize, Unit, Up};
 use crate::pose::{Pose, PoseKeys, Trajectory};
 use crate::sensor::SensorProfile;
-use crate::simplify::Simplify;
+use edgepuck_mesh::frame::{Normalize, Unit, Up};
+use edgepuck_mesh::import::{Format, Import};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -41,7 +40,6 @@ pub(super) struct SceneTable {
     /// `normal`.
     #[serde(default)]
     pub attributes: Vec<String>,
-    pub simplify: Option<Simplify>,
 }
 
 #[derive(Deserialize)]
@@ -80,12 +78,8 @@ pub(super) struct ObjectTable {
     /// The quality as a retro-reflector, such as a road sign: up to 1, which is ideal.
     #[serde(default)]
     retroreflection: f64,
-    /// The source of the colours of an OBJ file's faces, which give reflectivities.
-    colours: Option<ColourSource>,
     #[serde(default)]
     materials: BTreeMap<String, MaterialTable>,
-    /// The simplification of the mesh; by default the scene's. `false` switches it off.
-    simplify: Option<OwnSimplify>,
 }
 
 #[derive(Deserialize)]
@@ -202,17 +196,12 @@ pub(crate) fn check_start(key: &str, start_s: f64) -> Result<(), InvalidValue> {
     within(key, start_s, -1e12..=1e12)
 }
 
-/// Checks that `sensor` can move, and that its poses cover the scan; a single pose covers all times.
+/// Checks that the poses of a sensor cover the scan; a single pose covers all times.
 pub(crate) fn check_motion(
     key: &str,
-    sensor: &SensorProfile,
     trajectory: &Trajectory,
     [from_s, to_s]: [f64; 2],
 ) -> Result<(), InvalidValue> {
-    if sensor.rings.is_some() {
-        // Rings are cones around a single point, in world axes.
-        return Err(InvalidValue::new(key, "cannot move a sensor whose profile has [rings]"));
-    }
     let [first_s, last_s] = trajectory.known_s();
     // A recording may end within its last revolution.
     if first_s == last_s || (first_s <= from_s && to_s <= last_s + KITTI_PERIOD_S) {
@@ -268,13 +257,6 @@ enum Scale {
     PerAxis([f64; 3]),
 }
 
-#[derive(Clone, Copy, Deserialize)]
-#[serde(untagged, expecting = "expected \"auto\", metres above 0 or false as simplify")]
-enum OwnSimplify {
-    Switch(bool),
-    Within(Simplify),
-}
-
 impl ObjectTable {
     /// How its file becomes several instances; none of a mesh's keys stands beside those.
     fn import(&self, key: impl Fn(&str) -> String) -> Result<Option<Import>, InvalidValue> {
@@ -291,12 +273,8 @@ impl ObjectTable {
                 None => Ok(None),
             };
         };
-        let given = [
-            ("normalize", self.normalize.is_some()),
-            ("colours", self.colours.is_some()),
-            ("materials", !self.materials.is_empty()),
-            ("simplify", self.simplify.is_some()),
-        ];
+        let given =
+            [("normalize", self.normalize.is_some()), ("materials", !self.materials.is_empty())];
         let of_all = [
             ("reflectivity", self.reflectivity.is_some()),
             ("retroreflection", self.retroreflection != 0.0),
@@ -312,10 +290,12 @@ impl ObjectTable {
             InvalidValue::new(key("scene"), cause)
         };
         let format = Format::from_path(file).ok_or_else(found)?;
-        format
-            .check(&import)
-            .map_err(|invalid| InvalidValue::new(key(&invalid.key), invalid.cause))?;
-        Ok(Some(import))
+        match format.foreign_setting(&import) {
+            Some((name, of)) => {
+                Err(InvalidValue::new(key(name), format!("expected it only for {of}")))
+            }
+            None => Ok(Some(import)),
+        }
     }
 
     pub fn validate(self, index: usize, folder: &Path) -> Result<SceneObject, Vec<InvalidValue>> {
@@ -351,18 +331,6 @@ impl ObjectTable {
         let [position, rotation] =
             [keys.position_m(&table).map(drop), keys.rotation(&table).map(drop)];
         config::all([numbers, position, rotation])?;
-        let simplify = match self.simplify {
-            None => None,
-            Some(OwnSimplify::Within(simplify)) => Some(Some(simplify)),
-            Some(OwnSimplify::Switch(false)) => Some(None),
-            Some(OwnSimplify::Switch(true)) => {
-                return Err(InvalidValue::new(
-                    key("simplify"),
-                    "expected \"auto\", metres or false, found true",
-                )
-                .into());
-            }
-        };
         let own = self.materials.into_iter().map(|(name, material)| {
             let material = material.material(&format!("{table}.materials.{name}"))?;
             Ok((name, material))
@@ -383,8 +351,7 @@ impl ObjectTable {
             scale: DVec3::from_array(scale),
             reflectivity,
             retroreflection: self.retroreflection,
-            materials: MaterialChoice { colours: self.colours, by_name },
-            simplify,
+            materials: by_name,
         })
     }
 }
@@ -424,7 +391,7 @@ impl SensorTable {
                 return Err(InvalidValue::new(key("trajectory"), cause).into());
             }
             let last_s = sensor.pattern().last_s();
-            check_motion(&key("trajectory"), &sensor, &motion, [start_s, start_s + last_s])?;
+            check_motion(&key("trajectory"), &motion, [start_s, start_s + last_s])?;
             let pose = motion.at(start_s);
             return Ok(SceneSensor { sensor, name, pose, motion: Some(motion), start_s, deskew });
         }

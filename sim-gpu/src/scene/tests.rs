@@ -49,19 +49,6 @@ fn an_object_stands_upright_at_the_origin_by_default() {
 }
 
 #[test]
-fn an_object_is_simplified_as_it_says_or_else_as_the_scene_says() {
-    let simplify = |scene: &str, object: &str| {
-        let scene = parse(&format!("{scene}\n{OBJECT}{object}\n{SENSOR}")).unwrap();
-        scene.simplify_of(&scene.objects[0])
-    };
-    assert_eq!(simplify("", ""), None);
-    assert_eq!(simplify("simplify = \"auto\"", ""), Some(Simplify::Auto));
-    assert_eq!(simplify("simplify = \"auto\"", "simplify = false"), None);
-    assert_eq!(simplify("simplify = 1", "simplify = 0.002"), Some(Simplify::Metres(0.002)));
-    assert_eq!(simplify("", "simplify = \"auto\""), Some(Simplify::Auto));
-}
-
-#[test]
 fn an_object_is_scaled_then_turned_then_moved() {
     let keys = "position_m = [0, 0, 5]\nyaw_deg = 90\nscale = 2";
     let scene = parse(&format!("{OBJECT}{keys}\n{SENSOR}")).unwrap();
@@ -93,10 +80,6 @@ fn bad_scenes_are_named() {
             object("materials = { a = { reflectivity = -1 } }"),
             "object[0].materials.a.reflectivity: expected a number within 0..=1",
         ),
-        (
-            object("colours = \"mtl\"\nsimplify = \"auto\""),
-            "object[0].materials: a simplified mesh",
-        ),
         (both("effects = { detection = { range_m = 5 } }"), "effects.detection.reflectivity"),
         (object("up = \"x\""), "object[0].up: expected one of"),
         (object("normalize = \"sphere\""), "object[0].normalize: expected one of"),
@@ -115,12 +98,6 @@ fn bad_scenes_are_named() {
         (both("attributes = [\"range\", \"colour\"]"), "attributes[1]"),
         (both("attributes = [\"range\", \"range\"]"), "attributes[1]: found \"range\""),
         (both("attributes = [\"intensity\"]"), "requires effects.intensity"),
-        (both("simplify = 0"), "simplify: expected a number above 0, found 0"),
-        (both("simplify = \"much\""), "simplify: expected \"auto\" or a number of metres"),
-        (both("simplify = false"), "as simplify"),
-        (object("simplify = true"), "object[0].simplify: expected"),
-        (object("simplify = -1"), "as simplify"),
-        (both("simplify = \"auto\"\nattributes = [\"triangle\"]"), "simplify: a simplified mesh"),
         (both("effects = { fog = true }"), "fog"),
         (both("effects = { dropout = { probability = 2 } }"), "effects.dropout.probability"),
         (
@@ -171,7 +148,7 @@ fn the_scenes_of_effects_md_are_read() {
 }
 
 #[test]
-fn a_misspelt_word_is_told_with_the_likely_one() {
+fn misspelt_word_is_named_with_the_likely_one() {
     for (wrong, meant) in [
         ("[effects]\nnois = { sigma_m = 0.1 }\n", "did you mean \"noise\"?"),
         ("[[object]]\nmesh = \"a.obj\"\nreflectivty = 0.5\n", "did you mean \"reflectivity\"?"),
@@ -187,7 +164,7 @@ fn a_misspelt_word_is_told_with_the_likely_one() {
 
 /// Broken files, each with its whole message: one line for each mistake, and no other.
 #[test]
-fn all_mistakes_of_a_file_are_told_at_once() {
+fn all_mistakes_of_a_file_are_named_at_once() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("my.toml");
     for broken in include_str!("broken.txt").split("=====\n").skip(1) {
@@ -197,24 +174,24 @@ fn all_mistakes_of_a_file_are_told_at_once() {
             true => SensorProfile::load(&file).unwrap_err(),
             false => SceneFile::load(&file).unwrap_err(),
         };
-        let told = format!("{error}\n");
-        assert_eq!(told.split_once("my.toml: ").unwrap().1, expected, "{text}");
+        let found = format!("{error}\n");
+        assert_eq!(found.split_once("my.toml: ").unwrap().1, expected, "{text}");
     }
 }
 
 #[test]
-fn a_broken_profile_is_told_once_and_indented() {
+fn broken_profile_is_named_once_and_indented() {
     let folder = tempfile::tempdir().unwrap();
     let profile = "name = 1\nsources = [2]\nrange = { max_m = 1 }\n";
     std::fs::write(folder.path().join("own.toml"), profile).unwrap();
     let sensor = "[[sensor]]\nprofile = \"own.toml\"\nposition_m = [1, 0, 0]\nyaw_deg = 0\n";
     let text = format!("seed = 1\n{OBJECT}yaw_deg = nan\n{sensor}{sensor}");
     let error = SceneFile::parse(&text, &folder.path().join("my.toml")).unwrap_err().to_string();
-    let told = error.replace(&format!("{}/", folder.path().display()), "");
+    let found = error.replace(&format!("{}/", folder.path().display()), "");
     let expected = "my.toml: 2 mistakes:\n  \
                     line 4: object[0].yaw_deg: expected a finite number, found NaN\n  \
                     line 6: sensor[0].profile: own.toml: 2 mistakes:\n      \
                     line 1: name: expected a string, found 1\n      \
                     line 2: sources[0]: expected a string, found 2";
-    assert_eq!(told, expected);
+    assert_eq!(found, expected);
 }

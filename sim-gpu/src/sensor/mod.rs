@@ -19,10 +19,8 @@ pub use footprint::BeamShape;
 pub use grid::Grid;
 pub(crate) use pattern::starts;
 pub use pattern::{BeamPattern, Directions};
-pub use rings::{Rings, polar_angle_rad};
 pub use risley::{Line, Prism, Risley};
 pub use rotating::{Beam, Rotating};
-pub use sample::Sample;
 pub use table::Table;
 pub use uniform::Uniform;
 pub use views::Views;
@@ -35,10 +33,8 @@ mod grid;
 mod ouster;
 mod pattern;
 mod profile;
-mod rings;
 mod risley;
 mod rotating;
-mod sample;
 mod step;
 mod table;
 mod uniform;
@@ -87,15 +83,6 @@ pub struct SensorProfile {
     /// The revolutions per scan, or the frames of a sensor that does not turn; 1 by default.
     #[serde(skip_serializing_if = "is_one")]
     pub revolutions: NonZeroU32,
-    /// The rings to which points are snapped after the scan.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rings: Option<Rings>,
-    /// The sample of points that is drawn after the scan.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub sample: Option<Sample>,
-    /// The recommended views.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub views: Option<Views>,
 }
 
 fn is_one(number: &NonZeroU32) -> bool {
@@ -168,7 +155,7 @@ impl SensorProfile {
             Some("json") => ouster::load(file),
             Some("csv") => {
                 let cause = "expected a profile in TOML, which names a table in CSV by this key";
-                Err(InvalidValue::new("table.file", cause).in_file(file))
+                Err(ConfigError::value(file, InvalidValue::new("table.file", cause)))
             }
             _ => profile::load(file),
         }
@@ -253,14 +240,14 @@ impl SensorProfile {
         self.footprint.map_or([0.172; 2], |footprint| footprint.divergence_deg)
     }
 
-    /// The views this sensor is meant for: its own, or else
-    /// [`Views::STATIC`] for a camera and [`Views::ROTATING`] for all others.
+    /// The views this sensor is meant for: [`Views::STATIC`] for a camera and [`Views::ROTATING`] for
+    /// all others.
     #[must_use]
     pub fn default_views(&self) -> Views {
-        self.views.clone().unwrap_or(match self.layout {
+        match self.layout {
             Layout::Grid(_) => Views::STATIC,
             _ => Views::ROTATING,
-        })
+        }
     }
 }
 

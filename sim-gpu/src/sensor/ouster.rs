@@ -18,19 +18,20 @@ pub(super) fn load(file: &Path) -> Result<SensorProfile, ConfigError> {
         let bare = message.strip_prefix(&format!("{}: ", file.display())).unwrap_or(&message);
         ConfigError::Content { file: file.to_owned(), message: bare.to_owned() }
     })?;
-    let [start_m, height_m] = metadata.origin_m();
+    let flaw = |key: &str, cause: String| ConfigError::value(file, InvalidValue::new(key, cause));
+    let [start_m, height_m] = metadata.origin_m;
     if height_m != 0.0 {
         let cause = format!("expected beams that begin at height 0, found {height_m} m");
-        return Err(InvalidValue::new("beam_to_lidar_transform", cause).in_file(file));
+        return Err(flaw("beam_to_lidar_transform", cause));
     }
     if metadata.n_columns_unsent() > 0 {
         let unsent = metadata.n_columns_unsent();
         let cause = format!("expected all columns of a turn, found {unsent} that are not sent");
-        return Err(InvalidValue::new("column_window", cause).in_file(file));
+        return Err(flaw("column_window", cause));
     }
-    let rate_hz = metadata.rate_hz();
-    let columns = f64::from(metadata.columns_per_frame());
-    let beam = metadata.beams_deg().iter().map(|&[elevation_deg, azimuth_deg]| Beam {
+    let rate_hz = metadata.rate_hz;
+    let columns = f64::from(metadata.columns_per_frame);
+    let beam = metadata.beams_deg.iter().map(|&[elevation_deg, azimuth_deg]| Beam {
         // The head turns clockwise; a beam's azimuth counts clockwise from where it points.
         azimuth_offset_deg: -azimuth_deg,
         elevation_deg,
@@ -39,19 +40,18 @@ pub(super) fn load(file: &Path) -> Result<SensorProfile, ConfigError> {
     let rotating = Rotating {
         rpm: 60.0 * rate_hz,
         sequence_us: 1e6 / (rate_hz * columns),
-        azimuth_quantum_deg: None,
         sequence_quantum_deg: None,
         beam_crossing_m: None,
         beam_start_m: Some(start_m),
         beam: beam.collect(),
     };
-    rotating.validate().map_err(|InvalidValue { key, cause }| {
-        InvalidValue::new(format!("as a profile, {key}"), cause).in_file(file)
-    })?;
+    rotating
+        .validate()
+        .map_err(|InvalidValue { key, cause }| flaw(&format!("as a profile, {key}"), cause))?;
     let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     Ok(SensorProfile {
         name,
-        description: format!("Ouster of {} beams", metadata.beams_deg().len()),
+        description: format!("Ouster of {} beams", metadata.beams_deg.len()),
         sources: vec![file.display().to_string()],
         range: RangeLimits {
             min_m: 0.0,
@@ -64,8 +64,5 @@ pub(super) fn load(file: &Path) -> Result<SensorProfile, ConfigError> {
         layout: Layout::Rotating(rotating),
         decimation: NonZeroU32::MIN,
         revolutions: NonZeroU32::MIN,
-        rings: None,
-        sample: None,
-        views: None,
     })
 }

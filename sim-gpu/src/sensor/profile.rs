@@ -6,8 +6,8 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::{
-    BeamShape, DetectionLimit, Grid, LARGEST_M, Layout, RangeLimits, Rings, Risley, Rotating,
-    Sample, SensorProfile, Table, TypicalNoise, Uniform, Views,
+    BeamShape, DetectionLimit, Grid, LARGEST_M, Layout, RangeLimits, Risley, Rotating,
+    SensorProfile, Table, TypicalNoise, Uniform,
 };
 use crate::config::{self, ConfigError, InvalidValue, positive, within};
 
@@ -37,9 +37,6 @@ pub(super) struct Profile {
     decimation: NonZeroU32,
     #[serde(default = "one")]
     revolutions: NonZeroU32,
-    rings: Option<Rings>,
-    sample: Option<Sample>,
-    views: Option<Views>,
 }
 
 fn one() -> NonZeroU32 {
@@ -95,23 +92,9 @@ impl Profile {
             within("noise.repeatability_m", repeatability_m, 0.0..=f64::MAX),
             profile.detection.map_or(Ok(()), |limit| limit.validate("detection")),
             profile.footprint.map_or(Ok(()), |footprint| footprint.validate("footprint")),
-            profile.rings.as_ref().map_or(Ok(()), Rings::validate),
-            profile.sample.as_ref().map_or(Ok(()), Sample::validate),
-            profile.views.as_ref().map_or(Ok(()), Views::validate),
             layout.as_ref().map_err(Clone::clone).map(|_| ()),
         ])?;
         let layout = layout?;
-        if let (Layout::Rotating(rotating), Some(_)) = (&layout, &profile.rings)
-            && (rotating.beam_crossing_m.is_some() || rotating.beam_start_m.is_some())
-        {
-            // Rings are cones around one point, and these beams start at different ones.
-            let cause = "cannot stand beside [rings]";
-            let key = match rotating.beam_crossing_m {
-                Some(_) => "rotating.beam_crossing_m",
-                None => "rotating.beam_start_m",
-            };
-            return Err(InvalidValue::new(key, cause).into());
-        }
         let sensor = SensorProfile {
             name: profile.name,
             description: profile.description,
@@ -123,9 +106,6 @@ impl Profile {
             layout,
             decimation: profile.decimation,
             revolutions: profile.revolutions,
-            rings: profile.rings,
-            sample: profile.sample,
-            views: profile.views,
         };
         sensor.check_revolutions()?;
         Ok(sensor)

@@ -17,12 +17,8 @@ pub struct Rotating {
     pub rpm: f64,
     /// The period of firing sequences, microseconds.
     pub sequence_us: f64,
-    /// The encoder's azimuth is rounded to a multiple of this, degrees; exact if absent.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub azimuth_quantum_deg: Option<f64>,
-    /// The encoder's azimuth is rounded to a multiple of this, degrees, only when a sequence
-    /// starts, and grows from that value with the turning head, as packets encode azimuths.
-    /// Excludes `azimuth_quantum_deg`.
+    /// The encoder's azimuth is rounded to a multiple of this, degrees, when a sequence starts, and
+    /// grows from that value with the turning head, as packets encode azimuths; exact if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sequence_quantum_deg: Option<f64>,
     /// All beams cross at this distance in front of the axis, metres: a beam of elevation e starts
@@ -81,12 +77,7 @@ impl Rotating {
     pub(super) fn validate(&self) -> Result<(), InvalidValue> {
         positive("rotating.rpm", self.rpm)?;
         positive("rotating.sequence_us", self.sequence_us)?;
-        positive("rotating.azimuth_quantum_deg", self.azimuth_quantum_deg)?;
         positive("rotating.sequence_quantum_deg", self.sequence_quantum_deg)?;
-        if self.azimuth_quantum_deg.and(self.sequence_quantum_deg).is_some() {
-            let cause = "cannot stand beside rotating.azimuth_quantum_deg";
-            return Err(InvalidValue::new("rotating.sequence_quantum_deg", cause));
-        }
         within("rotating.beam_crossing_m", self.beam_crossing_m, 0.0..=1.0)?;
         within("rotating.beam_start_m", self.beam_start_m, 0.0..=1.0)?;
         if self.beam_crossing_m.and(self.beam_start_m).is_some() {
@@ -156,17 +147,10 @@ impl Rotating {
 
     fn encoder_rad(&self, start_s: f64, time_s: f64) -> f64 {
         let turned_rad = |time_s| TAU * time_s / self.period_s();
-        let rounded_rad = |angle_rad: f64, quantum_deg: f64| {
-            let quantum_rad = quantum_deg.to_radians();
-            (angle_rad / quantum_rad).round() * quantum_rad
-        };
-        match (self.azimuth_quantum_deg, self.sequence_quantum_deg) {
-            (Some(quantum_deg), _) => rounded_rad(turned_rad(time_s), quantum_deg),
-            (None, Some(quantum_deg)) => {
-                rounded_rad(turned_rad(start_s), quantum_deg) + turned_rad(time_s - start_s)
-            }
-            (None, None) => turned_rad(time_s),
-        }
+        let Some(quantum_deg) = self.sequence_quantum_deg else { return turned_rad(time_s) };
+        let quantum_rad = quantum_deg.to_radians();
+        let rounded_rad = (turned_rad(start_s) / quantum_rad).round() * quantum_rad;
+        rounded_rad + turned_rad(time_s - start_s)
     }
 
     /// The rank of each beam by elevation, from below.

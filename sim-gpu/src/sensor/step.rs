@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn of_directions_it_is_the_angle_of_the_two_that_are_nearest() {
+    fn step_is_the_angle_of_the_two_nearest_directions() {
         let at = |deg: f64| DVec3::new(deg.to_radians().cos(), 0.0, deg.to_radians().sin());
         let found = least_angle(&[at(10.0), at(-20.0), at(10.0), at(12.0), at(60.0)]).unwrap();
         assert!((found.to_degrees() - 2.0).abs() < 1e-9, "{}", found.to_degrees());

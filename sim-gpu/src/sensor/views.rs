@@ -1,16 +1,15 @@
-//! The recommended poses of a sensor around an object.
+//! The poses of a sensor around an object.
 
 use formats::rng::StreamKey;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::config::{InvalidValue, at_least, positive, within};
-use crate::mesh::frame::Normalize;
 use crate::pose::{Pose, azimuth_on_ring};
 
 /// Views of an object, evenly spread over azimuth.
+// Manifests of earlier versions have one key more, `normalize`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct Views {
     /// The number of views.
     pub count: u32,
@@ -29,9 +28,6 @@ pub struct Views {
     /// Each view's azimuth is moved by a uniform random angle of at most this.
     #[serde(default)]
     pub azimuth_jitter_deg: f64,
-    /// The recommended normalization of the object.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub normalize: Option<Normalize>,
 }
 
 impl Views {
@@ -44,7 +40,6 @@ impl Views {
         elevation_to_deg: None,
         azimuth_deg: 0.0,
         azimuth_jitter_deg: 0.0,
-        normalize: None,
     };
 
     /// One view from 45 degrees, 20 degrees above, 3 m away.
@@ -100,6 +95,7 @@ impl Views {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sensor::SensorProfile;
 
     #[test]
     fn views_are_regular_if_nothing_of_them_is_drawn() {
@@ -113,6 +109,18 @@ mod tests {
             let pose = |object| drawn.pose(1, DVec3::ZERO, StreamKey::new(0, object, 0));
             assert_ne!(pose("chair"), pose("table"));
         }
+    }
+
+    #[test]
+    fn cameras_and_other_sensors_have_their_usual_views() {
+        let views = |name| SensorProfile::builtin(name).unwrap().default_views();
+        assert_eq!(views("vlp32c"), Views::ROTATING);
+        assert_eq!(views("generic-static"), Views::STATIC);
+        let poses = Views::ROTATING.poses(DVec3::ZERO, StreamKey::new(0, "", 0));
+        let (sine, cosine) = 20f64.to_radians().sin_cos();
+        assert_eq!(poses.len(), 4);
+        assert!(poses[0].position_m.abs_diff_eq(DVec3::new(cosine, 0.0, sine) * 3.0, 1e-15));
+        assert!(poses[1].position_m.y > 2.8);
     }
 
     #[test]

@@ -20,18 +20,14 @@ const WHOLE_M: f64 = 1.0;
 /// Backscatter per steradian times the visibility: Rasshofer et al. 2011.
 const BACKSCATTER: f64 = 0.046;
 
-/// The reference of Hahner et al. for fog: 1e-6 / pi.
-const HAHNERS_SURFACE: f64 = 1e-6 / PI;
-
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fog {
     /// The range of the maximum of I(R), metres.
     peak_m: f64,
-    /// Its power; if proportional to the surface behind the fog, for a surface of brightness 1.
+    /// Its power.
     power: f64,
-    /// For physical fog, the part of that power from the fog before each border of cells.
+    /// The share of the backscatter from before each border of cells.
     up_to: [f64; CELLS + 1],
-    is_in_proportion: bool,
 }
 
 /// The extinction per metre for this visibility V: ln 20 / V, at which a contrast of 5 % remains.
@@ -49,35 +45,18 @@ pub(super) fn of_one_pulse(visibility_m: f64, length_m: f64) -> f64 {
 
 impl Fog {
     /// Fog of this visibility, in air of this total extinction.
-    pub fn new(visibility_m: f64, extinction: f64, is_in_proportion: bool) -> Self {
+    pub fn new(visibility_m: f64, extinction: f64) -> Self {
         let (peak_m, most) = strongest(extinction);
-        let backscatter = BACKSCATTER / visibility_m;
-        let factor = if is_in_proportion {
-            backscatter / HAHNERS_SURFACE
-        } else {
-            PI * LIGHT_M_S / 2.0 * backscatter
-        };
-        let up_to = if is_in_proportion { [1.0; CELLS + 1] } else { shares(peak_m, extinction) };
-        Self { peak_m, power: factor * most, up_to, is_in_proportion }
-    }
-
-    /// Whether its power is proportional to the brightness of the surface behind it.
-    pub fn is_in_proportion(&self) -> bool {
-        self.is_in_proportion
+        let factor = PI * LIGHT_M_S / 2.0 * (BACKSCATTER / visibility_m);
+        Self { peak_m, power: factor * most, up_to: shares(peak_m, extinction) }
     }
 
     pub fn scattered(&self, beam: &AirBeam) -> Option<Scattered> {
-        let (range_m, power, brightness) = if self.is_in_proportion {
-            let power = self.power * beam.brightness;
-            // That simulation reports the brightness as if the fog were as far as the surface.
-            (self.peak_m, power, (power * beam.end_m.powi(2)).min(1.0))
-        } else {
-            // The pulse of a surface peaks half of its length after it begins to return, for which
-            // sensors correct.
-            let range_m = (self.peak_m - PULSE_M / 2.0).max(BLIND_M);
-            let power = self.power * self.share_up_to(beam.end_m);
-            (range_m, power, power * range_m.powi(2))
-        };
+        // The pulse of a surface peaks half of its length after it begins to return, for which
+        // sensors correct.
+        let range_m = (self.peak_m - PULSE_M / 2.0).max(BLIND_M);
+        let power = self.power * self.share_up_to(beam.end_m);
+        let brightness = power * range_m.powi(2);
         let is_something = power > 0.0 && range_m < beam.end_m;
         is_something.then_some(Scattered { range_m, power, brightness, medium: Medium::Fog })
     }
@@ -179,17 +158,16 @@ mod tests {
     }
 
     #[test]
-    fn physical_fog_lies_where_a_surface_of_its_light_would_and_is_no_brighter_than_endless_fog() {
+    fn fog_lies_where_a_surface_of_its_light_would_and_is_no_brighter_than_endless_fog() {
         // Single scattering of endless fog: pi beta / (2 a), whatever the visibility.
         let endless = PI * BACKSCATTER / (2.0 * 20f64.ln());
         assert!((endless - 0.0241).abs() < 1e-4);
         for visibility_m in [0.5, 2.0, 10.0, 50.0, 500.0] {
-            let fog = Fog::new(visibility_m, extinction_of(visibility_m), false);
+            let fog = Fog::new(visibility_m, extinction_of(visibility_m));
             let along = |end_m| AirBeam {
                 origin: glam::DVec3::ZERO,
                 direction: glam::DVec3::X,
                 end_m,
-                brightness: 0.0,
                 stream: formats::rng::StreamKey([1, 2]),
                 number: 0,
             };
@@ -214,16 +192,6 @@ mod tests {
             assert!(of_one_pulse(visibility_m, f64::INFINITY) <= endless);
             let thin = of_one_pulse(visibility_m, 1e-6) / 1e-6;
             assert!((thin / (PI * BACKSCATTER / visibility_m) - 1.0).abs() < 1e-4);
-        }
-    }
-
-    #[test]
-    fn in_proportion_every_beam_beyond_one_range_becomes_fog() {
-        // Derived from the same tables: the root of R^2 (beta / beta0) I = exp(-2 a R).
-        for (extinction, from_m) in [(0.01, 150.6), (0.06, 35.6), (0.2, 13.6)] {
-            let fog = Fog::new(20f64.ln() / extinction, extinction, true);
-            let is_fog = |r: f64| fog.power * r * r > (-2.0 * extinction * r).exp();
-            assert!(!is_fog(from_m - 0.1) && is_fog(from_m + 0.1), "{extinction}");
         }
     }
 }

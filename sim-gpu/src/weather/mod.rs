@@ -46,11 +46,6 @@
 //! `c T / 2 = 3 m` behind it, and sensors correct for that: they report fog about 1.6 m away. A
 //! surface nearer than 4.6 m removes the fog behind it.
 //!
-//! [`FogModel::Hahner`] reproduces the simulation of Hahner et al. There fog returns
-//! `b (beta / beta0) I` with `beta0 = 1e-6 / pi`. It is proportional to the surface behind it, so
-//! that every beam longer than a certain range returns from fog 4.6 m away, whatever it hits. Their
-//! formula for surfaces lacks a factor 2/c, and they chose 1e-6 by eye. Both are kept.
-//!
 //! # Haze
 //!
 //! Kruse's law: `a = 3.912 / V (wavelength / 550 nm)^-q` per kilometre, with V the visibility in
@@ -78,7 +73,7 @@ pub(crate) use recorded::without_surface;
 pub use recorded::{Fates, in_weather};
 
 use crate::cpu::random::{Purpose, random_bits};
-use crate::effects::{FogModel, Volume, Weather};
+use crate::effects::{Volume, Weather};
 use crate::sensor::{DetectionLimit, RangeLimits};
 use drops::Drops;
 use fog::{Fog, extinction_of};
@@ -125,8 +120,6 @@ pub struct AirBeam {
     pub direction: DVec3,
     /// Its length, metres: up to the farthest surface that it meets, or the sensor's limit.
     pub end_m: f64,
-    /// The brightness of the surface at its end; 0 if there is none.
-    pub brightness: f64,
     /// The stream of its random numbers.
     pub stream: StreamKey,
     /// Its number, which keys its random numbers in the stream.
@@ -167,14 +160,11 @@ impl Air {
         let width =
             divergence_deg.map(|deg| libm::tan(deg.to_radians())).iter().product::<f64>().sqrt();
         let beam = drops::Beam { width, extinction, least_power: limit.power(), range: *range };
-        let model = weather.fog_model;
         Self {
             extinction,
             rain: rain_mm_h.map(|rate| Drops::rain(rate, &beam)),
             snow: snow_mm_h.map(|rate| Drops::snow(rate, &beam)),
-            fog: weather
-                .fog_visibility_m
-                .map(|visibility_m| Fog::new(visibility_m, extinction, model == FogModel::Hahner)),
+            fog: weather.fog_visibility_m.map(|visibility_m| Fog::new(visibility_m, extinction)),
             volumes: weather.volumes.clone(),
             empty_beams: weather.empty_beams.unwrap_or(true),
         }
@@ -190,12 +180,6 @@ impl Air {
     /// The optical depth of the volumes along a beam up to this range.
     fn depth_in_volumes(&self, origin: DVec3, direction: DVec3, range_m: f64) -> f64 {
         self.volumes.iter().map(|volume| depth(volume, origin, direction, range_m)).sum()
-    }
-
-    /// Whether the returns of the air depend on the brightness of the surface behind it.
-    #[must_use]
-    pub fn asks_for_brightness(&self) -> bool {
-        self.fog.is_some_and(|fog| fog.is_in_proportion())
     }
 
     /// Passes the returns of the air along `beam` to `take`, unordered.

@@ -54,8 +54,8 @@ pub fn in_weather(
         }
         let (origin, direction) = (sensor_m, from_sensor / end_m);
         let brightness = f64::from(brightness);
-        let along = AirBeam { origin, direction, end_m, brightness, stream, number };
-        match strongest(air, &along, limit.power()) {
+        let along = AirBeam { origin, direction, end_m, stream, number };
+        match strongest(air, &along, brightness, limit.power()) {
             None => {
                 fates.lost += 1;
                 let before = brightness / end_m.powi(2);
@@ -72,10 +72,11 @@ pub fn in_weather(
     (moved(scan, sensor_m, &kept, &found), fates)
 }
 
-/// The strongest return of the air along a beam that ends at a surface, if not below `least`.
-fn strongest(air: &Air, beam: &AirBeam, least: f64) -> Option<Scattered> {
+/// The strongest return of the air along a beam that ends at a surface of this `brightness`, if not
+/// below `least`.
+fn strongest(air: &Air, beam: &AirBeam, brightness: f64, least: f64) -> Option<Scattered> {
     let range_m = beam.end_m;
-    let brightness = beam.brightness * air.transmission(beam.origin, beam.direction, range_m);
+    let brightness = brightness * air.transmission(beam.origin, beam.direction, range_m);
     let power = brightness / range_m.powi(2);
     let mut best = Scattered { range_m, power, brightness, medium: Medium::Surface };
     air.scatter(beam, |one| {

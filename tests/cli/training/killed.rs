@@ -17,7 +17,7 @@ fn run(folder: &Path, out: &str) -> std::process::Child {
         .unwrap()
 }
 
-/// What each epoch came to, but for how long it took.
+/// The metrics of each epoch, without its duration.
 fn curve(folder: &Path, out: &str) -> Vec<String> {
     let csv = std::fs::read_to_string(folder.join(out).join("metrics.csv")).unwrap();
     let without_time = |line: &str| line.splitn(7, ',').take(6).collect::<Vec<_>>().join(",");
@@ -40,7 +40,7 @@ fn a_run_that_is_killed_again_and_again_ends_with_the_same_bytes_and_curve() {
         kills += usize::from(broken.wait().unwrap().signal() == Some(9));
     }
     assert!(kills > 0, "all runs ended before they were killed");
-    // Where none came as far as that, so does this, and the last resumes it.
+    // If no run has written a checkpoint, one is left to do so; the last run resumes it.
     while !folder.join("broken.run/checkpoint.safetensors").exists() {
         let mut broken = run(folder, "broken.safetensors");
         std::thread::sleep(Duration::from_millis(500));

@@ -6,7 +6,7 @@
 
 #![no_main]
 
-use infer_cpu::live::{Arrival, EgoMotion, LiveOptions, Object, Pipeline};
+use infer_cpu::live::{Arrival, LiveOptions, Object, Pipeline, Pose, Trajectory};
 use infer_cpu::{Classifier, Options};
 use libfuzzer_sys::fuzz_target;
 
@@ -18,9 +18,9 @@ fuzz_target!(|bytes: &[u8]| {
     let classifier = Classifier::from_bytes(MODEL, &Options::default()).expect("a model");
     let mut options = LiveOptions::default();
     if choice & 1 == 1 {
-        let [linear_m_s, angular_rad_s] =
-            [[3.0, 0.0, 0.1], [0.0, 0.1, f64::from(choice)]].map(Into::into);
-        options.ego_motion = Some(EgoMotion::Twist { linear_m_s, angular_rad_s });
+        let turned = Pose::at([30.0, 0.0, 1.0]).turned_deg(f64::from(choice), 5.0, 0.0);
+        let poses = vec![(0.0, Pose::IDENTITY), (10.0, turned)];
+        options.ego_motion = Some(Trajectory::new(poses).expect("finite poses"));
     }
     let mut pipeline = Pipeline::new(classifier, &options).expect("the default settings");
     for command in commands.as_chunks::<COMMAND>().0 {

@@ -1,14 +1,15 @@
 //! Any bytes, taken for any format, are an error or a mesh that can be placed
-//! and surveyed; an OBJ file with an MTL file is an error or has materials. The first byte chooses
+//! and surveyed; an OBJ file is an error or has materials. The first byte chooses
 //! the format.
 
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use sim_gpu::internals::material::{ColourSource, Material, MaterialChoice, Materials};
-use sim_gpu::internals::mesh::frame::{Normalize, Up, to_world};
-use sim_gpu::internals::mesh::validate::triangle_stats;
-use sim_gpu::internals::mesh::{MeshFormat, parse};
+use edgepuck_mesh::material::{Material, Materials};
+use edgepuck_mesh::frame::{Normalize, Up, to_world};
+use edgepuck_mesh::validate::triangle_stats;
+use edgepuck_mesh::{MeshFormat, parse};
+use std::collections::BTreeMap;
 use std::fs;
 
 fuzz_target!(|bytes: &[u8]| {
@@ -27,15 +28,11 @@ fuzz_target!(|bytes: &[u8]| {
     }
 });
 
-/// Takes the bytes up to the first 0xFF for an MTL file, and those after it for an OBJ file.
+/// Takes the bytes for an OBJ file.
 fn load_materials(content: &[u8]) {
     let folder = std::env::temp_dir().join(format!("fuzz-mesh-{}", std::process::id()));
-    let mut files = content.splitn(2, |byte| *byte == 0xFF);
-    let [mtl, obj] = [0, 1].map(|_| files.next().unwrap_or_default());
     fs::create_dir_all(&folder).expect("the folder of temporary files can be written");
-    for (name, content) in [("a.mtl", mtl), ("a.obj", &[b"mtllib a.mtl\n", obj].concat())] {
-        fs::write(folder.join(name), content).expect("as the folder");
-    }
-    let choice = MaterialChoice { colours: Some(ColourSource::Mtl), ..MaterialChoice::default() };
-    let _ = Materials::load(&folder.join("a.obj"), &choice, Material::diffuse(1.0));
+    fs::write(folder.join("a.obj"), content).expect("as the folder");
+    let none = BTreeMap::new();
+    let _ = Materials::load(&folder.join("a.obj"), &none, Material::diffuse(1.0));
 }

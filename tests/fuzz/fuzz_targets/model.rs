@@ -30,7 +30,7 @@ fuzz_target!(|bytes: &[u8]| {
     if fs::write(&*FILE, file).is_err() {
         return;
     }
-    let precision = Precision::ALL[usize::from(choice / 2 % 4)];
+    let precision = Precision::ALL[usize::from(choice / 2) % Precision::ALL.len()];
     let options = Options { precision, capacity: 16, ..Options::default() };
     let Ok(mut classifier) = Classifier::load(&FILE, &options) else { return };
     let cloud = [[0.0, 0.0, 0.1], [0.3, 0.0, 0.1], [0.3, 0.2, 0.0], [-0.1, 0.5, 0.2]];

@@ -3,7 +3,7 @@
 
 #![no_main]
 
-use sim_gpu::internals::mesh::{MeshFormat, parse};
+use edgepuck_mesh::{MeshFormat, parse};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|bytes: &[u8]| {

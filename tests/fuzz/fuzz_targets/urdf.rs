@@ -5,7 +5,7 @@
 use libfuzzer_sys::fuzz_target;
 use sim_gpu::Import;
 use sim_gpu::glam::DAffine3;
-use sim_gpu::internals::import::parse_urdf;
+use edgepuck_mesh::import::parse_urdf;
 
 fuzz_target!(|text: &str| {
     for collision in [false, true] {

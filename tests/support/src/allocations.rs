@@ -1,6 +1,8 @@
 //! Counts a process's allocations. A test program of a single test, without the
 //! standard harness, makes [`Counting`] its global allocator.
 
+#![expect(unsafe_code, reason = "an allocator is unsafe to make")]
+
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
 

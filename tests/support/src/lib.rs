@@ -8,8 +8,7 @@
 //! there from the passed to the skipped.
 
 pub mod allocations;
-#[cfg(feature = "c")]
-pub mod c;
+pub mod said;
 
 use std::env;
 use std::fs::OpenOptions;

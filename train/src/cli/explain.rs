@@ -1,18 +1,18 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use crate::explanation_drawing;
-use crate::lime::{Explanation, Lime, explain};
-use crate::random_baseline::RandomBaseline;
-use anyhow::{Context, Error};
+use anyhow::{Context, Error, ensure};
+use clap::value_parser;
 use formats::atomic;
-use formats::cloud_file::{Unlike, judge_object};
-use formats::outcome::say;
-use formats::outputs::{Overwrite, need_extension};
+use formats::cloud_file::{Cloud, read_cloud_as};
+use formats::plausible::{Unlike, judge_object};
 use infer_cpu::sampler::{SamplerKind, SamplerSpec};
 use infer_cpu::{Classifier, Normalization, Options};
+use program::outcome::say;
+use program::outputs::{Overwrite, need_extension};
 
-use super::compare_points::read_finite;
-use super::{Usage, print};
+use super::print;
+use crate::explanation_drawing;
+use crate::lime::explain;
 
 /// Flags of `explain`.
 #[derive(clap::Args, Debug)]
@@ -23,19 +23,12 @@ pub struct ExplainArgs {
     /// The cloud file: PLY, NPZ, NPY, PCD, text, KITTI or LAS
     #[arg(long, value_name = "FILE")]
     cloud: PathBuf,
-    /// Largest number of critical points. LIME-3D marks as many points as were found, since a point
-    /// can be critical several times
-    #[arg(long, default_value_t = 64, value_name = "N")]
-    points: usize,
+    /// Largest number of critical points
+    #[arg(long, default_value = "64", value_name = "N", value_parser = value_parser!(u32).range(1..))]
+    points: u32,
     /// Number of parts into which LIME-3D divides the cloud
-    #[arg(long, default_value_t = 20, value_name = "K")]
-    clusters: usize,
-    /// Number of copies of the cloud, each with some parts removed, that LIME-3D classifies
-    #[arg(long, default_value_t = 1000, value_name = "N")]
-    samples: usize,
-    /// Seed of all random numbers
-    #[arg(long, default_value_t = 0, value_name = "N")]
-    seed: u64,
+    #[arg(long, default_value = "20", value_name = "K", value_parser = value_parser!(u32).range(2..))]
+    clusters: u32,
     /// Draw the cloud, with the points that both methods mark, into this SVG file
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
@@ -43,11 +36,7 @@ pub struct ExplainArgs {
     overwrite: Overwrite,
 }
 
-/// Number of random subsets to compare the distance with.
-const DRAWS: u32 = 1000;
-
 pub fn run(args: &ExplainArgs) -> anyhow::Result<()> {
-    check(args)?;
     args.svg.iter().try_for_each(|file| need_extension("--svg", file, &["svg"]))?;
     args.overwrite.check(args.svg.iter().map(PathBuf::as_path))?;
     let cloud = read_finite(&args.cloud)?;
@@ -58,10 +47,6 @@ pub fn run(args: &ExplainArgs) -> anyhow::Result<()> {
     if unlike == Some(Unlike::Sweep) {
         say(format!("warning: {} {}", file(), Unlike::Sweep));
     }
-    let spec =
-        SamplerSpec { kind: SamplerKind::Cpl, points: args.points, ..SamplerSpec::default() };
-    // The network sees all points; the sampler only finds the critical points.
-    let whole = SamplerSpec { kind: SamplerKind::All, ..SamplerSpec::default() };
     // A cloud with parts removed must keep the normalisation of the whole cloud.
     let load = |sampler| {
         let (sampler, normalization) = (Some(sampler), Some(Normalization::None));
@@ -75,64 +60,33 @@ pub fn run(args: &ExplainArgs) -> anyhow::Result<()> {
     };
     infer_cpu::normalize(normalization, &cloud, None, &mut points);
     let wide: Vec<[f64; 3]> = points.iter().map(|point| point.map(f64::from)).collect();
-    let critical: Vec<usize> = load(spec)?.sample(&wide)?.iter().map(|&i| i as usize).collect();
-    let lime =
-        Lime { clusters: args.clusters, samples: args.samples, seed: args.seed, ..Lime::default() };
-    let mut classifier = load(whole)?;
+    let n_points = args.points as usize;
+    let cpl = SamplerSpec { kind: SamplerKind::Cpl, points: n_points, ..SamplerSpec::default() };
+    let critical: Vec<usize> = load(cpl)?.sample(&wide)?.iter().map(|&i| i as usize).collect();
+    // The network sees all points; the sampler only finds the critical points.
+    let mut classifier = load(SamplerSpec { kind: SamplerKind::All, ..SamplerSpec::default() })?;
     let class = classifier.classify(&points)?;
     let like = match class.answer() {
         answer if answer != &*class.label => format!("{answer}, most like "),
         _ => String::new(),
     };
     print(&format!("{like}{}: {:.1} %", class.label, 100.0 * class.confidence()))?;
-    let found = explain(&mut classifier, &points, &lime)?;
-    let strongest = found.strongest(critical.len());
-    print(&report(&points, &found, &critical, &strongest, args.seed))?;
+    let found = explain(&mut classifier, &points, args.clusters as usize)?;
+    let (n_parts, r_squared) = (found.attribution.len(), found.r_squared);
+    print(&format!("LIME-3D: {n_parts} parts, R² of its linear model {r_squared:.3}"))?;
+    print(&format!("critical points: {}", critical.len()))?;
     if let Some(path) = &args.svg {
-        let drawing = explanation_drawing::draw(&points, &found, &critical);
-        atomic::write_bytes(path, drawing)?;
+        atomic::write_bytes(path, explanation_drawing::draw(&points, &found, &critical))?;
     }
     Ok(())
 }
 
-fn check(args: &ExplainArgs) -> Result<(), Usage> {
-    let least =
-        [("points", args.points, 1), ("clusters", args.clusters, 2), ("samples", args.samples, 2)];
-    match least.into_iter().find(|(_, found, least)| found < least) {
-        Some((flag, found, least)) => {
-            Err(Usage(format!("--{flag}: expected {least} or more, found {found}")))
-        }
-        None => Ok(()),
+fn read_finite(path: &Path) -> anyhow::Result<Cloud> {
+    let cloud = read_cloud_as(path, None)?;
+    ensure!(!cloud.points.is_empty(), "{}: expected points, found none", path.display());
+    let bad = cloud.points.iter().position(|point| !point.iter().all(|x| x.is_finite()));
+    if let Some(i) = bad {
+        anyhow::bail!("{}: point {i} is not finite", path.display());
     }
-}
-
-/// The distance between the critical points and the points that LIME-3D finds strongest, as text.
-fn report(
-    points: &[[f32; 3]],
-    found: &Explanation,
-    critical: &[usize],
-    strongest: &[usize],
-    seed: u64,
-) -> String {
-    let n = critical.len();
-    let baseline = RandomBaseline::new(points, (critical, strongest), DRAWS, seed);
-    let RandomBaseline { ours, random } = &baseline;
-    let [low, middle, high] =
-        [DRAWS / 40, DRAWS / 2, DRAWS - 1 - DRAWS / 40].map(|i| random[i as usize]);
-    format!(
-        "LIME-3D: {} parts, R² of its linear model {:.3}\n\
-         Chamfer distance to the {n} points that LIME finds strongest (squared, and plain):\n  \
-         critical points  squared {:.5}, plain {:.5}\n  \
-         random points    squared {:.5} (95 % of {DRAWS} draws: {:.5} to {:.5}), plain {:.5}\n  \
-         {:.1} % of the random draws are nearer than the critical points",
-        found.attribution.len(),
-        found.r_squared,
-        ours.squared,
-        ours.plain,
-        middle.squared,
-        low.squared,
-        high.squared,
-        middle.plain,
-        100.0 * baseline.nearer() as f64 / f64::from(DRAWS),
-    )
+    Ok(cloud)
 }

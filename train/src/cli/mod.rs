@@ -1,13 +1,11 @@
 //! The commands of `edgepuck` that train networks and explain them.
 
-mod compare_points;
 mod eval;
 mod explain;
-mod progress;
 mod train;
 
 use clap::Subcommand;
-use formats::outcome::{Outcome, Usage};
+use program::outcome::{Outcome, Usage};
 use std::io::Write;
 
 /// A command and its flags.
@@ -19,8 +17,6 @@ pub enum Command {
     Eval(eval::EvalArgs),
     /// Show which points determined a prediction
     Explain(explain::ExplainArgs),
-    /// Compute the Chamfer distance of two clouds
-    ComparePoints(compare_points::ComparePointsArgs),
 }
 
 /// Runs `command` in the current folder, and prints its results.
@@ -32,7 +28,6 @@ pub fn run(command: &Command) -> anyhow::Result<Outcome> {
         Command::Train(args) => train::run(args),
         Command::Eval(args) => eval::run(args),
         Command::Explain(args) => explain::run(args),
-        Command::ComparePoints(args) => compare_points::run(args),
     }?;
     Ok(Outcome::Success)
 }

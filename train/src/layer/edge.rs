@@ -3,13 +3,11 @@
 //! layer whose clouds are the neighborhoods.
 
 use infer_cpu::kernel::Neighborhood;
-use ndarray::ArrayView2;
 use ndarray::parallel::prelude::*;
 
 use super::PooledLayer;
-use crate::batch::Batch;
+use crate::batch::{Batch, Rows};
 use crate::matrix::Matrix;
-use crate::rows::Rows;
 
 /// An EdgeConv layer with one radius.
 #[derive(Clone, Debug)]
@@ -33,7 +31,6 @@ struct Edges {
 
 impl EdgeLayer {
     /// EdgeConv layer `number`, for neighbors within `radius`.
-    #[must_use]
     pub fn new(number: usize, radius: f32, channels: usize, seed: u64) -> Self {
         let (linear, norm) = (format!("edge.conv{number}"), format!("edge.bn{number}"));
         let pooled = PooledLayer::new(&linear, &norm, (3, channels), true, seed);
@@ -41,7 +38,6 @@ impl EdgeLayer {
     }
 
     /// The number of features for each point.
-    #[must_use]
     pub fn channels(&self) -> usize {
         self.pooled.base.linear.size().1
     }
@@ -50,12 +46,6 @@ impl EdgeLayer {
     pub fn forward(&mut self, batch: &Batch, momentum: f32) {
         self.edges = Edges::new(batch, self.radius);
         self.pooled.forward(self.edges.offsets.view(), self.edges.rows(), momentum);
-    }
-
-    /// The output of the last forward pass.
-    #[must_use]
-    pub fn output(&self) -> ArrayView2<'_, f32> {
-        self.pooled.base.output()
     }
 
     /// Sets the gradients of the parameters from the gradient `dy` of the output.
@@ -69,7 +59,7 @@ impl Edges {
         let clouds: Vec<usize> = (0..batch.len()).collect();
         let offsets_of = |&cloud: &usize| {
             let centres = &batch.coordinates[batch.starts[cloud]..batch.starts[cloud + 1]];
-            let others = Neighborhood::of(batch.neighborhood_of(cloud));
+            let others = Neighborhood::of(&batch.neighborhoods[cloud]);
             centres.iter().map(|&p| neighbors(p, &others, radius)).collect::<Vec<_>>()
         };
         let offsets: Vec<Vec<[f32; 3]>> = clouds.par_iter().map(offsets_of).flatten().collect();

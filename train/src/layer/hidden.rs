@@ -5,8 +5,8 @@ use ndarray::ArrayView2;
 
 use super::Normed;
 use super::norm::Saved;
+use crate::batch::Rows;
 use crate::matrix::Matrix;
-use crate::rows::Rows;
 
 /// A layer that takes each row separately.
 #[derive(Clone, Debug)]
@@ -19,7 +19,6 @@ pub struct HiddenLayer {
 
 impl HiddenLayer {
     /// A layer with random weights, whose parts are named `linear` and `norm`.
-    #[must_use]
     pub fn new(linear: &str, norm: &str, size: (usize, usize), seed: u64) -> Self {
         Self { base: Normed::new(linear, norm, size, seed), saved: Saved::default(), kept: None }
     }

@@ -3,7 +3,6 @@
 use formats::streams::Stream;
 use ndarray::ArrayView2;
 
-use super::{Folded, LayerMut};
 use crate::matrix::{self, Matrix};
 use crate::parameter::Parameter;
 
@@ -19,7 +18,6 @@ pub struct Linear {
 impl Linear {
     /// A layer with random weights, named `name`. Weights and biases are uniform in ±1/√inputs, as
     /// in PyTorch's `Linear` and `Conv1d`.
-    #[must_use]
     pub fn new(name: &str, inputs: usize, outputs: usize, seed: u64) -> Self {
         let limit = 1.0 / (inputs as f64).sqrt();
         let draw = |part: &str, n: usize| {
@@ -37,25 +35,21 @@ impl Linear {
     }
 
     /// The layer's name in model files.
-    #[must_use]
     pub fn name(&self) -> &str {
         self.weight.name.trim_end_matches(".weight")
     }
 
     /// The numbers of inputs and outputs.
-    #[must_use]
     pub fn size(&self) -> (usize, usize) {
         (self.weight.shape[1], self.weight.shape[0])
     }
 
     /// `z` without the bias, for a batch norm, which would remove the bias.
-    #[must_use]
     pub fn products(&self, x: ArrayView2<'_, f32>) -> Matrix {
         matrix::product(x, self.weight.matrix().t())
     }
 
     /// `z`.
-    #[must_use]
     pub fn forward(&self, x: ArrayView2<'_, f32>) -> Matrix {
         self.products(x) + ndarray::aview1(&self.bias.value)
     }
@@ -79,25 +73,8 @@ impl Linear {
     }
 
     /// The gradient of `x`.
-    #[must_use]
     pub fn input_gradient(&self, dz: ArrayView2<'_, f32>) -> Matrix {
         matrix::product(dz, self.weight.matrix())
-    }
-
-    /// The layer without a batch norm, for a model file.
-    #[must_use]
-    pub fn folded(&self) -> Folded {
-        Folded {
-            name: self.name().to_owned(),
-            shape: [self.weight.shape[0], self.weight.shape[1]],
-            weight: self.weight.value.clone(),
-            bias: self.bias.value.clone(),
-        }
-    }
-
-    /// The layer as a part of a network.
-    pub fn layer(&mut self) -> LayerMut<'_> {
-        LayerMut { linear: self, norm: None, output: None }
     }
 }
 

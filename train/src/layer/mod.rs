@@ -12,36 +12,19 @@
 mod edge;
 mod hidden;
 mod linear;
-mod neighbor_pool;
 mod norm;
-mod normed;
 mod pooled;
-mod transform;
 
 pub use edge::EdgeLayer;
 pub use hidden::HiddenLayer;
 pub use linear::Linear;
-pub use neighbor_pool::{Centres, NeighborPool};
-pub use norm::{EPSILON, Norm};
-pub use normed::Normed;
+pub use norm::Norm;
 pub use pooled::PooledLayer;
-pub use transform::{Transforms, orthogonality};
+
+use ndarray::ArrayView2;
 
 use crate::matrix::Matrix;
 use crate::parameter::Parameter;
-
-/// A linear layer with its batch norm folded in, for a model file.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Folded {
-    /// The linear layer's name.
-    pub name: String,
-    /// `[outputs, inputs]`.
-    pub shape: [usize; 2],
-    /// W.
-    pub weight: Vec<f32>,
-    /// b.
-    pub bias: Vec<f32>,
-}
 
 /// A layer of a network, with its state.
 #[derive(Debug)]
@@ -52,6 +35,40 @@ pub struct LayerMut<'a> {
     pub norm: Option<&'a mut Norm>,
     /// The last output after the batch norm.
     pub output: Option<&'a Matrix>,
+}
+
+/// A linear layer, its batch norm, and the last output: the base of every layer before a ReLU or a
+/// pooling.
+#[derive(Clone, Debug)]
+pub struct Normed {
+    /// `W x + b`.
+    pub linear: Linear,
+    /// The batch norm of its output.
+    pub norm: Norm,
+    /// The last output.
+    pub output: Matrix,
+}
+
+impl Normed {
+    /// A layer with random weights, whose parts are named `linear` and `norm`.
+    pub fn new(linear: &str, norm: &str, (inputs, outputs): (usize, usize), seed: u64) -> Self {
+        Self {
+            linear: Linear::new(linear, inputs, outputs, seed),
+            norm: Norm::new(norm, outputs),
+            output: Matrix::default((0, outputs)),
+        }
+    }
+
+    /// The output of the last forward pass.
+    pub fn output(&self) -> ArrayView2<'_, f32> {
+        self.output.view()
+    }
+
+    /// The layer as a part of a network.
+    pub fn layer(&mut self) -> LayerMut<'_> {
+        let Self { linear, norm, output } = self;
+        LayerMut { linear, norm: Some(norm), output: Some(output) }
+    }
 }
 
 /// A part of a network, which owns layers.
@@ -73,15 +90,6 @@ pub trait Module {
     fn statistics(&mut self) -> Vec<(String, &mut Vec<f32>)> {
         let norms = self.layers().into_iter().filter_map(|layer| layer.norm);
         norms.flat_map(Norm::statistics).collect()
-    }
-
-    /// All linear layers, with their batch norms folded in.
-    fn folded(&mut self) -> Vec<Folded> {
-        let fold = |layer: LayerMut<'_>| match layer.norm {
-            Some(norm) => norm.folded_into(layer.linear),
-            None => layer.linear.folded(),
-        };
-        self.layers().into_iter().map(fold).collect()
     }
 
     /// The name of the first layer whose last output is not finite.

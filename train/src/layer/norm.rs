@@ -4,10 +4,10 @@ use ndarray::parallel::prelude::*;
 use ndarray::{ArrayViewMut1, Axis};
 use rayon::slice::ParallelSlice;
 
-use super::{Folded, Linear};
+use super::Linear;
+use crate::batch::Rows;
 use crate::matrix::{Matrix, ROWS};
 use crate::parameter::Parameter;
-use crate::rows::Rows;
 
 /// PyTorch's default, which the baseline uses.
 pub const EPSILON: f32 = 1e-5;
@@ -38,7 +38,6 @@ pub struct Saved {
 
 impl Norm {
     /// A batch norm of `channels` channels.
-    #[must_use]
     pub fn new(name: &str, channels: usize) -> Self {
         let parameter = |part: &str, value| {
             Parameter::new(format!("{name}.{part}"), vec![channels], vec![value; channels])
@@ -52,10 +51,9 @@ impl Norm {
         }
     }
 
-    /// `linear` with this batch norm folded into its weights and biases, computed in f64 from the
+    /// The weights and biases of `linear` with this batch norm folded in, computed in f64 from the
     /// running statistics.
-    #[must_use]
-    pub fn folded_into(&self, linear: &Linear) -> Folded {
+    pub fn folded_into(&self, linear: &Linear) -> (Vec<f32>, Vec<f32>) {
         let (inputs, outputs) = linear.size();
         let scale = |c: usize| {
             let variance = f64::from(self.variance[c]) + f64::from(EPSILON);
@@ -66,12 +64,8 @@ impl Norm {
             let from_mean = f64::from(linear.bias.value[c]) - f64::from(self.mean[c]);
             from_mean * scale(c) + f64::from(self.shift.value[c])
         };
-        Folded {
-            name: linear.name().to_owned(),
-            shape: [outputs, inputs],
-            weight: (0..outputs * inputs).map(|i| weight(i) as f32).collect(),
-            bias: (0..outputs).map(|c| bias(c) as f32).collect(),
-        }
+        let weights = (0..outputs * inputs).map(|i| weight(i) as f32);
+        (weights.collect(), (0..outputs).map(|c| bias(c) as f32).collect())
     }
 
     /// Mixes the statistics of a batch into the running statistics with the share `momentum`, as
@@ -176,14 +170,6 @@ pub fn normalise(
         // Keeps NaN, so that the loss shows it.
         *out = if relu && y < 0.0 { 0.0 } else { y };
     }
-}
-
-pub fn relu_gradient(dy: &mut Matrix, y: &Matrix) {
-    dy.zip_mut_with(y, |dy, &y| {
-        if y <= 0.0 {
-            *dy = 0.0;
-        }
-    });
 }
 
 fn slice<'a>(row: &'a mut ArrayViewMut1<'_, f32>) -> &'a mut [f32] {

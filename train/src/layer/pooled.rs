@@ -21,13 +21,13 @@
 
 use infer_cpu::kernel::PooledProducts;
 use ndarray::parallel::prelude::*;
-use ndarray::{ArrayView2, Axis};
+use ndarray::{ArrayView2, ArrayViewMut1, Axis, azip};
 use rayon::slice::ParallelSliceMut;
 
 use super::Normed;
-use super::norm::{EPSILON, means, normalise, relu_gradient};
+use super::norm::{EPSILON, means, normalise};
+use crate::batch::{Rows, by_cloud};
 use crate::matrix::{self, Matrix};
-use crate::rows::{Rows, by_cloud};
 
 /// The last point-wise layer before a pooling, and the pooling.
 #[derive(Clone, Debug)]
@@ -56,13 +56,11 @@ struct Saved {
 impl PooledLayer {
     /// A layer with random weights, whose parts are named `linear` and `norm`. With `relu`, a ReLU
     /// follows.
-    #[must_use]
     pub fn new(linear: &str, norm: &str, size: (usize, usize), relu: bool, seed: u64) -> Self {
         Self { base: Normed::new(linear, norm, size, seed), relu, saved: Saved::default() }
     }
 
     /// The row with the maximum of each channel of cloud `cloud`.
-    #[must_use]
     pub fn winners(&self, cloud: usize) -> &[u32] {
         let n = self.base.output.ncols();
         &self.saved.winners[cloud * n..][..n]
@@ -139,7 +137,7 @@ impl PooledLayer {
         wants_input: bool,
     ) -> Option<Matrix> {
         if self.relu {
-            relu_gradient(&mut dy, &self.base.output);
+            azip!((dy in &mut dy, &y in &self.base.output) if y <= 0.0 { *dy = 0.0 });
         }
         let sum = dy.sum_axis(Axis(0)).to_vec();
         let with_normalised = (&dy * &self.saved.normalised).sum_axis(Axis(0)).to_vec();
@@ -164,14 +162,15 @@ impl PooledLayer {
         let (inputs, outputs) = self.base.linear.size();
         let gradients = self.base.linear.weight.gradient.par_chunks_mut(inputs).enumerate();
         gradients.for_each(|(c, gradient)| {
+            let mut gradient = ArrayViewMut1::from(gradient);
             let share = with_normalised[c] * inverse[c];
-            for k in 0..inputs {
-                gradient[k] = -sum[c] * mean[k] - share * covariant[(c, k)];
-            }
+            azip!((gradient in &mut gradient, mean in mean, covariant in covariant.row(c)) {
+                *gradient = -sum[c] * mean - share * covariant;
+            });
             for (dy, winners) in dy.rows().into_iter().zip(winners.chunks_exact(outputs)) {
-                add(gradient, dy[c], x.row(winners[c] as usize));
+                gradient.scaled_add(dy[c], &x.row(winners[c] as usize));
             }
-            gradient.iter_mut().for_each(|gradient| *gradient *= slope[c]);
+            gradient *= slope[c];
         });
     }
 
@@ -186,14 +185,10 @@ impl PooledLayer {
         let (_, outputs) = self.base.linear.size();
         let weights = self.base.linear.weight.matrix();
         // A = Wᵀ (D W), D = γ P / (n σ²), and v = Wᵀ (γ/σ S/n).
-        let scaled = |factor: &dyn Fn(usize) -> f32| {
-            let mut scaled = weights.to_owned();
-            for (c, mut row) in scaled.rows_mut().into_iter().enumerate() {
-                row *= factor(c);
-            }
-            scaled
-        };
-        let curved = scaled(&|c| slope[c] * inverse[c] * with_normalised[c] / rows.total);
+        let mut curved = weights.to_owned();
+        for (c, mut row) in curved.rows_mut().into_iter().enumerate() {
+            row *= slope[c] * inverse[c] * with_normalised[c] / rows.total;
+        }
         let a = matrix::square(curved.view(), weights);
         let shares: Vec<f32> = (0..outputs).map(|c| slope[c] * sum[c] / rows.total).collect();
         let v = weights.t().dot(&ndarray::aview1(&shares));
@@ -204,20 +199,10 @@ impl PooledLayer {
         by_cloud(&mut dx, rows).into_par_iter().enumerate().for_each(|(cloud, mut dx)| {
             for c in (0..outputs).filter(|&c| dy[(cloud, c)] != 0.0) {
                 let row = winners[cloud * outputs + c] as usize - rows.starts[cloud];
-                let mut row = dx.row_mut(row);
-                let row = row.as_slice_mut().expect("invariant: rows are contiguous");
-                add(row, dy[(cloud, c)] * slope[c], weights.row(c));
+                dx.row_mut(row).scaled_add(dy[(cloud, c)] * slope[c], &weights.row(c));
             }
         });
         dx
-    }
-}
-
-/// `out += factor * row`.
-fn add(out: &mut [f32], factor: f32, row: ndarray::ArrayView1<'_, f32>) {
-    let row = row.to_slice().expect("invariant: rows are contiguous");
-    for (out, x) in out.iter_mut().zip(row) {
-        *out += factor * x;
     }
 }
 

@@ -1,21 +1,20 @@
 //! `cargo xtask bench`: measures, and writes the figures and the machine to a record.
 //!
 //! [`speed`] is about building and tracing, [`to_disk`] about the time of a dataset, [`embree`]
-//! compares with Embree; [`scenes`] is about scenes of many objects, [`infer`] about classifying,
-//! sampling and learning, [`pi5`] about a Raspberry Pi, [`gpu`] about adapters, [`frames`] about
-//! detection in real sweeps, [`sydney`] about real objects after training on simulated scenes.
+//! compares with Embree; [`pi5`] is about a Raspberry Pi, [`gpu`] about adapters, [`frames`] about
+//! detection in real sweeps.
 
 use crate::measure::backends;
 use crate::measure::bench_mesh::{self, BenchMesh};
 use crate::measure::machine::{self, Machine};
 use crate::pi5;
-use crate::rivals::{casting as embree, infer};
-use crate::study::casting::{scenes, speed, to_disk};
-use crate::study::{frames, gpu, sydney};
+use crate::rivals as embree;
+use crate::study::{frames, gpu};
+use crate::study::{speed, to_disk};
 use crate::table::write_json;
 use anyhow::Result;
 use clap::{Args, Subcommand};
-use edgepuck_program::Outcome;
+use program::Outcome;
 use serde::Serialize;
 use serde_json::json;
 use sim_gpu::internals::caster::AdapterRequest;
@@ -27,23 +26,11 @@ pub enum Benchmark {
     Sim(SimArgs),
     /// Compare casting with Embree, which is installed from PyPI under `target/peers`.
     Embree(SimArgs),
-    /// Compare the cost of a scene of many objects with the cost of its rays at one mesh.
-    Scenes(scenes::ScenesArgs),
-    /// Compare the speed of the classifier and the sampler with other engines.
-    ///
-    /// The engines run in alternation. The other engines are Python packages, installed from PyPI
-    /// under `target/peers`. An engine that cannot be installed is skipped with a message; an engine
-    /// whose answer is wrong is not timed.
-    Infer(infer::InferArgs),
-    /// Compare the time of a training step with PyTorch's.
-    Train(infer::learn::TrainArgs),
     /// Model the run time of the classifier on a Raspberry Pi 5; no board is needed.
     ///
     /// llvm-mca analyses the compiled inner loops, QEMU counts the instructions outside them, and a
     /// model adds the effects of memory and threads.
     PiModel(pi5::PiModelArgs),
-    /// Model the run time of `infer-cpu live` on a Raspberry Pi 5, stage by stage.
-    PiLive(pi5::PiLiveArgs),
     /// Check and measure a GPU in one call of some minutes, and write gpu.json.
     ///
     /// Every shader is compared with its counterpart on the CPU, and rays are aimed at the vertices
@@ -53,8 +40,6 @@ pub enum Benchmark {
     Gpu(gpu::GpuArgs),
     /// Detect the cars and persons in labelled sweeps of real sensors, and count false alarms.
     Frames(frames::FramesArgs),
-    /// Follow the protocol of the Sydney Urban Objects benchmark, pre-trained and from scratch.
-    Sydney(sydney::SydneyArgs),
 }
 
 /// Meshes to cast at, and casters.
@@ -100,13 +85,8 @@ pub fn run(benchmark: &Benchmark) -> Result<Outcome> {
         Benchmark::Gpu(args) => return gpu::run(args),
         Benchmark::Sim(args) => args.sim(),
         Benchmark::Embree(args) => args.embree(),
-        Benchmark::Scenes(args) => scenes::run(args),
-        Benchmark::Infer(args) => infer::run(args),
-        Benchmark::Train(args) => infer::learn::run(args),
         Benchmark::PiModel(args) => pi5::run(args),
-        Benchmark::PiLive(args) => pi5::run_live(args),
         Benchmark::Frames(args) => frames::run(args),
-        Benchmark::Sydney(args) => sydney::run(args),
     }?;
     Ok(Outcome::Success)
 }

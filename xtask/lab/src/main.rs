@@ -8,9 +8,8 @@ mod study;
 mod table;
 
 use clap::{Parser, Subcommand};
-use edgepuck_program::{Outcome, outcome};
+use program::outcome;
 use std::process::ExitCode;
-use study::{mutants, reproduction};
 
 /// Measures Edgepuck.
 #[derive(Parser)]
@@ -25,20 +24,9 @@ enum Command {
     /// Measure speed and accuracy
     #[command(subcommand)]
     Bench(bench::Benchmark),
-    /// Reproduce the accuracies of Meyer and Reitmann (2026) by points, sampler and dataset
-    Reproduce(reproduction::ReproduceArgs),
-    /// Change the code in one place at a time, and count the changes that the tests notice
-    Mutants(mutants::MutantsArgs),
 }
 
 fn main() -> ExitCode {
-    outcome::exit_code(run(&Cli::parse().command)).into()
-}
-
-fn run(command: &Command) -> anyhow::Result<Outcome> {
-    match command {
-        Command::Bench(benchmark) => bench::run(benchmark),
-        Command::Reproduce(args) => reproduction::run(args),
-        Command::Mutants(args) => mutants::run(args),
-    }
+    let Command::Bench(benchmark) = Cli::parse().command;
+    outcome::exit_code(bench::run(&benchmark)).into()
 }

@@ -1,7 +1,7 @@
-//! Tables: the same rows as text for a terminal, as Markdown and as CSV.
+//! Tables: the same rows as text for a terminal and as Markdown.
 
-pub use edgepuck_program::significant_digits::digits;
 use formats::atomic;
+pub use program::significant_digits::digits;
 use serde::Serialize;
 use std::fmt;
 use std::path::Path;
@@ -40,13 +40,6 @@ impl Table {
     /// The heading and the rows.
     fn lines(&self) -> impl Iterator<Item = &Vec<String>> {
         std::iter::once(&self.heading).chain(&self.rows)
-    }
-
-    /// The heading and the rows as a CSV file.
-    pub fn to_csv(&self) -> anyhow::Result<Vec<u8>> {
-        let mut csv = csv::Writer::from_writer(Vec::new());
-        self.lines().try_for_each(|words| csv.write_record(words))?;
-        Ok(csv.into_inner()?)
     }
 
     /// The table as Markdown, under its title.

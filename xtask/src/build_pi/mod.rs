@@ -56,16 +56,14 @@ pub fn build(for_rustc: &[&str]) -> anyhow::Result<PathBuf> {
     let mut cargo = pi_target::cargo(&words);
     cargo.args(["--message-format", "json-render-diagnostics", "--"]).args(for_rustc);
     let messages = workspace::output(cargo.stderr(Stdio::inherit()))?;
-    workspace::executable(&messages, "infer-cpu")
+    workspace::executable(&messages, "bin", "infer-cpu")
 }
 
 /// Copies the program and its permissions. The copy is complete or absent.
 fn copy<'a>(from: &Path, to: &'a Path) -> anyhow::Result<&'a Path> {
-    let mut source =
-        fs::File::open(from).with_context(|| format!("cannot read {}", from.display()))?;
-    let permissions = source.metadata()?.permissions();
-    formats::atomic::write(to, |file| std::io::copy(&mut source, file).map(|_| ()))?;
-    fs::set_permissions(to, permissions)
-        .with_context(|| format!("cannot make {} executable", to.display()))?;
+    let mut partial = to.as_os_str().to_owned();
+    partial.push(".partial");
+    let copied = fs::copy(from, &partial).and_then(|_| fs::rename(&partial, to));
+    copied.with_context(|| format!("cannot copy {} to {}", from.display(), to.display()))?;
     Ok(to)
 }

@@ -4,11 +4,11 @@ use super::meanwhile::{Meanwhile, nice};
 use crate::summary::{Counts, Summary};
 use anyhow::ensure;
 use std::fs;
-use std::path::PathBuf;
 use std::process::Command;
 use std::thread::available_parallelism;
 use xtask::workspace::{cargo, root};
 
+const FOLDER: &str = "tests/fuzz";
 const TARGETS: [&str; 9] =
     ["off", "mesh", "gltf", "urdf", "clouds", "model", "packets", "captures", "live"];
 
@@ -25,7 +25,7 @@ pub fn build_meanwhile(seconds: u32) -> Option<anyhow::Result<Meanwhile>> {
     let is_known = cfg!(all(target_os = "linux", target_arch = "x86_64"));
     (seconds > 0 && is_known).then(|| {
         let mut build = cargo(&["build", "--release", "--target", TRIPLE, "--bins"]);
-        build.current_dir(folder()).env("RUSTFLAGS", COVERAGE);
+        build.current_dir(root().join(FOLDER)).env("RUSTFLAGS", COVERAGE);
         Meanwhile::start("fuzz-build", &mut nice(&build))
     })
 }
@@ -58,12 +58,8 @@ pub fn run(summary: &mut Summary, seconds: u32, build: Option<anyhow::Result<Mea
     });
 }
 
-fn folder() -> PathBuf {
-    root().join("tests/fuzz")
-}
-
 fn start(target: &str, seconds: u32) -> anyhow::Result<Meanwhile> {
-    let folder = folder();
+    let folder = root().join(FOLDER);
     let mut command = Command::new(folder.join(format!("target/{TRIPLE}/release/{target}")));
     command.arg(format!("-max_total_time={seconds}")).current_dir(&folder);
     // libFuzzer starts with both folders, and writes new inputs to the first.

@@ -4,7 +4,7 @@
 //! `EDGEPUCK_INFER` and `EDGEPUCK_ROS2` are our programs, `EDGEPUCK_OUT` is an empty
 //! folder, and [`SUPPORT`] is on `PYTHONPATH`. A script exits with 0 on success and with
 //! [`SKIPPED`] if it cannot run here. A script `x.py` uses the packages of `requirements.txt`, or
-//! those of `x-requirements.txt` if it exists: they conflict with the others, or are very large.
+//! those of `x-requirements.txt` if it exists: they conflict with the others.
 
 use super::{compile_all, meanwhile::Meanwhile};
 use crate::summary::{Counts, Summary};
@@ -32,14 +32,19 @@ const SHARED: Environment<'_> = Environment {
     size: "about 1.5 GB",
 };
 
+/// The scripts that `--all` runs: what brings datasets and programs to other systems, on which no
+/// arithmetic depends.
+const SELDOM: [&str; 6] =
+    ["croissant", "debian_package", "hyperqueue", "kubernetes", "s3", "slurm"];
+
 /// Which scripts are run.
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Which {
     /// No comparison.
     None,
-    /// All comparisons except that with PyTorch.
+    /// Most comparisons.
     Light,
-    /// All comparisons, including that with PyTorch.
+    /// All comparisons, and the tests of the Python package with PyTorch of PyPI.
     All,
 }
 
@@ -67,17 +72,12 @@ impl Packages {
 }
 
 /// The interpreter of script `name`; `None` if it uses the shared packages.
-fn python_of(name: &str, which: Which, install: bool) -> Option<Python> {
+fn python_of(name: &str, install: bool) -> Option<Python> {
     let requirements = format!("{SCRIPTS}/{name}-requirements.txt");
     if !root().join(&requirements).exists() {
         return None;
     }
-    let is_large = name == "pytorch";
-    if is_large && which != Which::All {
-        return Some(Err("its packages are large; --peers all runs it".to_owned()));
-    }
-    let size = if is_large { "about 5 GB" } else { "about 400 MB" };
-    let folder = format!("tests-{name}-venv");
+    let (folder, size) = (format!("tests-{name}-venv"), "about 400 MB");
     Some(interpreter(&Environment { name: &folder, requirements: &requirements, size }, install))
 }
 
@@ -90,10 +90,18 @@ pub fn interpreter(environment: &Environment<'_>, install: bool) -> Python {
 }
 
 /// Runs the scripts, two at a time, because each waits for files, sockets and other programs. A
-/// script whose packages are missing is skipped and reported.
-pub fn run(summary: &mut Summary, packages: Packages, programs: &anyhow::Result<Programs>) {
+/// script whose packages are missing is skipped and reported. Those that seldom find a fault run with `all`.
+pub fn run(
+    summary: &mut Summary,
+    packages: Packages,
+    programs: &anyhow::Result<Programs>,
+    all: bool,
+) {
     summary.step("peers", |summary| {
-        let scripts = scripts()?;
+        let mut scripts = scripts()?;
+        let is_seldom =
+            |script: &Path| SELDOM.iter().any(|name| script.ends_with(format!("{name}.py")));
+        scripts.retain(|script| all || !is_seldom(script));
         let Packages { which, install, shared } = packages;
         if which == Which::None {
             return Ok(summary.skip("peers", scripts.len(), "--peers none was given"));
@@ -105,7 +113,7 @@ pub fn run(summary: &mut Summary, packages: Packages, programs: &anyhow::Result<
         let work = || {
             std::iter::from_fn(next).try_fold(Counts::default(), |counts, script| {
                 let name = script.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-                let python = python_of(&name, which, install).unwrap_or_else(|| shared.clone());
+                let python = python_of(&name, install).unwrap_or_else(|| shared.clone());
                 Ok(counts.and(check(&summary, &name, &script, python, programs)?))
             })
         };
@@ -140,7 +148,8 @@ fn check(
     // Compiled files must not lie beside the scripts.
     command.env("PYTHONPYCACHEPREFIX", cache_dir().join("pycache"));
     command.env("PYTHONPATH", root().join(SUPPORT)).env("EDGEPUCK_OUT", &out);
-    command.envs(programs.iter().map(|(variable, program)| (variable, program)));
+    command.env("EDGEPUCK_PROGRAM", &programs.edgepuck);
+    command.env("EDGEPUCK_INFER", &programs.infer_cpu).env("EDGEPUCK_ROS2", &programs.ros2);
     let (status, said) = Meanwhile::start(&format!("peer-{name}"), &mut command)?.end()?;
     eprintln!("== {peer}: {SCRIPTS}/{name}.py\n{said}");
     Ok(match status.code() {
@@ -163,17 +172,23 @@ fn scripts() -> anyhow::Result<Vec<PathBuf>> {
     Ok(scripts)
 }
 
-/// Our programs, each with the environment variable that has its path.
-pub type Programs = [(&'static str, PathBuf); 3];
-
 /// Our programs as the tests have built them: nothing is built for the peers alone.
+pub struct Programs {
+    pub edgepuck: PathBuf,
+    pub infer_cpu: PathBuf,
+    pub ros2: PathBuf,
+    /// The example of `web` that writes what a page must find.
+    pub traced: PathBuf,
+}
+
 pub fn programs() -> anyhow::Result<Programs> {
     let mut cargo = compile_all(&["test", "--no-run"]);
     cargo.args(["--message-format", "json-render-diagnostics"]).stderr(Stdio::inherit());
     let messages = output(&mut cargo)?;
-    Ok([
-        ("EDGEPUCK_PROGRAM", executable(&messages, "edgepuck")?),
-        ("EDGEPUCK_INFER", executable(&messages, "infer-cpu")?),
-        ("EDGEPUCK_ROS2", executable(&messages, "edgepuck-ros2")?),
-    ])
+    Ok(Programs {
+        edgepuck: executable(&messages, "bin", "edgepuck")?,
+        infer_cpu: executable(&messages, "bin", "infer-cpu")?,
+        ros2: executable(&messages, "bin", "edgepuck-ros2")?,
+        traced: executable(&messages, "example", "traced")?,
+    })
 }

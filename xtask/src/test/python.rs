@@ -1,8 +1,9 @@
-//! The Python package: its wheel is built and checked, and its tests run in an environment that has
-//! nothing else of ours.
+//! The Python package: its tests run in an environment that has nothing else of ours, with the extension
+//! module of the other tests' build, or with the wheel as it is built for a release.
 
 use super::meanwhile::{Meanwhile, nice};
 use super::peers::interpreter;
+use super::python_module;
 use crate::summary::{Counts, Summary};
 use anyhow::{Context, anyhow, bail, ensure};
 use std::ffi::OsString;
@@ -12,7 +13,7 @@ use std::process::Command;
 use std::thread::JoinHandle;
 use xtask::pi_target;
 use xtask::venv::{self, Environment, cache_dir, succeeds};
-use xtask::workspace::{need_standard_library, output, root};
+use xtask::workspace::{library, need_standard_library, output, root};
 
 /// The packages that build and check wheels.
 const BUILD: Environment<'_> = Environment {
@@ -33,7 +34,7 @@ pub const NATIVE: &str =
     if cfg!(target_arch = "aarch64") { AARCH64 } else { "x86_64-unknown-linux-gnu" };
 
 pub struct Wheel {
-    /// The interpreter that has the packages of [`BUILD`].
+    /// An interpreter, which has the packages of [`BUILD`] if the wheel is one for a release.
     pub tools: PathBuf,
     pub file: PathBuf,
 }
@@ -51,27 +52,50 @@ pub fn build_meanwhile(install: bool) -> Build {
     })
 }
 
-/// Tests the wheel, with PyTorch of PyPI if `with_pytorch` is set. Returns it, or the reason for
-/// its absence.
-pub fn run(summary: &mut Summary, building: Build, with_pytorch: bool) -> Result<Wheel, String> {
+/// Tests the package, with PyTorch of PyPI if `with_pytorch` is set: the wheel that is being built, or
+/// else the module of the tests' build. Returns the wheel, or the reason for its absence.
+pub fn run(
+    summary: &mut Summary,
+    building: Option<Build>,
+    with_pytorch: bool,
+) -> Result<Wheel, String> {
     let mut wheel = Err("its wheel was not built".to_owned());
     summary.step("python", |summary| {
-        let built = match building.join() {
-            Ok(Ok(built)) => built?,
-            Ok(Err(cause)) => return Ok(summary.skip("python", 1, &cause)),
-            Err(_) => bail!("the thread that builds the wheel panicked"),
+        let (built, checks) = match building.map(Build::join) {
+            None => (pack_module()?, Counts::default()),
+            Some(Ok(Ok(built))) => {
+                let built = built?;
+                let checks = audit(&built)?;
+                (built, checks)
+            }
+            Some(Ok(Err(cause))) => return Ok(summary.skip("python", 1, &cause)),
+            Some(Err(_)) => bail!("the thread that builds the wheel panicked"),
         };
         let folder = cache_dir().join("python-test-venv");
         venv::make(&built.tools, &folder, &["--without-pip"]).map_err(|cause| anyhow!(cause))?;
         let mut requirements = vec![TESTS_NEED];
         if with_pytorch {
-            requirements.push("tests/peers/pytorch-requirements.txt");
+            requirements.push("python/tests/torch-requirements.txt");
         }
         let counts = test(&built, &folder, &requirements, "");
         wheel = Ok(built);
-        counts
+        Ok(checks.and(counts?))
     });
     wheel
+}
+
+/// Packs the module of the tests' build and the package's sources into a wheel for this machine.
+fn pack_module() -> anyhow::Result<Wheel> {
+    let mut cargo = python_module();
+    let messages = output(cargo.args(["--message-format", "json-render-diagnostics"]))?;
+    let module = library(&messages, "_edgepuck")?;
+    let tools = PathBuf::from(venv::any_python().map_err(|cause| anyhow!(cause))?);
+    let mut pack = Command::new(&tools);
+    pack.arg(root().join("xtask/module-wheel.py"))
+        .arg(module)
+        .arg(cache_dir().join("module-wheel"));
+    let file = PathBuf::from(output(&mut pack)?.trim());
+    Ok(Wheel { tools, file })
 }
 
 /// Builds the wheel for aarch64 as for a release, and tests it in an emulator if there is one.
@@ -92,7 +116,8 @@ pub fn run_emulated(summary: &mut Summary) {
              that fork: QEMU aborts once a child of a process with threads starts one"
         ));
         let tests = "not (test_memory.py or fork- or [fork])";
-        test(&build(tools, AARCH64, "dist")?, &folder, &[TESTS_NEED], tests)
+        let wheel = build(tools, AARCH64, "dist")?;
+        Ok(audit(&wheel)?.and(test(&wheel, &folder, &[TESTS_NEED], tests)?))
     });
 }
 
@@ -126,15 +151,8 @@ fn build(tools: PathBuf, target: &str, profile: &str) -> anyhow::Result<Wheel> {
     Ok(Wheel { tools, file })
 }
 
-/// Checks that the wheel runs on the versions of Python and the systems that its name states, and
-/// tests it in the environment `folder`, away from the package's source. `tests` selects tests as
-/// pytest's option `-k` does; if it is empty, all run.
-fn test(
-    wheel: &Wheel,
-    folder: &Path,
-    requirements: &[&str],
-    tests: &str,
-) -> anyhow::Result<Counts> {
+/// Checks that the wheel runs on the versions of Python and the systems that its name states.
+fn audit(wheel: &Wheel) -> anyhow::Result<Counts> {
     let mut abi3audit = Command::new(&wheel.tools);
     abi3audit.args(["-m", "abi3audit", "--strict"]).arg(&wheel.file);
     succeeds(&mut abi3audit).map_err(|cause| anyhow!(cause))?;
@@ -144,13 +162,24 @@ fn test(
         shown.split_whitespace().collect::<Vec<_>>().join(" ").contains(PLATFORM),
         "auditwheel: expected a wheel for {PLATFORM}, found: {shown}"
     );
+    Ok(Counts { passed: 2, ..Counts::default() })
+}
+
+/// Tests the wheel in the environment `folder`, away from the package's source. `tests` selects tests as
+/// pytest's option `-k` does; if it is empty, all run.
+fn test(
+    wheel: &Wheel,
+    folder: &Path,
+    requirements: &[&str],
+    tests: &str,
+) -> anyhow::Result<Counts> {
     let python = folder.join("bin/python");
     wheel.install(&python, requirements)?;
     let mut pytest = pytest(&python, folder);
     // `edgepuck.torch` alone needs PyTorch.
     pytest.args(["--doctest-modules", "--doctest-ignore-import-errors", "-k", tests]);
     pytest.arg(root().join("python/tests")).args(["--pyargs", "edgepuck"]);
-    Ok(Counts { passed: 2, ..Counts::default() }.and(counts(&mut pytest)?))
+    counts(&mut pytest)
 }
 
 impl Wheel {

@@ -34,7 +34,7 @@ pub fn run(summary: &mut Summary, install: bool, programs: &anyhow::Result<Progr
         };
         let programs = programs.as_ref().map_err(|cause| anyhow!("{cause:#}"))?;
         let path = output(Command::new("which").arg(browser))?;
-        passes(in_viewer("node").arg("test/browser.mjs").arg(&programs[0].1).arg(path.trim()))?;
+        passes(in_viewer("node").arg("test/browser.mjs").arg(&programs.edgepuck).arg(path.trim()))?;
         Ok(counts.and(Counts::PASSED))
     });
 }

@@ -34,7 +34,10 @@ impl Frame {
         let sensor = if name.starts_with("argoverse") { [1.35, 0.0, 1.6] } else { [0.0; 3] };
         let from_sensor = |at: [f64; 3]| [0, 1, 2].map(|axis| at[axis] - sensor[axis]);
         let mut sweep = read_labelled_sweep(path).unwrap();
-        sweep.boxes.iter_mut().for_each(|object| object.centre_m = from_sensor(object.centre_m));
+        sweep
+            .boxes
+            .iter_mut()
+            .for_each(|object| object.place.centre_m = from_sensor(object.place.centre_m));
         let points = sweep.points.iter().map(|&at| from_sensor(at).map(|x| x as f32)).collect();
         Self { name, points, lasers: sweep.lasers, boxes: sweep.boxes }
     }
@@ -49,10 +52,10 @@ impl Frame {
     }
 
     fn inside(&self, object: &LabelledBox) -> Vec<usize> {
-        let feet_m = object.centre_m[2] - object.size_m[2] / 2.0 + FEET_M;
+        let feet_m = object.place.centre_m[2] - object.place.size_m[2] / 2.0 + FEET_M;
         let is_inside = |i: &usize| {
             let point = self.points[*i].map(f64::from);
-            object.contains(point, 0.0) && point[2] >= feet_m
+            object.place.contains(point, 0.0) && point[2] >= feet_m
         };
         (0..self.points.len()).filter(is_inside).collect()
     }
@@ -76,13 +79,14 @@ impl Frame {
             return (0.0, 0.0);
         };
         let cluster = found.clusters().nth(number).unwrap().points;
-        let is_other =
-            |&&point: &&u32| !object.contains(self.points[point as usize].map(f64::from), MARGIN_M);
+        let is_other = |&&point: &&u32| {
+            !object.place.contains(self.points[point as usize].map(f64::from), MARGIN_M)
+        };
         let others = cluster.iter().filter(is_other).count();
         (count as f64 / inside.len() as f64, others as f64 / cluster.len() as f64)
     }
 }
 
 pub fn range_m(object: &LabelledBox) -> f64 {
-    object.centre_m[0].hypot(object.centre_m[1])
+    object.place.centre_m[0].hypot(object.place.centre_m[1])
 }

@@ -19,7 +19,7 @@ fn few_points_or_none_have_labels() {
 }
 
 #[test]
-fn points_that_are_not_finite_or_at_the_origin_are_invalid_and_disturb_nothing() {
+fn invalid_points_change_no_cluster() {
     let scan = scan(&VLP32C, &[flat(), block([10.0, 3.0], [2.0, 4.0], 0.0, 1.5)]);
     let expected = labels(&scan.points);
     let broken = [

@@ -1,6 +1,6 @@
 //! Real sweeps with labelled cars and persons: how many are clusters of their own.
 
-use edgepuck_segment::{Label, Segmenter, Settings, Sweep, doubtful_axes};
+use edgepuck_segment::{Label, Segmenter, Settings, Sweep, other_axis_up};
 use test_support::{need, shared_data};
 
 use crate::frames::{Frame, paths, range_m};
@@ -15,7 +15,7 @@ fn cars_and_persons_are_clusters_of_their_own() {
     for path in paths(&folder) {
         let frame = Frame::read(&path);
         let sweep = Sweep { points: &frame.points, rings: frame.lasers.as_deref() };
-        assert_eq!(doubtful_axes(&frame.points), None, "{}", frame.name);
+        assert_eq!(other_axis_up(&frame.points), None, "{}", frame.name);
         let found = segmenter.segment(&sweep).unwrap();
         for (object, inside) in frame.objects() {
             let (held, others) = frame.shares(object, &inside, found);

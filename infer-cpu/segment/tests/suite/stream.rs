@@ -238,7 +238,7 @@ fn is_pillar([x, y, _]: [f32; 3]) -> bool {
 }
 
 #[test]
-fn what_ends_in_the_middle_of_the_first_turn_is_still_cut() {
+fn a_stream_that_ends_within_the_first_turn_is_segmented() {
     let scan = scan(&VLP32C, &[flat(), block([0.0, -10.0], [1.0, 1.0], 0.0, 1.7)]);
     let mut turn = Turn::new(&scan.points, &scan.rings, 0.0);
     let expected = turn.whole(&settings(VLP32C.into_iter()));

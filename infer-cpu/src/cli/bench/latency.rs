@@ -1,13 +1,12 @@
 //! Measures the latency of classifications.
 
-use std::collections::BTreeMap;
 use std::hint::black_box;
 use std::io::{Write, stdout};
 use std::iter::repeat_n;
 use std::path::Path;
 use std::time::Instant;
 
-use crate::network::open;
+use crate::model::network::open;
 use crate::{Classifier, ClassifierTeam, Options, Precision};
 use anyhow::Context;
 use formats::streams::Stream;
@@ -49,7 +48,6 @@ struct Setting<'a> {
 }
 
 pub fn run(args: &BenchArgs, model: &Path) -> anyhow::Result<()> {
-    let ranges = super::calibration(args, model)?;
     // fp32 comes first, as the baseline of the others.
     let mut precisions = args.precision.clone();
     precisions.sort_unstable();
@@ -59,7 +57,7 @@ pub fn run(args: &BenchArgs, model: &Path) -> anyhow::Result<()> {
             for &threads in &args.threads {
                 for &precision in &precisions {
                     let setting = Setting { sampler, points, threads, precision };
-                    rows.push(measure(args, model, &setting, &ranges)?);
+                    rows.push(measure(args, model, &setting)?);
                 }
             }
         }
@@ -89,22 +87,11 @@ pub fn run(args: &BenchArgs, model: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn measure(
-    args: &BenchArgs,
-    model: &Path,
-    setting: &Setting<'_>,
-    ranges: &Option<BTreeMap<String, f32>>,
-) -> anyhow::Result<Timing> {
+fn measure(args: &BenchArgs, model: &Path, setting: &Setting<'_>) -> anyhow::Result<Timing> {
     let &Setting { sampler, points, threads, precision } = setting;
     let from = if sampler.takes_all() { points } else { args.from };
-    let mut options = Options {
-        precision,
-        kernel: args.kernel,
-        threads,
-        capacity: from,
-        activation_ranges: ranges.clone(),
-        ..Options::default()
-    };
+    let mut options =
+        Options { precision, kernel: args.kernel, threads, capacity: from, ..Options::default() };
     sampler.set(&mut options, points);
     let mut classifier = Classifier::load(model, &options)?;
     let kernel = classifier.kernel().name();

@@ -5,12 +5,9 @@ mod machine;
 mod table;
 mod variant;
 
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use crate::Precision;
-#[cfg(feature = "npz")]
-use formats::labelled::read_labelled;
 
 pub use latency::run;
 use variant::Variant;
@@ -20,12 +17,11 @@ use variant::Variant;
 #[command(after_help = "\
 Examples:
   infer-cpu bench --json > pi5.json
-  infer-cpu bench --points 64,1024 --precision f32,f16 --threads 1,4
+  infer-cpu bench --points 64,1024 --precision f32,i8 --threads 1,4
   infer-cpu bench --points 64 --precision i8 --threads 1,4 --clouds 30
 
-The latency is that of a whole classification, from coordinates to class. Options
-of a sampler follow its name, separated by colons: `fps`, `cpl`, `cpl:stn`,
-`cpl:trunk`, `random:votes5`, `random:votes5:turned` (with rotations).")]
+The latency is that of a whole classification, from coordinates to class. The front
+end of cpl follows its name: `cpl:stn`, `cpl:trunk`.")]
 pub struct BenchArgs {
     /// Model file [default: the bundled model]
     #[arg(long, value_name = "FILE")]
@@ -37,7 +33,7 @@ pub struct BenchArgs {
     points: Vec<usize>,
 
     /// Precisions to measure
-    #[arg(long, value_delimiter = ',', default_value = "f32,f32-fc16,f16,i8")]
+    #[arg(long, value_delimiter = ',', default_value = "f32,i8")]
     precision: Vec<Precision>,
 
     /// Samplers to measure; for `all`, the clouds have as many points as the network sees
@@ -48,7 +44,7 @@ pub struct BenchArgs {
     #[arg(long, value_delimiter = ',', value_parser = at_least_one, default_value = "1,2,4")]
     threads: Vec<usize>,
 
-    /// Kernels to use: scalar, avx2, avx512, neon, neon_f16, neon_dot [default: the fastest]
+    /// Kernels to use: scalar, avx2, avx512, neon, neon_dot [default: the fastest]
     #[arg(long)]
     kernel: Option<crate::kernel::KernelName>,
 
@@ -68,25 +64,6 @@ pub struct BenchArgs {
     /// Print one JSON object with all samples instead of a table
     #[arg(long)]
     json: bool,
-
-    #[cfg(feature = "npz")]
-    /// Packed NPZ file of clouds to calibrate int8 with [default: the model's own calibration, else
-    /// built-in procedural shapes]
-    #[arg(long, value_name = "NPZ")]
-    calibrate: Option<PathBuf>,
-}
-
-/// Without the feature `npz`, there is no flag `--calibrate`.
-#[cfg(not(feature = "npz"))]
-fn calibration(_: &BenchArgs, _: &Path) -> anyhow::Result<Option<BTreeMap<String, f32>>> {
-    Ok(None)
-}
-
-/// The largest activations on the clouds of `--calibrate`, if given.
-#[cfg(feature = "npz")]
-fn calibration(args: &BenchArgs, model: &Path) -> anyhow::Result<Option<BTreeMap<String, f32>>> {
-    let Some(path) = &args.calibrate else { return Ok(None) };
-    Ok(Some(crate::activation_ranges_of_set(model, &read_labelled(path)?)?))
 }
 
 fn at_least_one(word: &str) -> Result<usize, String> {

@@ -1,4 +1,4 @@
-//! Samplers with options in one word, such as `cpl:stn` or `random:votes5`.
+//! Samplers with their front ends in one word, such as `cpl:stn`.
 
 use std::fmt;
 use std::str::FromStr;
@@ -11,8 +11,6 @@ use formats::FormatError;
 pub struct Variant {
     name: String,
     spec: SamplerSpec,
-    votes: u32,
-    rotations: bool,
 }
 
 impl Variant {
@@ -24,8 +22,6 @@ impl Variant {
     /// Sets this sampler in `options`, to keep `points`.
     pub fn set(&self, options: &mut Options, points: usize) {
         options.sampler = Some(SamplerSpec { points, ..self.spec.clone() });
-        options.votes = self.votes;
-        options.vote_rotations = self.rotations;
     }
 }
 
@@ -33,25 +29,12 @@ impl FromStr for Variant {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let mut words = text.split(':');
-        let kind = words.next().unwrap_or_default();
-        let kind = kind.parse().map_err(|error: FormatError| error.to_string())?;
-        let spec = SamplerSpec { kind, ..SamplerSpec::default() };
-        let mut variant = Self { name: text.to_owned(), spec, votes: 1, rotations: false };
-        for word in words {
-            if let Ok(front) = word.parse() {
-                variant.spec.front = front;
-            } else if let Some(Ok(votes)) = word.strip_prefix("votes").map(str::parse) {
-                variant.votes = votes;
-            } else if word == "turned" {
-                variant.rotations = true;
-            } else {
-                return Err(format!(
-                    "unknown word `{word}` after the sampler, expected a front end, votesN or turned"
-                ));
-            }
-        }
-        Ok(variant)
+        let (kind, front) = text.split_once(':').unwrap_or((text, "auto"));
+        let parsed = || -> Result<SamplerSpec, FormatError> {
+            Ok(SamplerSpec { kind: kind.parse()?, front: front.parse()?, ..SamplerSpec::default() })
+        };
+        let spec = parsed().map_err(|error| error.to_string())?;
+        Ok(Self { name: text.to_owned(), spec })
     }
 }
 
@@ -68,13 +51,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_variant_says_what_follows_the_sampler() {
+    fn front_ends_follow_the_sampler() {
         let variant: Variant = "cpl:stn".parse().unwrap();
         assert_eq!(variant.spec.kind, SamplerKind::Cpl);
         assert_eq!(variant.spec.front, FrontChoice::Stn);
-        let variant: Variant = "random:votes5:turned".parse().unwrap();
-        assert_eq!((variant.votes, variant.rotations), (5, true));
-        assert!("fps:votes".parse::<Variant>().unwrap_err().contains("unknown word `votes`"));
+        let error = "cpl:front".parse::<Variant>().unwrap_err();
+        assert!(error.contains("unknown front end `front`"), "{error}");
         assert!("fsp".parse::<Variant>().is_err());
     }
 }

@@ -11,12 +11,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use crate::live::{Counts, EgoMotion, Flaw, LiveOptions, Pipeline, Recorder, Timeline};
+use crate::live::{Counts, Flaw, LiveOptions, Pipeline, Recorder, Timeline, Trajectory};
 use crate::{Classifier, Options, Precision};
 use formats::ouster::Metadata;
-use formats::outputs::need_extension;
+use formats::plausible::sensor_motion;
+use formats::trajectory::check_cover;
 use formats::{ChosenSender, FormatError};
-use glam::DVec3;
+use program::outputs::need_extension;
 use signal_hook::consts::{SIGINT, SIGTERM};
 
 use super::model::ModelArgs;
@@ -49,8 +50,8 @@ the object. The keys are, in this order: version (1), turn, track (a number that
 object), class (of the track, from all of its clusters, or `unknown`; null while no cluster of it
 had --min-points), resembles (the most similar class, even if class is `unknown`), confidence (the
 probability of `resembles` from this cluster alone, or null), probability (the same from all
-clusters of the track), frame (of position, yaw and velocity: sensor, or world with --poses or
---twist), position_m (the middle of the box around the points), size_m (length, width, height),
+clusters of the track), frame (of position, yaw and velocity: sensor, or world with --poses),
+position_m (the middle of the box around the points), size_m (length, width, height),
 yaw_deg (direction of the length, -90 to 90), velocity_m_s (null at first; relative to the sensor in
 its frame), points, range_m, first_s and last_s (Unix time of the first and the last point: the
 sensor's stamps give the intervals, and the clock of this machine or of the capture gives the
@@ -83,7 +84,7 @@ pub struct LiveArgs {
 
     /// Record points and objects to a new file that ROS 2, Foxglove and Rerun read: MCAP with
     /// /points (PointCloud2), /objects (Detection3DArray), /objects/markers (MarkerArray),
-    /// /tf_static and, with --poses or --twist, /tf; each turn is in the file when it ends
+    /// /tf_static and, with --poses, /tf; each turn is in the file when it ends
     #[arg(long, value_name = "FILE")]
     mcap: Option<PathBuf>,
 
@@ -110,14 +111,8 @@ pub struct LiveArgs {
 
     /// Poses of the sensor in the world, in TUM's format (Unix time x y z qx qy qz qw), by which
     /// clusters are deskewed and tracked in the world; they must cover all packets
-    #[arg(long, value_name = "FILE", conflicts_with = "twist")]
+    #[arg(long, value_name = "FILE")]
     poses: Option<PathBuf>,
-
-    /// Steady motion of the sensor in its own frame, in place of poses: metres and degrees per
-    /// second
-    #[arg(long, num_args = 6, value_names = ["VX", "VY", "VZ", "WX", "WY", "WZ"])]
-    #[arg(value_parser = rate)]
-    twist: Option<Vec<f64>>,
 
     /// Fewest points of a cluster that is classified
     #[arg(long, default_value_t = 20, value_name = "N")]
@@ -131,19 +126,13 @@ pub struct LiveArgs {
     #[command(flatten)]
     model: ModelArgs,
 
-    /// Precision of the network: f32, f32-fc16, f16 or i8
+    /// Precision of the network: f32 or i8
     #[arg(long, default_value = "f32")]
     precision: Precision,
 
     /// Number of threads that classify [default: one per core, at most 4]
     #[arg(long, value_name = "T", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
-}
-
-/// Parses a velocity or an angular rate of a vehicle.
-fn rate(word: &str) -> Result<f64, String> {
-    let rate = word.parse().ok().filter(|rate: &f64| rate.abs() <= 1000.0);
-    rate.ok_or_else(|| format!("expected a number from -1000 to 1000, found {word:?}"))
 }
 
 /// Parses the address of a multicast group (RFC 5771).
@@ -176,7 +165,7 @@ pub fn run(args: &LiveArgs) -> anyhow::Result<Outcome> {
             }
             Tick::Quiet if heard.elapsed() >= SILENCE && !is_silent => {
                 is_silent = true;
-                formats::say!("warning: {}", args.silence());
+                program::say!("warning: {}", args.silence());
             }
             Tick::Quiet => {}
             Tick::End => {
@@ -194,8 +183,8 @@ pub fn run(args: &LiveArgs) -> anyhow::Result<Outcome> {
         }
         for flaw in pipeline.new_flaws() {
             match flaw {
-                Flaw::Times { .. } => formats::say!("warning: {flaw}"),
-                _ => formats::say!(
+                Flaw::Times { .. } => program::say!("warning: {flaw}"),
+                _ => program::say!(
                     "warning: ignored a packet, and will ignore others with the same flaw: {flaw}"
                 ),
             }
@@ -212,11 +201,11 @@ pub fn run(args: &LiveArgs) -> anyhow::Result<Outcome> {
     }
     read.error.take().map_or(Ok(()), Err)?;
     if !args.stats && read.capture.first_unread.is_some() {
-        formats::say!("warning: {}{} UDP packets{}", args.capture(), read.n_packets, read.capture);
+        program::say!("warning: {}{} UDP packets{}", args.capture(), read.n_packets, read.capture);
     }
     let Counts { packets, lost, duplicated, late, points, clusters, .. } = *pipeline.counts();
     if args.pcap.is_some() && !args.stats && packets > 0 && clusters == 0 {
-        formats::say!(
+        program::say!(
             "warning: {}no object was found among {points} points of {packets} packets: expected a whole \
              turn of the sensor or more, and clusters of {} points or more (--min-points)",
             args.capture(),
@@ -225,7 +214,7 @@ pub fn run(args: &LiveArgs) -> anyhow::Result<Outcome> {
     }
     // Single repeated and late packets are usual in networks.
     if duplicated + late > packets {
-        formats::say!(
+        program::say!(
             "warning: {}expected packets in the order of the sensor's stamps, found {duplicated} with a \
              stamp again and {late} with an earlier one, which were not used",
             args.capture()
@@ -233,7 +222,7 @@ pub fn run(args: &LiveArgs) -> anyhow::Result<Outcome> {
     }
     if !args.stats && lost > 0 {
         let of = packets + lost;
-        formats::say!("warning: {}{lost} of {of} packets are probably missing", args.capture());
+        program::say!("warning: {}{lost} of {of} packets are probably missing", args.capture());
     }
     if packets == 0 {
         let cause = format!(
@@ -248,7 +237,7 @@ pub fn run(args: &LiveArgs) -> anyhow::Result<Outcome> {
         if args.udp.is_none() {
             return Err(Usage(cause).into());
         }
-        formats::say!("warning: {cause}");
+        program::say!("warning: {cause}");
     }
     Ok(Outcome::Success)
 }
@@ -260,24 +249,16 @@ impl LiveArgs {
         let options = Options { precision: self.precision, threads, ..Options::default() };
         let classifier = Classifier::load(&model, &options).map_err(of_setup)?;
         if let Some(warning) = classifier.unsuited_to_clusters() {
-            formats::say!("warning: {}: {warning}", model.display());
+            program::say!("warning: {}: {warning}", model.display());
         }
         Ok(Pipeline::new(classifier, live)?)
     }
 
     fn options(&self) -> anyhow::Result<LiveOptions> {
-        let ego_motion = match (&self.poses, self.twist.as_deref()) {
-            (Some(file), _) => Some(EgoMotion::read(file)?),
-            (None, Some(&[x, y, z, roll, pitch, yaw])) => Some(EgoMotion::Twist {
-                linear_m_s: DVec3::new(x, y, z),
-                angular_rad_s: DVec3::new(roll, pitch, yaw).map(f64::to_radians),
-            }),
-            _ => None,
-        };
         Ok(LiveOptions {
             min_points: self.min_points,
             min_turns: self.min_turns,
-            ego_motion,
+            ego_motion: self.poses.as_deref().map(Trajectory::load).transpose()?,
             ouster: self.metadata.as_deref().map(Metadata::read).transpose()?,
             is_recorded: self.pcap.is_some(),
             ..LiveOptions::default()
@@ -286,9 +267,9 @@ impl LiveArgs {
 
     /// Tells why the poses are probably not those of the sensor.
     fn warn_of_poses(&self, options: &LiveOptions) {
-        let doubts = options.ego_motion.as_ref().map(EgoMotion::doubts).unwrap_or_default();
-        for (doubt, file) in doubts.iter().zip(self.poses.iter().cycle()) {
-            formats::say!("warning: {}: {doubt}", file.display());
+        let warnings = options.ego_motion.as_ref().map(sensor_motion).unwrap_or_default();
+        for (warning, file) in warnings.iter().zip(self.poses.iter().cycle()) {
+            program::say!("warning: {}: {warning}", file.display());
         }
     }
 
@@ -311,7 +292,8 @@ impl LiveArgs {
     }
 
     fn check_cover(&self, options: &LiveOptions, sent_s: [f64; 2]) -> Result<(), FormatError> {
-        let covered = options.ego_motion.as_ref().map_or(Ok(()), |m| m.check_cover(sent_s));
+        let known_s = options.ego_motion.as_ref().map(Trajectory::known_s);
+        let covered = known_s.map_or(Ok(()), |known_s| check_cover(known_s, sent_s));
         let file = self.poses.as_deref().unwrap_or(Path::new("poses"));
         covered.map_err(|cause| FormatError::malformed(file, "times", cause))
     }

@@ -1,23 +1,26 @@
 //! Notifies systemd about a service of `Type=notify`: that it is ready, alive, its status, and that
 //! it stops. The protocol is sd_notify(3) and sd_watchdog_enabled(3).
+//!
+//! The crates `sd-notify` 0.5.0 and `libsystemd` 0.7.2 wait while the manager's socket is full, which
+//! would hold up packets, and ignore a malformed `WATCHDOG_USEC`; the former takes an abstract name
+//! for a path.
 
-use std::env;
 use std::ffi::{OsStr, OsString};
-use std::io;
-use std::process;
 use std::time::{Duration, Instant};
+use std::{env, io, process};
 
 use crate::live::Counts;
 use anyhow::Context;
 
-use manager::Manager;
-
 /// The interval of status messages without a watchdog.
 const STATUS_PERIOD: Duration = Duration::from_secs(5);
 
+/// Sends one message to the manager, and fails rather than wait if its socket is full.
+type Send = Box<dyn Fn(&str) -> io::Result<()>>;
+
 /// Sends messages to systemd, if it listens.
 pub struct Notifier {
-    manager: Option<Manager>,
+    send: Option<Send>,
     watchdog: Option<Duration>,
     /// When the next keep-alive message is due.
     due: Instant,
@@ -31,31 +34,30 @@ impl Notifier {
     fn new(variable: impl Fn(&str) -> Option<OsString>) -> anyhow::Result<Self> {
         let due = Instant::now();
         let Some(name) = variable("NOTIFY_SOCKET").filter(|name| !name.is_empty()) else {
-            return Ok(Self { manager: None, watchdog: None, due });
+            return Ok(Self { send: None, watchdog: None, due });
         };
-        let manager =
-            Manager::at(&name).with_context(|| format!("NOTIFY_SOCKET={}", name.display()))?;
+        let send = sender(&name).with_context(|| format!("NOTIFY_SOCKET={}", name.display()))?;
         // The watchdog may be for another process.
         let is_ours = variable("WATCHDOG_PID").is_none_or(|id| id == *process::id().to_string());
         let watchdog = variable("WATCHDOG_USEC").filter(|_| is_ours);
         let watchdog = watchdog.map(|time| microseconds(&time)).transpose()?;
-        Ok(Self { manager: Some(manager), watchdog, due })
+        Ok(Self { send: Some(send), watchdog, due })
     }
 
     /// Reports that the model is loaded and packets are received.
     pub fn ready(&self) -> anyhow::Result<()> {
-        let Some(manager) = &self.manager else { return Ok(()) };
-        manager.tell("READY=1\nSTATUS=Waiting for packets").context("telling NOTIFY_SOCKET")
+        let Some(send) = &self.send else { return Ok(()) };
+        send("READY=1\nSTATUS=Waiting for packets").context("sending to NOTIFY_SOCKET")
     }
 
     /// Sends a keep-alive message if one is due. The loop over packets calls this, so that the
     /// watchdog detects if the loop hangs.
     pub fn alive(&mut self, counts: &Counts, now: Instant) {
-        let Some(manager) = self.manager.as_ref().filter(|_| now >= self.due) else { return };
+        let Some(send) = self.send.as_ref().filter(|_| now >= self.due) else { return };
         let Counts { packets, clusters, .. } = counts;
         let sign = if self.watchdog.is_some() { "WATCHDOG=1\n" } else { "" };
         // If the socket is full, the next packet tries again.
-        if manager.tell(&format!("{sign}STATUS={packets} packets, {clusters} objects")).is_ok() {
+        if send(&format!("{sign}STATUS={packets} packets, {clusters} objects")).is_ok() {
             // sd_watchdog_enabled(3) recommends half of the time.
             self.due = now + self.watchdog.map_or(STATUS_PERIOD, |time| time / 2);
         }
@@ -63,10 +65,8 @@ impl Notifier {
 
     /// Reports that the program stops; later messages are not sent.
     pub fn stopping(&mut self) {
-        if let Some(manager) = self.manager.take() {
-            // If this fails, systemd still sees the process end.
-            let _ = manager.tell("STOPPING=1");
-        }
+        // If this fails, systemd still sees the process end.
+        let _ = self.send.take().map(|send| send("STOPPING=1"));
     }
 }
 
@@ -77,53 +77,24 @@ fn microseconds(text: &OsStr) -> anyhow::Result<Duration> {
     })
 }
 
+/// Sends to the socket at a path, or at the abstract name after an `@`.
 #[cfg(target_os = "linux")]
-mod manager {
-    use super::{OsStr, io};
+fn sender(name: &OsStr) -> io::Result<Send> {
     use std::os::linux::net::SocketAddrExt;
-    use std::os::unix::ffi::OsStrExt;
-    use std::os::unix::net::{SocketAddr, UnixDatagram};
-
-    pub struct Manager {
-        socket: UnixDatagram,
-        address: SocketAddr,
-    }
-
-    impl Manager {
-        /// Connects to a path, or to the abstract name after an `@`.
-        pub fn at(name: &OsStr) -> io::Result<Self> {
-            let address = match name.as_bytes() {
-                [b'@', name @ ..] => SocketAddr::from_abstract_name(name)?,
-                [b'/', ..] => SocketAddr::from_pathname(name)?,
-                _ => return Err(io::Error::other("expected a path or an abstract name: /… or @…")),
-            };
-            let socket = UnixDatagram::unbound()?;
-            // Packets must not wait for a busy manager.
-            socket.set_nonblocking(true)?;
-            Ok(Self { socket, address })
-        }
-
-        pub fn tell(&self, state: &str) -> io::Result<()> {
-            self.socket.send_to_addr(state.as_bytes(), &self.address).map(drop)
-        }
-    }
+    use std::os::unix::{ffi::OsStrExt, net};
+    let address = match name.as_bytes() {
+        [b'@', name @ ..] => net::SocketAddr::from_abstract_name(name)?,
+        [b'/', ..] => net::SocketAddr::from_pathname(name)?,
+        _ => return Err(io::Error::other("expected a path or an abstract name: /… or @…")),
+    };
+    let socket = net::UnixDatagram::unbound()?;
+    socket.set_nonblocking(true)?;
+    Ok(Box::new(move |state| socket.send_to_addr(state.as_bytes(), &address).map(drop)))
 }
 
 #[cfg(not(target_os = "linux"))]
-mod manager {
-    use super::{OsStr, io};
-
-    pub enum Manager {}
-
-    impl Manager {
-        pub fn at(_: &OsStr) -> io::Result<Self> {
-            Err(io::ErrorKind::Unsupported.into())
-        }
-
-        pub fn tell(&self, _: &str) -> io::Result<()> {
-            match *self {}
-        }
-    }
+fn sender(_: &OsStr) -> io::Result<Send> {
+    Err(io::Error::other("expected no such variable, since systemd runs on Linux only"))
 }
 
 #[cfg(test)]
@@ -133,6 +104,8 @@ mod tests {
     use std::os::linux::net::SocketAddrExt;
     use std::os::unix::net::{SocketAddr, UnixDatagram};
 
+    const ALIVE: &str = "STATUS=754 packets, 30 objects";
+
     fn counts() -> Counts {
         Counts { packets: 754, clusters: 30, ..Counts::default() }
     }
@@ -141,91 +114,87 @@ mod tests {
     fn manager(test: &str) -> (UnixDatagram, String) {
         let name = format!("edgepuck-{test}-{}", process::id());
         let address = SocketAddr::from_abstract_name(&name).unwrap();
-        (unblocked(UnixDatagram::bind_addr(&address).unwrap()), format!("@{name}"))
-    }
-
-    fn unblocked(socket: UnixDatagram) -> UnixDatagram {
+        let socket = UnixDatagram::bind_addr(&address).unwrap();
         socket.set_nonblocking(true).unwrap();
-        socket
+        (socket, format!("@{name}"))
     }
 
     fn notifier(variables: &[(&str, &str)]) -> anyhow::Result<Notifier> {
-        Notifier::new(|name| {
-            let (_, value) = variables.iter().find(|(key, _)| *key == name)?;
-            Some(value.into())
-        })
+        let value = |name: &str| variables.iter().find(|(key, _)| *key == name);
+        Notifier::new(|name| value(name).map(|(_, value)| value.into()))
     }
 
     /// The messages since the last call.
-    fn told(manager: &UnixDatagram) -> Vec<String> {
+    fn received(manager: &UnixDatagram) -> Vec<String> {
         let mut buffer = [0; 256];
-        let mut next = || manager.recv(&mut buffer).ok().map(|n| buffer[..n].to_vec());
-        let all = std::iter::from_fn(&mut next);
-        all.map(|state| String::from_utf8(state).unwrap()).collect()
+        let next = || manager.recv(&mut buffer).ok().map(|n| buffer[..n].to_vec());
+        std::iter::from_fn(next).map(|state| String::from_utf8(state).unwrap()).collect()
     }
 
     #[test]
-    fn a_service_is_ready_then_alive_at_half_of_the_watchdogs_time_then_stopping() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("notify");
-        let manager = unblocked(UnixDatagram::bind(&path).unwrap());
-        let (path, own_id) = (path.to_str().unwrap(), process::id().to_string());
-        let watched =
-            [("NOTIFY_SOCKET", path), ("WATCHDOG_USEC", "10000000"), ("WATCHDOG_PID", &own_id)];
-        let mut notifier = notifier(&watched).unwrap();
+    fn alive_is_sent_at_half_of_the_watchdog_time() {
+        let (manager, name) = manager("watched");
+        let own_id = process::id().to_string();
+        let watched = [("WATCHDOG_USEC", "10000000"), ("WATCHDOG_PID", &*own_id)];
+        let mut notifier =
+            notifier(&[&watched[..], &[("NOTIFY_SOCKET", &*name)]].concat()).unwrap();
         notifier.ready().unwrap();
-        assert_eq!(told(&manager), ["READY=1\nSTATUS=Waiting for packets"]);
+        assert_eq!(received(&manager), ["READY=1\nSTATUS=Waiting for packets"]);
         let start = Instant::now();
         for tenths in 0..=100 {
             notifier.alive(&counts(), start + Duration::from_millis(100 * tenths));
         }
-        assert_eq!(told(&manager), ["WATCHDOG=1\nSTATUS=754 packets, 30 objects"; 3]);
+        assert_eq!(received(&manager), ["WATCHDOG=1\nSTATUS=754 packets, 30 objects"; 3]);
         notifier.stopping();
         notifier.alive(&counts(), start + Duration::from_secs(100));
-        assert_eq!(told(&manager), ["STOPPING=1"]);
+        assert_eq!(received(&manager), ["STOPPING=1"]);
     }
 
     #[test]
-    fn without_a_watchdog_of_its_own_only_the_status_is_told() {
+    fn only_the_status_is_sent_without_a_watchdog_of_this_process() {
         let (manager, name) = manager("unwatched");
-        let unwatched = [("NOTIFY_SOCKET", &*name)];
-        let others =
-            [("NOTIFY_SOCKET", &*name), ("WATCHDOG_USEC", "10000000"), ("WATCHDOG_PID", "1")];
-        for variables in [&unwatched[..], &others] {
-            notifier(variables).unwrap().alive(&counts(), Instant::now());
-            assert_eq!(told(&manager), ["STATUS=754 packets, 30 objects"]);
+        let others = [("WATCHDOG_USEC", "10000000"), ("WATCHDOG_PID", "1")];
+        for watchdog in [&[][..], &others] {
+            let variables = [watchdog, &[("NOTIFY_SOCKET", &*name)]].concat();
+            notifier(&variables).unwrap().alive(&counts(), Instant::now());
+            assert_eq!(received(&manager), [ALIVE]);
         }
     }
 
     #[test]
-    fn a_busy_manager_delays_the_sign_of_life_and_not_the_packets() {
+    fn a_busy_manager_delays_alive_without_blocking() {
         let (manager, name) = manager("busy");
         let mut notifier = notifier(&[("NOTIFY_SOCKET", &*name)]).unwrap();
         let now = Instant::now();
         while notifier.ready().is_ok() {}
         notifier.alive(&counts(), now);
-        told(&manager);
+        assert!(!received(&manager).contains(&ALIVE.to_owned()));
         notifier.alive(&counts(), now);
-        assert_eq!(told(&manager), ["STATUS=754 packets, 30 objects"]);
+        assert_eq!(received(&manager), [ALIVE]);
     }
 
     #[test]
-    fn nobody_is_told_without_a_socket_and_odd_variables_are_refused() {
-        for unset in [&[("WATCHDOG_USEC", "10 s")][..], &[("NOTIFY_SOCKET", "")]] {
-            let mut silent = notifier(unset).unwrap();
+    fn nothing_is_sent_without_a_socket() {
+        for unset in [("WATCHDOG_USEC", "10 s"), ("NOTIFY_SOCKET", "")] {
+            let mut silent = notifier(&[unset]).unwrap();
             silent.ready().unwrap();
             silent.alive(&counts(), Instant::now());
         }
-        let refusal = |variables: &[_]| format!("{:#}", notifier(variables).err().unwrap());
+    }
+
+    #[test]
+    fn malformed_variables_fail() {
+        let error = |variables: &[_]| format!("{:#}", notifier(variables).err().unwrap());
         assert_eq!(
-            refusal(&[("NOTIFY_SOCKET", "vsock:2:1")]),
+            error(&[("NOTIFY_SOCKET", "vsock:2:1")]),
             "NOTIFY_SOCKET=vsock:2:1: expected a path or an abstract name: /… or @…"
         );
-        assert_eq!(
-            refusal(&[("NOTIFY_SOCKET", "/nowhere/notify"), ("WATCHDOG_USEC", "10 s")]),
-            "expected microseconds in WATCHDOG_USEC, found `10 s`"
-        );
-        let gone = notifier(&[("NOTIFY_SOCKET", "/nowhere/notify")]).unwrap();
-        assert!(gone.ready().is_err());
+        for time in ["10 s", "0", ""] {
+            assert_eq!(
+                error(&[("NOTIFY_SOCKET", "/nowhere/notify"), ("WATCHDOG_USEC", time)]),
+                format!("expected microseconds in WATCHDOG_USEC, found `{time}`")
+            );
+        }
+        assert!(notifier(&[("NOTIFY_SOCKET", "/nowhere/notify")]).unwrap().ready().is_err());
     }
 }

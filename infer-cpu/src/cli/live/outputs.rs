@@ -40,7 +40,7 @@ impl Outputs {
         if let Err(failure) = recorder.packet(pipeline) {
             if self.lines.is_some() {
                 let cause = &failure.source;
-                formats::say!(
+                program::say!(
                     "warning: the recording ends, the lines continue: {failure}: {cause}"
                 );
             }

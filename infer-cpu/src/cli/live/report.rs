@@ -7,32 +7,32 @@ use super::source::Read;
 /// Prints times, counts and memory on standard error.
 pub fn print(pipeline: &Pipeline, read: &Read) {
     let (counts, stats) = (pipeline.counts(), pipeline.stats());
-    formats::say!("{:<22} {:>8} {:>8} {:>8} {:>8}", "time a turn, ms", "mean", "p50", "p90", "p99");
+    program::say!("{:<22} {:>8} {:>8} {:>8} {:>8}", "time a turn, ms", "mean", "p50", "p90", "p99");
     let total: f64 = Stage::ALL.into_iter().map(|stage| stats.mean_ms(stage)).sum();
     for stage in Stage::ALL {
         let [p50, p90, p99] = [0.5, 0.9, 0.99].map(|share| stats.stage_ms(stage, share));
         let (mean, name) = (stats.mean_ms(stage), stage.name());
         let share = 100.0 * mean / total.max(f64::MIN_POSITIVE);
-        formats::say!("{name:<22} {mean:>8.3} {p50:>8.3} {p90:>8.3} {p99:>8.3} {share:>5.0} %");
+        program::say!("{name:<22} {mean:>8.3} {p50:>8.3} {p90:>8.3} {p99:>8.3} {share:>5.0} %");
     }
     if let [Some(p50), Some(p90), Some(p99)] = [0.5, 0.9, 0.99].map(|share| stats.latency_ms(share))
     {
-        formats::say!("{:<22} {:>8} {p50:>8.3} {p90:>8.3} {p99:>8.3}", "latency, ms", "");
+        program::say!("{:<22} {:>8} {p50:>8.3} {p90:>8.3} {p99:>8.3}", "latency, ms", "");
     }
     if let Some(most) = stats.first_turn_ms() {
-        formats::say!(
+        program::say!(
             "latency of the first turn, whose objects wait for its end, left out above: {most:.3} ms \
              at most"
         );
     }
     let n_turns = stats.n_turns().max(1) as f64;
-    formats::say!(
+    program::say!(
         "{} turns of {:.0} points and {:.1} clusters on average",
         stats.n_turns(),
         counts.points as f64 / n_turns,
         counts.clusters as f64 / n_turns
     );
-    formats::say!(
+    program::say!(
         "{} packets{}; {} lost, {} late, {} duplicate, {} foreign, {} from other addresses, {} overrun, \
          {} restarts",
         counts.packets,
@@ -45,13 +45,13 @@ pub fn print(pipeline: &Pipeline, read: &Read) {
         read.n_overrun,
         counts.restarts
     );
-    formats::say!(
+    program::say!(
         "{} points dropped, {} clusters too small for a class",
         counts.dropped_points,
         counts.unclassified
     );
     if let Some([now, most]) = resident_mib() {
-        formats::say!("{now:.1} MiB resident, {most:.1} MiB at most");
+        program::say!("{now:.1} MiB resident, {most:.1} MiB at most");
     }
 }
 

@@ -51,7 +51,7 @@ pub struct Sensor {
     senders: Senders,
     /// For the packets of an Ouster; without it, they are a Velodyne's.
     ouster: Option<Box<ouster::Decoder>>,
-    /// Whether the user was told of other sensors.
+    /// Whether the user was warned of other sensors.
     pub has_warned: bool,
 }
 
@@ -72,7 +72,7 @@ impl Sensor {
             && !self.has_warned
             && let Some(warning) = self.senders.warning()
         {
-            formats::say!("warning: {warning}");
+            program::say!("warning: {warning}");
             self.has_warned = true;
         }
         is_used
@@ -116,7 +116,7 @@ impl Source {
         is_over: &Arc<AtomicBool>,
     ) -> anyhow::Result<Self> {
         let socket = bind(address, multicast).with_context(|| format!("UDP {address}"))?;
-        formats::say!("listening on UDP {}", socket.local_addr()?);
+        program::say!("listening on UDP {}", socket.local_addr()?);
         let (fill, filled) = sync_channel(RING);
         let (empty, empties) = sync_channel(RING);
         for _ in 0..RING {
@@ -254,7 +254,7 @@ fn replay(
     let (mut read, start, mut first_s) = (Read::default(), Instant::now(), None);
     let ended = pcap::read(file, |packet| {
         read.n_packets += 1;
-        if !sensor.sent(&packet.payload, packet.sender()) {
+        if !sensor.sent(&packet.payload, packet.sender) {
             return ControlFlow::Continue(());
         }
         let time_s = packet.time_s.unwrap_or_default();

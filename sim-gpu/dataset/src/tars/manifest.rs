@@ -3,7 +3,7 @@
 use super::Cut;
 use crate::config::DatasetConfig;
 use crate::error::DatasetError;
-use crate::journal::{read_json, write_json};
+use crate::folder::{read_json, write_json};
 use crate::record::MeshFailure;
 use formats::hash::FileHash;
 use formats::{Split, atomic};

@@ -1,4 +1,4 @@
-use crate::primitives::{Builder, DVec2, DVec3, loft, outline};
+use crate::primitives::{Builder, DVec2, DVec3, dvec3, loft, outline};
 
 /// A body from its nose at y = -length / 2 to its tail at y = length / 2.
 pub struct Fuselage {
@@ -19,13 +19,13 @@ impl Fuselage {
     }
 
     pub fn nose(&self) -> DVec3 {
-        DVec3::new(0.0, -0.5 * self.length_m, 0.0)
+        dvec3(0.0, -0.5 * self.length_m, 0.0)
     }
 
     /// The middle of the section at a fraction of the length from the nose.
     pub fn spine(&self, share: f64) -> DVec3 {
         let rise = self.upsweep * self.radius_m() * self.along_tail(share).powi(2);
-        DVec3::new(0.0, (share - 0.5) * self.length_m, rise)
+        dvec3(0.0, (share - 0.5) * self.length_m, rise)
     }
 
     /// 0 ahead of the tail, 1 at its end.
@@ -58,7 +58,7 @@ impl Fuselage {
             .map(|share| {
                 let (centre, radius) = (self.spine(share), self.radius_at(share));
                 // Counter-clockwise about +y: x mirrored.
-                circle.iter().map(|p| centre + radius * DVec3::new(-p.x, 0.0, p.y)).collect()
+                circle.iter().map(|p| centre + radius * dvec3(-p.x, 0.0, p.y)).collect()
             })
             .collect();
         loft(b, &sections);

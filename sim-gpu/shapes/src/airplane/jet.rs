@@ -1,7 +1,7 @@
 use super::details;
 use super::fuselage::Fuselage;
 use super::wing::{Wing, fin};
-use crate::primitives::{Builder, DVec3, Sampler};
+use crate::primitives::{Builder, DVec3, Sampler, dvec3};
 
 /// A fighter with thin wings, one or two fins and a canopy. One with `delta` wings has no tail.
 pub fn fighter(b: &mut Builder, s: &mut Sampler, delta: bool) {
@@ -10,10 +10,10 @@ pub fn fighter(b: &mut Builder, s: &mut Sampler, delta: bool) {
         Fuselage { slender: s.uniform(8.0, 12.0), nose: 0.3, tail: 0.12, length_m, upsweep: 0.0 };
     let r = body.radius_m();
     body.build(b);
-    details::canopy(b, DVec3::new(0.0, -0.25 * length_m, 0.6 * r), 0.8 * r, 0.12 * length_m);
+    details::canopy(b, dvec3(0.0, -0.25 * length_m, 0.6 * r), 0.8 * r, 0.12 * length_m);
     let chord_m = length_m * if delta { s.uniform(0.42, 0.55) } else { s.uniform(0.24, 0.34) };
     let wing = Wing {
-        root: DVec3::new(0.0, 0.4 * length_m - chord_m, s.uniform(-0.4, 0.4) * r),
+        root: dvec3(0.0, 0.4 * length_m - chord_m, s.uniform(-0.4, 0.4) * r),
         half_span_m: length_m * s.uniform(0.26, 0.38),
         root_chord_m: chord_m,
         taper: if delta { s.uniform(0.05, 0.15) } else { s.uniform(0.2, 0.4) },
@@ -23,7 +23,7 @@ pub fn fighter(b: &mut Builder, s: &mut Sampler, delta: bool) {
     };
     wing.build(b);
     let fin_m = length_m * s.uniform(0.12, 0.18);
-    let root = DVec3::new(0.0, 0.46 * length_m - fin_m, 0.5 * r);
+    let root = dvec3(0.0, 0.46 * length_m - fin_m, 0.5 * r);
     if s.chance(0.5) {
         let aside = 0.8 * r * DVec3::X;
         b.mirrored_x(|b| fin(b, root + aside, fin_m, fin_m, 0.7));
@@ -32,7 +32,7 @@ pub fn fighter(b: &mut Builder, s: &mut Sampler, delta: bool) {
     }
     if !delta {
         let stabilizer = Wing {
-            root: DVec3::new(0.0, 0.49 * length_m - fin_m, 0.0),
+            root: dvec3(0.0, 0.49 * length_m - fin_m, 0.0),
             half_span_m: 0.5 * wing.half_span_m + r,
             root_chord_m: fin_m,
             ..wing
@@ -40,7 +40,7 @@ pub fn fighter(b: &mut Builder, s: &mut Sampler, delta: bool) {
         stabilizer.build(b);
     }
     let intake_m = 0.6 * r;
-    let at = DVec3::new(1.1 * r, -0.1 * length_m, -0.1 * r);
+    let at = dvec3(1.1 * r, -0.1 * length_m, -0.1 * r);
     b.mirrored_x(|b| details::nacelle(b, at, intake_m, 0.55 * length_m));
     if s.chance(0.4) {
         let tip = wing.leading_edge(0.98) - 0.03 * length_m * DVec3::Y;

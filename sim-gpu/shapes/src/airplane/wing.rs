@@ -1,4 +1,4 @@
-use crate::primitives::{Builder, DAffine3, DVec3, cap, outline, skin};
+use crate::primitives::{Builder, DAffine3, DVec3, cap, dvec3, outline, skin};
 
 /// A pair of wings. Slopes are per metre of span.
 #[derive(Clone, Copy)]
@@ -21,7 +21,7 @@ impl Wing {
     /// The leading edge of the right wing at a fraction of the half span.
     pub fn leading_edge(&self, share: f64) -> DVec3 {
         let out_m = share * self.half_span_m;
-        self.root + DVec3::new(1.0, self.sweep, self.dihedral) * out_m
+        self.root + dvec3(1.0, self.sweep, self.dihedral) * out_m
     }
 
     pub fn chord_m(&self, share: f64) -> f64 {
@@ -32,7 +32,7 @@ impl Wing {
         let section = outline::airfoil(self.thickness, b.curved(self.root_chord_m, 4));
         let ends = [0.0, 1.0].map(|share| {
             let (nose, chord) = (self.leading_edge(share), self.chord_m(share));
-            section.iter().map(|p| nose + chord * DVec3::new(0.0, p.x, p.y)).collect()
+            section.iter().map(|p| nose + chord * dvec3(0.0, p.x, p.y)).collect()
         });
         b.mirrored_x(|b| open_at_root(b, &ends));
     }
@@ -48,11 +48,10 @@ impl Wing {
 pub fn fin(b: &mut Builder, root: DVec3, high_m: f64, chord_m: f64, sweep: f64) {
     let section = outline::airfoil(0.09, b.curved(chord_m, 4));
     let ends = [(0.0, chord_m), (high_m, 0.5 * chord_m)].map(|(up, chord)| {
-        section.iter().map(|p| DVec3::new(chord * p.y, sweep * up + chord * p.x, up)).collect()
+        section.iter().map(|p| dvec3(chord * p.y, sweep * up + chord * p.x, up)).collect()
     });
     // With x and y exchanged, the outline runs clockwise; mirrored, it looks outwards.
-    let mirror = DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0));
-    b.turned(root, mirror, |b| open_at_root(b, &ends));
+    b.turned(root, DAffine3::from_scale(dvec3(-1.0, 1.0, 1.0)), |b| open_at_root(b, &ends));
 }
 
 /// The surface from the first section, which stays open, to the last, which is closed.

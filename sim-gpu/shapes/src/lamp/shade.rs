@@ -1,4 +1,4 @@
-use crate::primitives::{Builder, DVec3, Profile, Sampler, Section, Vessel, Wall, ellipsoid, rod};
+use crate::primitives::*;
 
 /// A shade below `top_m`, `high_m` high and `radius_m` wide at its lower edge, with the bulb
 /// inside. Most shades are open at both ends.
@@ -23,7 +23,7 @@ pub fn shade(b: &mut Builder, s: &mut Sampler, top_m: f64, radius_m: f64, high_m
     Vessel::new(profile, wall, section).build(b);
     let bulb_m = 0.22 * narrow_m.min(high_m);
     let bulb = (low_m + 0.5 * high_m) * DVec3::Z;
-    ellipsoid(b, bulb, DVec3::new(bulb_m, bulb_m, 1.4 * bulb_m));
+    ellipsoid(b, bulb, dvec3(bulb_m, bulb_m, 1.4 * bulb_m));
     spider(b, bulb, top_m, 0.97 * neck_m);
 }
 

@@ -1,6 +1,6 @@
 //! Flat screens in their housings.
 
-use crate::primitives::{Builder, DVec3, Sampler, block, block_between, board, cushion};
+use crate::primitives::{Builder, DVec3, Sampler, block, block_between, board, cushion, dvec3};
 
 /// A screen that faces +x, with its width along y and its middle at the origin.
 #[derive(Clone, Copy)]
@@ -29,7 +29,7 @@ impl Screen {
     }
 
     pub fn build(self, b: &mut Builder, s: &mut Sampler) {
-        (self.housing)(b, s, DVec3::new(self.depth_m, self.width_m, self.height_m));
+        (self.housing)(b, s, dvec3(self.depth_m, self.width_m, self.height_m));
     }
 }
 
@@ -48,22 +48,20 @@ fn framed(b: &mut Builder, s: &mut Sampler, size: DVec3) {
     let half = size / 2.0;
     let back = -half.x;
     for side in [-1.0, 1.0] {
-        let outer = DVec3::new(half.x, side * half.y, half.z);
-        block_between(b, DVec3::new(back, side * (half.y - frame_m), -half.z), outer);
+        let outer = dvec3(half.x, side * half.y, half.z);
+        block_between(b, dvec3(back, side * (half.y - frame_m), -half.z), outer);
     }
     let inner_m = half.y - frame_m;
-    let top = DVec3::new(half.x, inner_m, half.z);
-    block_between(b, DVec3::new(back, -inner_m, half.z - frame_m), top);
-    let chin = DVec3::new(half.x, inner_m, -half.z + chin_m);
-    block_between(b, DVec3::new(back, -inner_m, -half.z), chin);
-    let glass = DVec3::new(half.x - 0.2 * size.x, inner_m, half.z - frame_m);
-    block_between(b, DVec3::new(back, -inner_m, -half.z + chin_m), glass);
+    block_between(b, dvec3(back, -inner_m, half.z - frame_m), dvec3(half.x, inner_m, half.z));
+    block_between(b, dvec3(back, -inner_m, -half.z), dvec3(half.x, inner_m, -half.z + chin_m));
+    let glass = dvec3(half.x - 0.2 * size.x, inner_m, half.z - frame_m);
+    block_between(b, dvec3(back, -inner_m, -half.z + chin_m), glass);
 }
 
 /// A framed screen with a housing for its electronics behind it.
 fn framed_with_box(b: &mut Builder, s: &mut Sampler, size: DVec3) {
     framed(b, s, size);
-    let inner = size * DVec3::new(1.0, s.uniform(0.4, 0.75), s.uniform(0.4, 0.7));
+    let inner = size * dvec3(1.0, s.uniform(0.4, 0.75), s.uniform(0.4, 0.7));
     cushion(b, -0.8 * size.x * DVec3::X, inner, 0.2 * size.x);
 }
 
@@ -73,6 +71,6 @@ fn bent(b: &mut Builder, _: &mut Sampler, size: DVec3) {
     board(b, [size.y, size.z], -size.x * DVec3::X, |u, v| {
         let across = 2.0 * u - 1.0;
         let x = 0.5 * size.x + sag_m * across * across;
-        DVec3::new(x, 0.5 * across * size.y, (v - 0.5) * size.z)
+        dvec3(x, 0.5 * across * size.y, (v - 0.5) * size.z)
     });
 }

@@ -6,7 +6,7 @@ mod interior;
 pub(super) mod panel;
 pub(super) mod wheel;
 
-use crate::primitives::{Builder, DAffine3, DVec3, Sampler};
+use crate::primitives::{Builder, DAffine3, Sampler, dvec3};
 use body::Body;
 use cabin::Cabin;
 use form::Form;
@@ -16,8 +16,7 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
     let form = Form::draw(s);
     let body = Body::draw(s, &form);
     body.build(b);
-    let cabin = Cabin::draw(s, &form, &body);
-    cabin.build(b);
+    Cabin::draw(s, &form, &body).build(b);
     wheels(b, s, &form, &body);
     if s.chance(0.85) {
         interior::build(b, s, &form);
@@ -34,8 +33,7 @@ fn wheels(b: &mut Builder, s: &mut Sampler, form: &Form, body: &Body) {
     for (axle, turn_rad) in [(form.axles[0], 0.0), (form.axles[1], steered_rad)] {
         for side in [-1.0, 1.0] {
             let y = side * (body.plan_y(axle) - recess_m);
-            let hub = DVec3::new(axle, y, form.wheel_m);
-            b.turned(hub, DAffine3::from_rotation_z(turn_rad), |b| {
+            b.turned(dvec3(axle, y, form.wheel_m), DAffine3::from_rotation_z(turn_rad), |b| {
                 wheel::wheel(b, [form.wheel_m, width_m, dish_m], side)
             });
         }

@@ -5,9 +5,9 @@ pub mod sofa;
 
 use std::f64::consts::FRAC_PI_2;
 
-use sim_gpu::internals::mesh::TriangleMesh;
+use edgepuck_mesh::TriangleMesh;
 
-use crate::primitives::{Builder, DAffine3, DVec3, Make, Sampler};
+use crate::primitives::{Builder, DAffine3, Make, Sampler, dvec3};
 
 /// Builds a chair that faces +x.
 ///
@@ -47,7 +47,7 @@ fn scaled(b: &mut Builder, s: &mut Sampler, build: Make, height_m: impl Fn(f64) 
         trial = b.clone();
     };
     let drawn_m = mesh.vertices.iter().map(|v| v.z).fold(0.0, f64::max);
-    let stretch = DVec3::new(1.0, 1.0, height_m(drawn_m) / drawn_m);
+    let stretch = dvec3(1.0, 1.0, height_m(drawn_m) / drawn_m);
     b.place(DAffine3::from_scale(stretch), |b| build(b, &mut start));
 }
 

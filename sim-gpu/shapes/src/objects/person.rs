@@ -5,7 +5,7 @@ mod carried;
 mod clothes;
 mod pose;
 
-use crate::primitives::{Builder, DAffine3, DVec3, Sampler};
+use crate::primitives::{Builder, DAffine3, DVec3, Sampler, dvec3};
 use body::Measures;
 use pose::Pose;
 
@@ -58,7 +58,7 @@ fn figure(b: &mut Builder, s: &mut Sampler, stature_m: f64) {
     clothes::below_waist(b, s, &measures, &pose);
     for (side, hand) in [-1.0, 1.0].into_iter().zip(pose.hands) {
         let shoulder = trunk.transform_point3(measures.shoulder(side));
-        measures.arm(b, shoulder, hand, DVec3::new(-0.7, 0.5 * side, -0.7));
+        measures.arm(b, shoulder, hand, dvec3(-0.7, 0.5 * side, -0.7));
     }
     carried::build(b, s, &carried, &measures, trunk);
 }

@@ -2,10 +2,7 @@ pub mod lamp_post;
 pub mod traffic_light;
 pub mod traffic_sign;
 
-use crate::primitives::{
-    Builder, DVec2, DVec3, Makes, Profile, Sampler, Section, block, cushion, cylinder, ellipsoid,
-    frustum, outline, prism, rod,
-};
+use crate::primitives::*;
 
 pub const MAKES: Makes =
     &[(3, bollard), (4, post), (3, utility), (4, pillar), (1, delineator), (2, meter)];
@@ -43,12 +40,11 @@ fn post(b: &mut Builder, s: &mut Sampler) {
     let section = draw_section(s);
     let lean_m = s.uniform(-0.08, 0.08) * height_m;
     if s.chance(0.3) {
-        let top = DVec3::new(lean_m, 0.0, height_m);
-        return rod(b, DVec3::ZERO, top, [radius_m, radius_m]);
+        return rod(b, DVec3::ZERO, dvec3(lean_m, 0.0, height_m), [radius_m, radius_m]);
     }
     shaft(b, [radius_m, radius_m], height_m, section);
     if s.chance(0.3) {
-        cushion(b, 0.02 * DVec3::Z, DVec3::new(4.0 * radius_m, 4.0 * radius_m, 0.04), 0.01);
+        cushion(b, 0.02 * DVec3::Z, dvec3(4.0 * radius_m, 4.0 * radius_m, 0.04), 0.01);
     }
 }
 
@@ -61,18 +57,17 @@ fn utility(b: &mut Builder, s: &mut Sampler) {
     let half_m = s.uniform(0.5, 0.95);
     for arm in 0..s.count(0, 2) {
         let z = height_m - 0.3 - 0.8 * arm as f64;
-        block(b, z * DVec3::Z, DVec3::new(0.1, 2.0 * half_m, 0.12));
+        block(b, z * DVec3::Z, dvec3(0.1, 2.0 * half_m, 0.12));
         for y in [-0.9, -0.4, 0.4, 0.9] {
-            cylinder(b, DVec3::new(0.0, y * half_m, z + 0.06), 0.05, 0.15);
+            cylinder(b, dvec3(0.0, y * half_m, z + 0.06), 0.05, 0.15);
         }
     }
     if s.chance(0.25) {
-        let side = DVec3::new(radius_m + 0.25, 0.0, height_m - 2.5);
-        cylinder(b, side, 0.25, 0.9);
+        cylinder(b, dvec3(radius_m + 0.25, 0.0, height_m - 2.5), 0.25, 0.9);
     }
     if s.chance(0.3) {
         let z = s.uniform(0.8, 1.8);
-        block(b, DVec3::new(radius_m + 0.1, 0.0, z), DVec3::new(0.2, 0.3, 0.5));
+        block(b, dvec3(radius_m + 0.1, 0.0, z), dvec3(0.2, 0.3, 0.5));
     }
 }
 
@@ -85,7 +80,7 @@ fn pillar(b: &mut Builder, s: &mut Sampler) {
     let sections = [(4, Section::Round), (2, square), (1, Section::Polygon(8)), (1, fluted)];
     let section = s.weighted(&sections);
     if s.chance(0.4) {
-        let size = DVec3::new(2.0 * radius_m, radius_m * s.uniform(0.6, 3.9), height_m);
+        let size = dvec3(2.0 * radius_m, radius_m * s.uniform(0.6, 3.9), height_m);
         block(b, 0.5 * size * DVec3::Z, size);
     } else {
         shaft(b, [radius_m, radius_m * s.uniform(0.8, 1.0)], height_m, section);
@@ -94,15 +89,14 @@ fn pillar(b: &mut Builder, s: &mut Sampler) {
     for z in [0.05, 0.97] {
         if s.chance(0.4) {
             let high_m = s.uniform(0.08, 0.3);
-            block(b, z * height_m * DVec3::Z, DVec3::new(wide_m, wide_m, high_m));
+            block(b, z * height_m * DVec3::Z, dvec3(wide_m, wide_m, high_m));
         }
     }
 }
 
 /// A delineator beside a road: a hollow three-sided post, 1.05 m high (Germany's HLB).
 fn delineator(b: &mut Builder, s: &mut Sampler) {
-    let half = DVec2::new(0.04, 0.06) * s.uniform(0.8, 1.3);
-    let section = outline::ellipse(half, s.pick(&[3, 8]));
+    let section = outline::ellipse(dvec2(0.04, 0.06) * s.uniform(0.8, 1.3), s.pick(&[3, 8]));
     prism(b, &section, 0.0, s.uniform(0.9, 1.1), s.uniform(0.8, 1.0));
 }
 
@@ -110,7 +104,7 @@ fn delineator(b: &mut Builder, s: &mut Sampler) {
 /// a letter box, a charging point.
 fn meter(b: &mut Builder, s: &mut Sampler) {
     let height_m = s.uniform(1.1, 1.9);
-    let size = DVec3::new(s.uniform(0.12, 0.4), s.uniform(0.18, 0.5), s.uniform(0.2, 0.9));
+    let size = dvec3(s.uniform(0.12, 0.4), s.uniform(0.18, 0.5), s.uniform(0.2, 0.9));
     let radius_m = s.uniform(0.025, 0.09);
     shaft(b, [radius_m, radius_m], height_m - 0.5 * size.z, draw_section(s));
     cushion(b, (height_m - 0.5 * size.z) * DVec3::Z, size, 0.04);

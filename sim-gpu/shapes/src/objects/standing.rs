@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use sim_gpu::internals::mesh::TriangleMesh;
+use edgepuck_mesh::TriangleMesh;
 
 use crate::tessellation::bounds;
 

@@ -1,8 +1,7 @@
 use std::collections::BTreeSet;
 
-use glam::DVec3;
-
 use super::{ObjectKind, object};
+use crate::tessellation::bounds;
 
 const SEED: u64 = 5;
 const INSTANCES: u32 = 8;
@@ -61,9 +60,7 @@ fn every_object_is_a_sound_mesh_that_stands_about_the_origin_at_its_kind_s_size(
         }
         assert!(object.glass.start <= object.glass.end, "{what}");
         assert_eq!(object.glass.end as usize, mesh.triangles.len(), "{what}: glass comes last");
-        let vertices = object.mesh.vertices.iter().copied();
-        let low = vertices.clone().fold(DVec3::INFINITY, DVec3::min);
-        let high = vertices.fold(DVec3::NEG_INFINITY, DVec3::max);
+        let [low, high] = bounds(mesh);
         assert_eq!(low.z, 0.0, "{what}");
         // Two roundings of a few metres.
         assert!((low + high).truncate().length() < 1e-12, "{what}: {low} to {high}");

@@ -1,5 +1,6 @@
 //! The surfaces from which shapes are built. Class files import all their tools from here,
-//! including the builder and the sampler.
+//! including the builder and the sampler: those that need many of them as a prelude,
+//! `use crate::primitives::*`.
 
 mod block;
 mod loft;
@@ -16,7 +17,7 @@ mod tests;
 pub use super::builder::Builder;
 pub use super::sampler::Sampler;
 pub use block::{block, block_between, cushion};
-pub use glam::{DAffine3, DVec2, DVec3};
+pub use glam::{DAffine3, DVec2, DVec3, dvec2, dvec3};
 pub use loft::{cap, cap_start, loft, prism, skin};
 pub use revolve::{Profile, Section, cylinder, ellipsoid, frustum};
 pub use sheet::{board, sheet};

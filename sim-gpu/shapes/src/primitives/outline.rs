@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, dvec2, dvec3};
 
 pub fn ellipse(half: DVec2, n: usize) -> Vec<DVec2> {
     superellipse(half, 2.0, n)
@@ -13,14 +13,12 @@ pub fn superellipse(half: DVec2, exponent: f64, n: usize) -> Vec<DVec2> {
     let power = |value: f64| value.signum() * libm::pow(value.abs(), 2.0 / exponent);
     (0..n)
         .map(|k| libm::sincos(k as f64 / n as f64 * TAU))
-        .map(|(sin, cos)| DVec2::new(power(cos), power(sin)) * half)
+        .map(|(sin, cos)| dvec2(power(cos), power(sin)) * half)
         .collect()
 }
 
 pub fn rectangle(half: DVec2) -> Vec<DVec2> {
-    [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
-        .map(|(x, y)| DVec2::new(x, y) * half)
-        .to_vec()
+    [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| dvec2(x, y) * half).to_vec()
 }
 
 /// A rectangle with corners of `radius` in `n_corner` segments each; `radius` is at most half the
@@ -33,7 +31,7 @@ pub fn rounded_rectangle(half: DVec2, radius: f64, n_corner: usize) -> Vec<DVec2
     for (quarter, (x, y)) in corners.into_iter().enumerate() {
         for k in 0..=n_corner {
             let angle_rad = (quarter as f64 + k as f64 / n_corner as f64) * FRAC_PI_2;
-            outline.push(DVec2::new(x, y) * inner + radius * DVec2::from_angle(angle_rad));
+            outline.push(dvec2(x, y) * inner + radius * DVec2::from_angle(angle_rad));
         }
     }
     outline
@@ -53,14 +51,19 @@ pub fn airfoil(thickness: f64, n: usize) -> Vec<DVec2> {
     let station = |k: usize| 0.5 - 0.5 * libm::cos(k as f64 / n as f64 * TAU / 2.0);
     let lower = (0..n).map(|k| (station(k), -1.0));
     let upper = (1..=n).rev().map(|k| (station(k), 1.0));
-    lower.chain(upper).map(|(x, side)| DVec2::new(x, side * half_thickness(x).max(0.0))).collect()
+    lower.chain(upper).map(|(x, side)| dvec2(x, side * half_thickness(x).max(0.0))).collect()
 }
 
 /// An upright rectangle across x, between the heights `low` and `high`.
 pub fn upright(x: f64, half_y: f64, [low, high]: [f64; 2]) -> Vec<DVec3> {
     [(-half_y, low), (-half_y, high), (half_y, high), (half_y, low)]
-        .map(|(y, z)| DVec3::new(x, y, z))
+        .map(|(y, z)| dvec3(x, y, z))
         .to_vec()
+}
+
+/// An outline in the plane across x about `centre`; its x points along y, its y upwards.
+pub fn across_x(outline: &[DVec2], centre: DVec3) -> Vec<DVec3> {
+    outline.iter().map(|p| centre + dvec3(0.0, p.x, p.y)).collect()
 }
 
 pub fn at_height(outline: &[DVec2], z: f64) -> Vec<DVec3> {
@@ -78,7 +81,7 @@ mod tests {
 
     #[test]
     fn outlines_run_counter_clockwise_and_enclose_their_areas() {
-        let half = DVec2::new(2.0, 1.0);
+        let half = dvec2(2.0, 1.0);
         // An inscribed polygon of n sides lacks (2 pi / n)^2 / 6 of the area: 1e-3 of it at n = 80.
         let pi = TAU / 2.0;
         assert!((area(&ellipse(half, 80)) / (2.0 * pi) - 1.0).abs() < 1.1e-3);

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use glam::{DAffine3, DVec2, DVec3};
+use glam::{DAffine3, DVec2, DVec3, dvec2, dvec3};
 
 use super::{Builder, smooth};
 
@@ -21,18 +21,18 @@ enum Span {
 
 impl Profile {
     pub fn from(radius_m: f64, height_m: f64) -> Self {
-        Self { corners: vec![DVec2::new(radius_m, height_m)], spans: Vec::new() }
+        Self { corners: vec![dvec2(radius_m, height_m)], spans: Vec::new() }
     }
 
     pub fn line(mut self, radius_m: f64, height_m: f64) -> Self {
-        self.corners.push(DVec2::new(radius_m, height_m));
-        self.spans.push(Span::Line(DVec2::new(radius_m, height_m)));
+        self.corners.push(dvec2(radius_m, height_m));
+        self.spans.push(Span::Line(dvec2(radius_m, height_m)));
         self
     }
 
     /// Continues with a smooth curve through `points` of (radius, height).
     pub fn curve(mut self, points: &[(f64, f64)]) -> Self {
-        let points: Vec<_> = points.iter().map(|&(r, z)| DVec2::new(r, z)).collect();
+        let points: Vec<_> = points.iter().map(|&(r, z)| dvec2(r, z)).collect();
         self.corners.extend(points.last());
         self.spans.push(Span::Curve(points));
         self
@@ -58,7 +58,7 @@ impl Profile {
                     let through: Vec<_> =
                         std::iter::once(start).chain(points).map(|p| p.extend(0.0)).collect();
                     let curve = smooth(b, &through, 2);
-                    path.extend(curve[1..].iter().map(|p| DVec2::new(p.x.max(0.0), p.y)));
+                    path.extend(curve[1..].iter().map(|p| dvec2(p.x.max(0.0), p.y)));
                 }
             }
         }
@@ -99,7 +99,7 @@ impl Section {
         let direction = DVec2::from_angle(angle_rad);
         match self {
             Self::Round => direction,
-            Self::Oval(ratio) => direction * DVec2::new(1.0, ratio),
+            Self::Oval(ratio) => direction * dvec2(1.0, ratio),
             Self::Square(exponent) => {
                 let sum =
                     libm::pow(direction.abs().x, exponent) + libm::pow(direction.abs().y, exponent);
@@ -126,7 +126,7 @@ pub fn revolve(b: &mut Builder, profile: &[DVec2], section: Section, twist_rad: 
         .iter()
         .map(|p| {
             if p.x <= 1e-9 {
-                return vec![DVec3::new(0.0, 0.0, p.y)];
+                return vec![dvec3(0.0, 0.0, p.y)];
             }
             let turn = DVec2::from_angle(twist_rad * p.y);
             let angle_rad = |k: usize| k as f64 / n as f64 * TAU;
@@ -155,7 +155,7 @@ pub fn ellipsoid(b: &mut Builder, centre: DVec3, radii_m: DVec3) {
     let n = b.curved(FRAC_PI_2 * 2.0 * widest_m, 6);
     let meridian: Vec<_> = (0..=n)
         .map(|k| libm::sincos(k as f64 / n as f64 * FRAC_PI_2 * 2.0))
-        .map(|(sin, cos)| widest_m * DVec2::new(sin, -cos))
+        .map(|(sin, cos)| widest_m * dvec2(sin, -cos))
         .collect();
     let scaled = DAffine3::from_scale(radii_m / widest_m);
     b.place(DAffine3::from_translation(centre) * scaled, |b| {

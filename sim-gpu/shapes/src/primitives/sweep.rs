@@ -1,6 +1,6 @@
 //! Surfaces swept along a path: rods, handles, rails, cords.
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, dvec2};
 
 use super::{Builder, loft, outline, smooth};
 
@@ -30,8 +30,7 @@ pub fn rod(b: &mut Builder, from: DVec3, to: DVec3, radii_m: [f64; 2]) {
 /// A bar of rectangular section. `width_m` is its level side where the direction allows it,
 /// `height_m` the other one.
 pub fn bar(b: &mut Builder, from: DVec3, to: DVec3, width_m: f64, height_m: f64) {
-    let section = outline::rectangle(DVec2::new(width_m, height_m) / 2.0);
-    sweep(b, &[from, to], &section);
+    sweep(b, &[from, to], &outline::rectangle(dvec2(width_m, height_m) / 2.0));
 }
 
 /// Sweeps `section` (x level, y up where the path allows it) along `path` without twisting it, and

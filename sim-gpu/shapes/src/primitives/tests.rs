@@ -1,6 +1,6 @@
 use std::f64::consts::PI;
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, dvec3};
 
 use super::revolve::revolve;
 use super::*;
@@ -42,10 +42,10 @@ const ROUNDING: f64 = 1e-12;
 #[test]
 fn flat_solids_enclose_their_volumes_however_finely_divided() {
     let square = outline::rectangle(DVec2::splat(0.5));
-    let flat = |u: f64, v: f64| DVec3::new(2.0 * u, 3.0 * v, 0.0);
-    let down = DVec3::new(0.0, 0.0, -0.1);
+    let flat = |u: f64, v: f64| dvec3(2.0 * u, 3.0 * v, 0.0);
+    let down = dvec3(0.0, 0.0, -0.1);
     for edge_m in [f64::INFINITY, 0.3] {
-        let size = DVec3::new(1.0, 2.0, 3.0);
+        let size = dvec3(1.0, 2.0, 3.0);
         encloses("block", edge_m, (6.0, ROUNDING), |b| block(b, DVec3::ONE, size));
         covers("block", edge_m, 22.0, |b| block(b, DVec3::ONE, size));
         encloses("prism", edge_m, (3.0, ROUNDING), |b| prism(b, &square, 1.0, 4.0, 1.0));
@@ -64,7 +64,7 @@ fn solids_of_revolution_enclose_their_volumes() {
     // Chords of length e on a circle of radius r lack e^2 / (6 r^2) of its area; a sphere lacks it
     // in both directions: under 0.4 % at e = 0.1.
     encloses("cylinder", 0.1, (2.0 * PI, 4e-3), |b| cylinder(b, DVec3::ONE, 1.0, 2.0));
-    let radii = DVec3::new(1.0, 2.0, 3.0) / 2.0;
+    let radii = dvec3(1.0, 2.0, 3.0) / 2.0;
     encloses("ellipsoid", 0.1, (PI, 4e-3), |b| ellipsoid(b, DVec3::X, radii));
     let profile = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(DVec2::from);
     for (section, area) in [
@@ -96,7 +96,7 @@ fn a_vessel_holds_the_volume_of_its_material_and_a_sheet_has_one_side() {
 
 #[test]
 fn a_rod_is_closed_whichever_way_it_points() {
-    for to in [DVec3::X, DVec3::Y, DVec3::Z, -DVec3::Z, DVec3::new(0.6, 0.0, 0.8)] {
+    for to in [DVec3::X, DVec3::Y, DVec3::Z, -DVec3::Z, dvec3(0.6, 0.0, 0.8)] {
         // Sixty-three sides lack (2 pi / 63)^2 / 6 = 0.17 % of the disc.
         let exact = (PI * 0.01, 2e-3);
         encloses(&format!("to {to}"), 0.01, exact, |b| rod(b, DVec3::ZERO, to, [0.1, 0.1]));
@@ -109,5 +109,5 @@ fn a_level_bar_is_as_wide_and_high_as_asked() {
     bar(&mut b, DVec3::ZERO, DVec3::X, 0.4, 0.1);
     let (mesh, _) = b.finish();
     let high = mesh.vertices.iter().copied().reduce(DVec3::max);
-    assert!(high.is_some_and(|h| h.distance(DVec3::new(1.0, 0.2, 0.05)) < 1e-12), "{high:?}");
+    assert!(high.is_some_and(|h| h.distance(dvec3(1.0, 0.2, 0.05)) < 1e-12), "{high:?}");
 }

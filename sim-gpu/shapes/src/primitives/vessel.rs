@@ -1,6 +1,6 @@
 //! Hollow bodies with an open mouth: bowls, cups, vases, shades.
 
-use glam::DVec2;
+use glam::{DVec2, dvec2};
 
 use super::revolve::revolve;
 use super::{Builder, Profile, Sampler, Section};
@@ -45,8 +45,7 @@ impl Vessel {
         let mut profile = self.outside.sample(b);
         if let Wall::Solid(thickness_m) = self.wall {
             let floor_m = self.hollow_from_m.max(profile[0].y) + thickness_m;
-            let inside = inside(&profile, thickness_m, floor_m);
-            profile.extend(inside);
+            profile.extend(inside(&profile, thickness_m, floor_m));
         }
         revolve(b, &profile, self.section, self.twist_rad);
     }
@@ -72,10 +71,10 @@ fn inside(outside: &[DVec2], thickness_m: f64, floor_m: f64) -> Vec<DVec2> {
             break;
         }
         // A neck that is narrower than its walls leaves no hollow.
-        points.push(DVec2::new(point.x.max(0.25 * thickness_m), point.y));
+        points.push(dvec2(point.x.max(0.25 * thickness_m), point.y));
     }
     if has_bottom {
-        points.push(DVec2::new(0.0, points.last().map_or(floor_m, |lowest| lowest.y)));
+        points.push(dvec2(0.0, points.last().map_or(floor_m, |lowest| lowest.y)));
     }
     points
 }

@@ -1,5 +1,5 @@
 use super::Top;
-use crate::primitives::{Builder, DVec3, Sampler, block, block_between};
+use crate::primitives::{Builder, DVec3, Sampler, block, block_between, dvec3};
 
 /// A desk with a cabinet at one end and a panel or a second cabinet at the other.
 pub fn desk(b: &mut Builder, s: &mut Sampler, top: &Top) {
@@ -12,25 +12,25 @@ pub fn desk(b: &mut Builder, s: &mut Sampler, top: &Top) {
         if side > 0.0 || both {
             cabinet(b, top, y, wide_m, n_drawers, handle_m);
         } else {
-            let edge = DVec3::new(-0.92 * top.half.x, -0.96 * top.half.y, 0.0);
-            block_between(b, edge, edge * DVec3::new(-1.0, 0.93, 1.0) + top.under_m() * DVec3::Z);
+            let edge = dvec3(-0.92 * top.half.x, -0.96 * top.half.y, 0.0);
+            block_between(b, edge, edge * dvec3(-1.0, 0.93, 1.0) + top.under_m() * DVec3::Z);
         }
     }
-    let back = DVec3::new(0.85 * top.half.x, 0.0, 0.65 * top.height_m);
-    block(b, back, DVec3::new(0.02, 1.85 * top.half.y, 0.6 * top.height_m));
+    let back = dvec3(0.85 * top.half.x, 0.0, 0.65 * top.height_m);
+    block(b, back, dvec3(0.02, 1.85 * top.half.y, 0.6 * top.height_m));
 }
 
 /// A box under the top with `n` drawers on the side of -x.
 fn cabinet(b: &mut Builder, top: &Top, y: f64, wide_m: f64, n: usize, handle_m: f64) {
     let low_m = 0.06 * top.height_m;
     let deep_m = 0.9 * top.half.x;
-    let corner = DVec3::new(deep_m, y + 0.5 * wide_m, top.under_m());
-    block_between(b, DVec3::new(-deep_m, y - 0.5 * wide_m, low_m), corner);
+    let corner = dvec3(deep_m, y + 0.5 * wide_m, top.under_m());
+    block_between(b, dvec3(-deep_m, y - 0.5 * wide_m, low_m), corner);
     let high_m = (top.under_m() - low_m) / n as f64;
     for drawer in 0..n {
         let z = low_m + (drawer as f64 + 0.5) * high_m;
-        let front = DVec3::new(-deep_m - 0.01, y, z);
-        block(b, front, DVec3::new(0.02, 0.92 * wide_m, 0.88 * high_m));
-        block(b, front - 0.02 * DVec3::X, DVec3::new(0.02, handle_m, 0.015));
+        let front = dvec3(-deep_m - 0.01, y, z);
+        block(b, front, dvec3(0.02, 0.92 * wide_m, 0.88 * high_m));
+        block(b, front - 0.02 * DVec3::X, dvec3(0.02, handle_m, 0.015));
     }
 }

@@ -5,8 +5,8 @@ use glam::DVec3;
 use super::soundness::corners;
 use crate::sampler::Sampler;
 use crate::tessellation::bounds;
+use edgepuck_mesh::TriangleMesh;
 use formats::rng::StreamKey;
-use sim_gpu::internals::mesh::TriangleMesh;
 
 const BINS: usize = 24;
 const PAIRS: usize = 4000;

@@ -3,7 +3,7 @@ use rayon::prelude::*;
 
 use super::{SEED, ShapeClass, for_all, generate};
 use crate::tessellation::bounds;
-use sim_gpu::internals::mesh::TriangleMesh;
+use edgepuck_mesh::TriangleMesh;
 
 pub fn corners(mesh: &TriangleMesh, triangle: [u32; 3]) -> [DVec3; 3] {
     triangle.map(|i| mesh.vertices[i as usize])

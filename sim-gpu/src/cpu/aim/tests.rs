@@ -98,7 +98,7 @@ fn rays_start_before_their_object_and_near_it() {
 }
 
 #[test]
-fn what_whole_numbers_cannot_hold_is_left_to_f64() {
+fn poses_beyond_whole_numbers_are_left_to_f64() {
     let fixed = |origin, map: &DMat3| FixedFrame::new(origin, map, RADIUS);
     assert!(fixed(DVec3::X * 128.0, &DMat3::IDENTITY).is_some());
     for origin in [DVec3::X * 128.001, DVec3::splat(f64::NAN), DVec3::splat(f64::INFINITY)] {

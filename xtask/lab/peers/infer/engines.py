@@ -1,5 +1,5 @@
-"""General inference engines, each with the options its makers advise for one
-cloud at a time on a given number of threads.
+"""Inference engines, each with the options its makers advise for one cloud at a
+time on one thread.
 
 Where an engine can run the model in more than one form, each is tried at every
 size and the fastest is kept.
@@ -7,7 +7,24 @@ size and the fastest is kept.
 
 import graph
 import numpy
+from pointnet import log_softmax
 from turns import fastest
+
+
+class Edgepuck:
+    """The Python package, which classifies on one thread."""
+
+    def __init__(self, folder, precision):
+        import edgepuck
+
+        self.version = edgepuck.__version__
+        self.classifier = edgepuck.Classifier(folder / "model.safetensors", precision=precision)
+
+    def load(self, points):
+        self.run = lambda: self.classifier(points)
+
+    def answer(self, prediction):
+        return log_softmax(prediction.logits.astype(numpy.float64))
 
 
 class OnnxRuntime:
@@ -18,13 +35,13 @@ class OnnxRuntime:
         self.version = onnxruntime.__version__
         self.files = [folder / f"{form}{suffix}.onnx" for form in graph.FORMS]
 
-    def load(self, points, threads):
+    def load(self, points):
         channels_first = numpy.ascontiguousarray(points.T[None])
-        self.run = fastest([self.ready(file, channels_first, threads) for file in self.files])
+        self.run = fastest([self.ready(file, channels_first) for file in self.files])
 
-    def ready(self, file, x, threads):
+    def ready(self, file, x):
         options = self.onnxruntime.SessionOptions()
-        options.intra_op_num_threads = threads
+        options.intra_op_num_threads = 1
         options.inter_op_num_threads = 1
         session = self.onnxruntime.InferenceSession(
             file, options, providers=["CPUExecutionProvider"]
@@ -57,15 +74,16 @@ class OpenVino:
             raise RuntimeError("this processor has no bf16 arithmetic")
         self.files = [folder / f"{form}{suffix}.onnx" for form in graph.FORMS]
 
-    def load(self, points, threads):
-        channels_first = numpy.ascontiguousarray(points.T[None])
-        self.run = fastest([self.ready(file, channels_first, threads) for file in self.files])
+    def load(self, points):
+        # OpenVINO and ncnn do not keep an array alive whose memory they use.
+        self.x = numpy.ascontiguousarray(points.T[None])
+        self.run = fastest([self.ready(file, self.x) for file in self.files])
 
-    def ready(self, file, x, threads):
+    def ready(self, file, x):
         model = self.core.read_model(file)
         model.reshape(list(x.shape))
         options = {
-            "INFERENCE_NUM_THREADS": threads,
+            "INFERENCE_NUM_THREADS": 1,
             "INFERENCE_PRECISION_HINT": self.precision,
             "PERFORMANCE_HINT": "LATENCY",
         }
@@ -91,17 +109,15 @@ class Ncnn:
         self.storage = storage
         self.stem = f"{folder}/{{form}}{suffix}".format
 
-    def load(self, points, threads):
-        image = self.ncnn.Mat(numpy.ascontiguousarray(points.T[:, None])).clone()
-        rows = self.ncnn.Mat(points).clone()
-        self.run = fastest(
-            [self.ready("image", image, threads), self.ready("rows", rows, threads)]
-        )
+    def load(self, points):
+        self.arrays = numpy.ascontiguousarray(points.T[:, None]), numpy.ascontiguousarray(points)
+        image, rows = (self.ncnn.Mat(array).clone() for array in self.arrays)
+        self.run = fastest([self.ready("image", image), self.ready("rows", rows)])
 
-    def ready(self, form, x, threads):
+    def ready(self, form, x):
         net = self.ncnn.Net()
         options = net.opt
-        options.num_threads = threads
+        options.num_threads = 1
         options.use_vulkan_compute = False
         if self.storage != "f16":
             # On by default.

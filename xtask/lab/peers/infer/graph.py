@@ -8,6 +8,7 @@ as the rows of matrices.
 import numpy
 import onnx
 from onnx import TensorProto, helper, numpy_helper
+from pointnet import Folded
 
 OPSET = 18
 IR_VERSION = 9
@@ -59,13 +60,23 @@ class Graph:
         return self.op("Relu", [linear(f"{key}.linear")], key)
 
 
-class Image(Graph):
+class Form(Graph, Folded):
+    """A PointNet whose layers of points are a form's own."""
+
+    def layer(self, name, x, relu=True):
+        return (self.shared if "conv" in name else self.dense)(name, x, relu)
+
+    def matrix(self, x, side, key):
+        return self.op("Reshape", [x, self.shape(1, side, side)], f"{key}.matrix")
+
+
+class Image(Form):
     """Points lie along the last axis of [1, channels, 1, n]."""
 
     def enter(self):
         return self.op("Unsqueeze", ["x", self.shape(2)], "points")
 
-    def shared(self, key, x, relu=True):
+    def shared(self, key, x, relu):
         weights, bias = self.layers[key]
         kernel = self.constant(f"{key}.w", weights[:, :, None, None])
         inputs = [x, kernel, self.constant(f"{key}.b", bias)]
@@ -82,20 +93,20 @@ class Image(Graph):
     def pooled(self, x, name):
         return self.op("Flatten", [self.op("GlobalMaxPool", [x], f"{name}.max")], name)
 
-    def turned(self, x, matrix, name):
+    def turned(self, x, matrix, side, name):
         transposed = self.op("Transpose", [matrix], f"{name}.matrix", perm=[0, 2, 1])
         flat = self.op("Squeeze", [x, self.shape(2)], f"{name}.flat")
         turned = self.op("MatMul", [transposed, flat], f"{name}.turned")
         return self.op("Unsqueeze", [turned, self.shape(2)], name)
 
 
-class Rows(Graph):
+class Rows(Form):
     """Points are the rows of [1, n, channels]."""
 
     def enter(self):
         return self.op("Transpose", ["x"], "points", perm=[0, 2, 1])
 
-    def shared(self, key, x, relu=True):
+    def shared(self, key, x, relu):
         weights, bias = self.layers[key]
         product = self.op("MatMul", [x, self.constant(f"{key}.w", weights.T)], f"{key}.product")
         inputs = [product, self.constant(f"{key}.b", bias)]
@@ -104,28 +115,14 @@ class Rows(Graph):
     def pooled(self, x, name):
         return self.op("ReduceMax", [x, self.shape(1)], name, keepdims=0)
 
-    def turned(self, x, matrix, name):
+    def turned(self, x, matrix, side, name):
         return self.op("MatMul", [x, matrix], name)
 
 
 def pointnet(layers, form):
     """The model of `layers`, as `pointnet.layers` gives them, in `form`."""
     graph = {"image": Image, "rows": Rows}[form](layers)
-
-    def t_net(key, x, side):
-        for layer in ("conv1", "conv2", "conv3"):
-            x = graph.shared(f"{key}.{layer}", x)
-        x = graph.pooled(x, f"{key}.global")
-        x = graph.dense(f"{key}.fc2", graph.dense(f"{key}.fc1", x))
-        x = graph.dense(f"{key}.fc3", x, relu=False)
-        return graph.op("Reshape", [x, graph.shape(1, side, side)], f"{key}.matrix")
-
-    x = graph.enter()
-    x = graph.turned(x, t_net("feat.stn", x, 3), "turned")
-    x = graph.shared("feat.conv1", x)
-    x = graph.turned(x, t_net("feat.fstn", x, 64), "features")
-    x = graph.shared("feat.conv3", graph.shared("feat.conv2", x), relu=False)
-    x = graph.dense("fc2", graph.dense("fc1", graph.pooled(x, "global")))
-    graph.op("LogSoftmax", [graph.dense("fc3", x, relu=False)], "logp", axis=1)
+    logits, _ = graph.logits(graph.enter())
+    graph.op("LogSoftmax", [logits], "logp", axis=1)
     classes = len(layers["fc3"][1])
     return graph.model("pointnet", {"x": [1, 3, "n"]}, {"logp": [1, classes]})

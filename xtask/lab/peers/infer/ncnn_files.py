@@ -7,6 +7,7 @@ compute in eight bits.
 """
 
 import numpy
+from pointnet import Folded
 
 MAGIC = 7767517
 # Before weights: plain f32.
@@ -17,75 +18,56 @@ SCALED = 1
 I8_LARGEST = 127
 
 
-class Net:
+class Net(Folded):
     def __init__(self, layers, form, ranges=None):
-        self.layers = layers
+        super().__init__(layers)
         self.form = form
         self.ranges = ranges
         self.lines = []
         self.weights = []
 
-    def layer(self, kind, inputs, output, **parameters):
+    def add(self, kind, inputs, output, **parameters):
         numbered = {f"{key[1:]}": value for key, value in parameters.items()}
         self.lines.append((kind, inputs, output, numbered))
         return output
 
-    def linear(self, kind, key, x, relu, **parameters):
-        weights, bias = self.layers[key]
+    def layer(self, name, x, relu=True):
+        weights, bias = self.layers[name]
         self.weights += [RAW_F32, weights, bias]
-        activation = RELU if relu else 0
+        kind, parameters = "InnerProduct", {"_1": 1, "_2": weights.size}
+        if self.form == "image" and "conv" in name:
+            kind, parameters = "Convolution", {"_1": 1, "_5": 1, "_6": weights.size}
         if self.ranges:
             largest = numpy.abs(weights).max(1)
-            scales = I8_LARGEST / numpy.append(largest, self.ranges[key])
+            scales = I8_LARGEST / numpy.append(largest, self.ranges[name])
             self.weights.append(scales.astype(numpy.float32))
             parameters["_8"] = SCALED
-        return self.layer(kind, [x], key, _0=len(bias), _9=activation, **parameters)
-
-    def dense(self, key, x, relu=True):
-        size = self.layers[key][0].size
-        return self.linear("InnerProduct", key, x, relu, _1=1, _2=size)
-
-    def shared(self, key, x, relu=True):
-        if self.form == "rows":
-            return self.dense(key, x, relu)
-        size = self.layers[key][0].size
-        return self.linear("Convolution", key, x, relu, _1=1, _5=1, _6=size)
+        return self.add(kind, [x], name, _0=len(bias), _9=RELU if relu else 0, **parameters)
 
     def pooled(self, x, name):
         if self.form == "rows":
             # The maximum over the outermost axis.
-            return self.layer("Reduction", [x], name, _0=4, _1=0, **{"_-23303": "1,0"}, _5=1)
-        return self.layer("Pooling", [x], name, _0=0, _4=1)
+            return self.add("Reduction", [x], name, _0=4, _1=0, **{"_-23303": "1,0"}, _5=1)
+        return self.add("Pooling", [x], name, _0=0, _4=1)
 
-    def turned(self, x, matrix, channels, name):
+    def turned(self, x, matrix, side, name):
         if self.form == "rows":
-            return self.layer("Gemm", [x, matrix], name)
-        flat = self.layer("Reshape", [x], f"{name}.flat", _0=-1, _1=channels)
+            return self.add("Gemm", [x, matrix], name)
+        flat = self.add("Reshape", [x], f"{name}.flat", _0=-1, _1=side)
         # The first factor transposed.
-        turned = self.layer("Gemm", [matrix, flat], f"{name}.turned", _2=1)
-        return self.layer("Reshape", [turned], name, _0=-1, _1=1, _2=channels)
+        turned = self.add("Gemm", [matrix, flat], f"{name}.turned", _2=1)
+        return self.add("Reshape", [turned], name, _0=-1, _1=1, _2=side)
 
-    def t_net(self, key, x, side):
-        for layer in ("conv1", "conv2", "conv3"):
-            x = self.shared(f"{key}.{layer}", x)
-        x = self.pooled(x, f"{key}.global")
-        x = self.dense(f"{key}.fc2", self.dense(f"{key}.fc1", x))
-        x = self.dense(f"{key}.fc3", x, relu=False)
-        return self.layer("Reshape", [x], f"{key}.matrix", _0=side, _1=side)
+    def matrix(self, x, side, key):
+        return self.add("Reshape", [x], f"{key}.matrix", _0=side, _1=side)
 
 
 def write(layers, form, stem, ranges=None):
     """Writes `stem`.param and `stem`.bin; blob `logp` is the answer."""
     net = Net(layers, form, ranges)
-    x = net.layer("Input", [], "x")
-    x = net.turned(x, net.t_net("feat.stn", x, 3), 3, "turned")
-    x = net.shared("feat.conv1", x)
-    x = net.turned(x, net.t_net("feat.fstn", x, 64), 64, "features")
-    x = net.shared("feat.conv3", net.shared("feat.conv2", x), relu=False)
-    x = net.dense("fc2", net.dense("fc1", net.pooled(x, "global")))
-    x = net.layer("Softmax", [net.dense("fc3", x, relu=False)], "p", _0=0, _1=1)
+    logits, _ = net.logits(net.add("Input", [], "x"))
     # The logarithm.
-    net.layer("UnaryOp", [x], "logp", _0=8)
+    net.add("UnaryOp", [net.add("Softmax", [logits], "p", _0=0, _1=1)], "logp", _0=8)
     lines = split(net.lines)
     blobs = sum(len(outputs) for _, _, outputs, _ in lines)
     with open(f"{stem}.param", "w") as file:

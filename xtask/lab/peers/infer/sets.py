@@ -14,7 +14,6 @@ and also has a row of its own. Multiplications are those of layers, without thos
 import argparse
 import itertools
 import json
-import platform
 import statistics
 import subprocess
 import sys
@@ -66,7 +65,7 @@ def main():
         print(f"| {name} | {sizes} | {ms[name]:.2f} | {ms[name] / ms['set-64']:.2f} |")
     packages = ("edgepuck", "onnxruntime", "fpsample", "numpy")
     versions = ", ".join(f"{package} {version(package)}" for package in packages)
-    print(f"\n{processor()}, one thread; {versions}")
+    print(f"\n{turns.processor()}, one thread; {versions}")
 
 
 def first_clouds(file):
@@ -158,8 +157,8 @@ def in_turns(runs, clouds, rounds):
     for _ in range(rounds):
         for name, run in runs.items():
             turn = itertools.cycle(clouds)
-            wall_ns = turns.timed(lambda: run(next(turn)), len(clouds))["wall_ns"]
-            medians[name].append(statistics.median(wall_ns) / 1e6)
+            costs = turns.timed(lambda: run(next(turn)), len(clouds))
+            medians[name].append(statistics.median(cost["wall_s"] for cost in costs) * 1e3)
     return {name: statistics.median(ms) for name, ms in medians.items()}
 
 
@@ -169,14 +168,6 @@ def edgepuck_program(*words):
     if done.returncode != 0:
         sys.exit(done.stderr.strip())
     return done.stdout
-
-
-def processor():
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-        return next(line.split(": ")[1] for line in lines if line.startswith("model name"))
-    except (OSError, StopIteration):
-        return platform.processor() or platform.machine()
 
 
 main()

@@ -52,7 +52,7 @@ pub fn open(request: Option<&AdapterRequest>) -> Result<Vec<Backend>> {
         }
     }
     if backends.is_empty() {
-        bail!("expected an adapter of that name; `cargo xtask adapters` lists them");
+        bail!("expected an adapter of that name; `cargo xtask scan --adapter list` lists them");
     }
     Ok(backends)
 }

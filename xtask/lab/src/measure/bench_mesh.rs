@@ -1,11 +1,11 @@
 //! The meshes that a run casts at.
 
 use anyhow::{Result, bail};
+use edgepuck_mesh::frame::{Normalize, to_world};
+use edgepuck_mesh::{TriangleMesh, load, tree};
 use glam::DVec3;
 use harness::meshes::{cuboid, together};
 use sim_gpu::internals::bvh::Builder;
-use sim_gpu::internals::mesh::frame::{Normalize, to_world};
-use sim_gpu::internals::mesh::{TriangleMesh, load, tree};
 use sim_gpu::internals::target::{Surface, Target};
 use std::path::Path;
 
@@ -58,6 +58,6 @@ pub fn real(root: &Path, limit: usize) -> Result<Vec<BenchMesh>> {
     Ok(bench_meshes)
 }
 
-pub fn target(mesh: TriangleMesh, builder: Builder) -> Target {
-    Target::new(Surface::of_mesh(mesh), builder)
+pub fn target(mesh: TriangleMesh) -> Target {
+    Target::new(Surface::of_mesh(mesh), Builder::Sah)
 }

@@ -1,7 +1,8 @@
 //! The machine and the program of a benchmark record.
 
 use serde::Serialize;
-use sim_gpu::internals::gpu::list_adapters;
+use sim_gpu::internals::gpu::{AdapterSummary, list_adapters};
+use std::collections::BTreeMap;
 use std::fs;
 use std::process::Command;
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -22,15 +23,8 @@ pub struct Machine {
     pub system: String,
     /// Mean number of runnable threads over 1, 5 and 15 minutes, on Linux.
     pub load_average: Option<String>,
-    pub adapters: Vec<Adapter>,
-}
-
-#[derive(Clone, Debug, Serialize)]
-pub struct Adapter {
-    pub name: String,
-    pub kind: String,
-    pub backend: String,
-    pub driver: String,
+    /// The name, kind, backend and driver of each adapter.
+    pub adapters: Vec<BTreeMap<&'static str, String>>,
 }
 
 impl Machine {
@@ -45,17 +39,15 @@ impl Machine {
             threads: rayon::current_num_threads(),
             system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
             load_average: load_average(),
-            adapters: list_adapters()
-                .into_iter()
-                .map(|a| Adapter {
-                    name: a.name,
-                    kind: a.kind.to_string(),
-                    backend: a.backend,
-                    driver: a.driver,
-                })
-                .collect(),
+            adapters: list_adapters().into_iter().map(described).collect(),
         }
     }
+}
+
+fn described(adapter: AdapterSummary) -> BTreeMap<&'static str, String> {
+    let AdapterSummary { name, kind, backend, driver, .. } = adapter;
+    let kind = kind.to_string();
+    [("name", name), ("kind", kind), ("backend", backend), ("driver", driver)].into()
 }
 
 /// The peak memory of this process, bytes, where the system states it.

@@ -7,4 +7,3 @@ pub mod clock;
 pub mod machine;
 pub mod methods;
 pub mod ray_set;
-pub mod subprocess;

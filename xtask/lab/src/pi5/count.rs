@@ -45,27 +45,22 @@ impl Counter {
                 "bench --json --threads 1 --repeats {repeats} --sampler {sampler} --from {from} \
                  --points {points} --precision {precision} --model"
             );
-            self.run(&flags, &[&self.model]).map(|(counts, _)| counts)
+            self.run(&flags, &[&self.model])
         };
         Ok(repeated(2)?.less(&repeated(1)?))
     }
 
-    pub fn live(&self, capture: &Path) -> anyhow::Result<(Counts, String)> {
-        let model = self.model.as_path();
-        self.run("live --threads 1", &["--model".as_ref(), model, "--pcap".as_ref(), capture])
-    }
-
-    /// Counts a run of the binary with these flags, then `more`; also gives what it prints.
-    fn run(&self, flags: &str, more: &[&Path]) -> anyhow::Result<(Counts, String)> {
+    /// Counts a run of the binary with these flags, then `more`.
+    fn run(&self, flags: &str, more: &[&Path]) -> anyhow::Result<Counts> {
         let mut qemu = pi_target::emulator().context(pi_target::NO_EMULATOR)?;
         let log = tempfile::NamedTempFile::new_in(&self.folder)?;
         qemu.arg("-plugin").arg(&self.plugin).args(["-d", "plugin", "-D"]).arg(log.path());
-        let printed = workspace::output(qemu.arg(&self.binary).args(flags.split(' ')).args(more))?;
+        workspace::output(qemu.arg(&self.binary).args(flags.split(' ')).args(more))?;
         let log = std::fs::read_to_string(log.path())
             .with_context(|| format!("cannot read {}", log.path().display()))?;
         let counts = Counts::parse(&log);
         ensure!(!counts.0.is_empty(), "QEMU's plugin counted nothing");
-        Ok((counts, printed))
+        Ok(counts)
     }
 }
 
@@ -86,10 +81,6 @@ impl Counts {
 
     fn of(&self, part: &str) -> f64 {
         self.0.iter().filter(|(name, _)| name.contains(part)).map(|(_, count)| count).sum()
-    }
-
-    pub fn all(&self) -> impl Iterator<Item = (&str, f64)> {
-        self.0.iter().map(|(name, count)| (name.as_str(), *count))
     }
 
     /// The instructions outside the inner loops of `stages`, and the share of the vector layers'
@@ -137,10 +128,8 @@ fn is_kernel(name: &str) -> bool {
 /// Whether the function runs on all threads instead of the caller's alone.
 fn is_shared(name: &str) -> bool {
     let parts = [
-        "kernel::",
+        "edgepuck_kernels::",
         "engine::chunks",
-        "edge_conv::",
-        "set_abstraction::",
         "PoolInput::lift",
         "PoolInput::pool",
         "::set_block",
@@ -177,12 +166,12 @@ mod tests {
         let vector = Layer { inputs: 64, outputs: 10 };
         let stages = [
             Stage::Pool { rows: 8, product, screened: false },
-            Stage::Vector { layer: vector, stored: Number::F16 },
+            Stage::Vector { layer: vector, stored: Number::I8 },
         ];
         let mut lines = vec![
-            ("infer_cpu::kernel::neon::tile_f32_8x8", 100.0),
-            ("infer_cpu::kernel::neon::gemv::gemv", 96.0),
-            ("infer_cpu::kernel::neon::tile::max", 7.0),
+            ("edgepuck_kernels::neon::tile_f32_8x8", 100.0),
+            ("edgepuck_kernels::neon::gemv::gemv", 96.0),
+            ("edgepuck_kernels::neon::tile::max", 7.0),
             ("infer_cpu::normalize::to_unit_sphere", 30.0),
         ];
         let (other, columns_read) =

@@ -4,9 +4,6 @@ use super::assembly::{Function, Loop, functions};
 use super::mca::{Cost, Mca};
 use anyhow::{Context, ensure};
 
-/// FMA and dot-product pipes of a Cortex-A76.
-const PIPES: usize = 2;
-
 /// One round of a kernel's inner loop.
 #[derive(Clone, Debug)]
 pub struct Kernel {
@@ -14,15 +11,6 @@ pub struct Kernel {
     /// Products of a round; of farthest point sampling, points.
     pub work: usize,
     pub cost: Cost,
-    /// The core's most products a cycle in the format computed in.
-    pub peak: Option<usize>,
-}
-
-impl Kernel {
-    /// Products a cycle over the core's most.
-    pub fn share_of_peak(&self) -> Option<f64> {
-        self.peak.map(|peak| self.work as f64 / self.cost.cycles / peak as f64)
-    }
 }
 
 #[derive(Clone, Debug)]
@@ -49,7 +37,7 @@ impl Kernels {
     pub fn of(listing: &str, mca: &Mca) -> anyhow::Result<Self> {
         let functions: Vec<(String, Function<'_>)> = functions(listing)
             .map(|function| (demangled(function.symbol), function))
-            .filter(|(name, _)| name.contains("kernel::neon"))
+            .filter(|(name, _)| name.contains("edgepuck_kernels::neon"))
             .collect();
         let tiles = Number::ALL.map(|number| tile(&functions, number, mca));
         let gemv = Number::ALL.map(|number| {
@@ -59,7 +47,7 @@ impl Kernels {
             };
             let kernel = slowest(&functions, "gemv::gemv", products, mca)?;
             let name = format!("gemv, {number:?} weights").to_lowercase();
-            Ok(Kernel { name, peak: None, ..kernel })
+            Ok(Kernel { name, ..kernel })
         });
         // FMINNM lowers the distances of four points.
         let points = |inner: &Loop<'_>| 4 * inner.count("fminnm", "4s");
@@ -67,7 +55,7 @@ impl Kernels {
         Ok(Self {
             tiles: tiles.into_iter().collect::<anyhow::Result<_>>()?,
             gemv: gemv.into_iter().collect::<anyhow::Result<_>>()?,
-            farthest: Kernel { name: "farthest point step".into(), peak: None, ..farthest },
+            farthest: Kernel { name: "farthest point step".into(), ..farthest },
         })
     }
 
@@ -105,11 +93,11 @@ fn tile(functions: &[(String, Function<'_>)], number: Number, mca: &Mca) -> anyh
         kernel.work
     );
     let inputs = kernel.work / (rows * channels);
-    let kernel = Kernel { name, peak: Some(PIPES * products), ..kernel };
+    let kernel = Kernel { name, ..kernel };
     Ok(Tile { kernel, rows, channels, inputs })
 }
 
-/// (8, 16) of a path that ends in `tile_f16_8x16`, perhaps with generics.
+/// (8, 8) of a path that ends in `tile_i8_8x8`, perhaps with generics.
 fn shape(name: &str, prefix: &str) -> Option<(usize, usize)> {
     let (_, shape) = name.split_once(prefix)?;
     let (rows, channels) = shape.split_once('x')?;
@@ -135,7 +123,7 @@ fn slowest(
     for (name, inner) in loops.into_iter().filter(|(_, inner)| work(inner) == most) {
         let cost = mca.cost(&inner.text()).with_context(|| format!("the inner loop of {name}"))?;
         if slowest.as_ref().is_none_or(|kernel| cost.cycles > kernel.cost.cycles) {
-            slowest = Some(Kernel { name: name.clone(), work: most, cost, peak: None });
+            slowest = Some(Kernel { name: name.clone(), work: most, cost });
         }
     }
     slowest.context("invariant: one loop has most work")
@@ -145,17 +133,15 @@ fn slowest(
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Number {
     F32,
-    F16,
     I8,
 }
 
 impl Number {
-    pub const ALL: [Self; 3] = [Self::F32, Self::F16, Self::I8];
+    pub const ALL: [Self; 2] = [Self::F32, Self::I8];
 
     pub fn bytes(self) -> usize {
         match self {
             Self::F32 => 4,
-            Self::F16 => 2,
             Self::I8 => 1,
         }
     }
@@ -164,7 +150,6 @@ impl Number {
     pub fn tile_prefix(self) -> &'static str {
         match self {
             Self::F32 => "tile_f32_",
-            Self::F16 => "tile_f16_",
             Self::I8 => "tile_i8_",
         }
     }
@@ -174,19 +159,13 @@ impl Number {
     pub fn multiplier(self) -> (&'static str, &'static str, usize) {
         match self {
             Self::F32 => ("fmla", "4s", 4),
-            Self::F16 => ("fmla", "8h", 8),
             Self::I8 => ("sdot", "4s", 16),
         }
     }
 
     /// Whether a loop of matrix-vector products widens weights of this format.
     pub fn widens(self, inner: &Loop<'_>) -> bool {
-        let (f16, i8) = (inner.has("fcvtl"), inner.has("scvtf"));
-        match self {
-            Self::F32 => !f16 && !i8,
-            Self::F16 => f16,
-            Self::I8 => i8,
-        }
+        (self == Self::I8) == inner.has("scvtf")
     }
 }
 
@@ -199,7 +178,7 @@ pub mod tests {
     /// and each four points.
     pub fn round_kernels() -> Kernels {
         let cost = Cost { cycles: 1.0, instructions: 2.0 };
-        let kernel = |work| Kernel { name: String::new(), work, cost, peak: None };
+        let kernel = |work| Kernel { name: String::new(), work, cost };
         let tile = || Tile { kernel: kernel(64), rows: 8, channels: 8, inputs: 1 };
         Kernels {
             tiles: Number::ALL.map(|_| tile()).to_vec(),
@@ -210,7 +189,7 @@ pub mod tests {
 
     #[test]
     fn a_tile_s_name_says_its_shape() {
-        assert_eq!(shape("a::kernel::neon_f16::tile_f16_8x16", "tile_f16_"), Some((8, 16)));
+        assert_eq!(shape("edgepuck_kernels::neon_dot::tile_i8_8x16", "tile_i8_"), Some((8, 16)));
         assert_eq!(shape("tile_f32_12x8::<Max, 8>", "tile_f32_"), Some((12, 8)));
         assert_eq!(shape("tile_f32_8", "tile_f32_"), None);
         assert_eq!(shape("gemv", "tile_f32_"), None);

@@ -86,7 +86,7 @@ impl Mca {
         let file = tempfile::NamedTempFile::new()?;
         std::fs::write(&file, code)?;
         let mut command = Command::new(&self.program);
-        command.args(["-mtriple=aarch64-linux-gnu", "-mattr=+fullfp16,+dotprod", "--json"]);
+        command.args(["-mtriple=aarch64-linux-gnu", "-mattr=+dotprod", "--json"]);
         command.args([format!("-mcpu={CORE}"), format!("-iterations={ITERATIONS}")]);
         parse(&workspace::output(command.arg(file.path()))?)
     }

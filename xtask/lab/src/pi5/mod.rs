@@ -7,7 +7,6 @@
 
 use anyhow::{Context, Result};
 use clap::Args;
-use formats::atomic;
 use infer_cpu::Precision;
 use std::path::{Path, PathBuf};
 use xtask::{build_pi, pi_target, workspace};
@@ -15,14 +14,11 @@ use xtask::{build_pi, pi_target, workspace};
 mod assembly;
 mod count;
 mod kernels;
-mod live;
 mod mca;
 mod model;
 mod network;
 mod plan;
 mod rows;
-
-use model::Machine;
 
 #[derive(Args, Debug)]
 pub struct PiModelArgs {
@@ -33,31 +29,9 @@ pub struct PiModelArgs {
     #[arg(long, value_delimiter = ',', value_parser = eights,
           default_value = "16,32,64,128,256,512,1024,2048,4096")]
     points: Vec<usize>,
-    /// Precisions to model: f32, f32-fc16, f16, i8.
-    #[arg(long, value_delimiter = ',', default_value = "f32,f32-fc16,f16,i8")]
+    /// Precisions to model: f32, i8.
+    #[arg(long, value_delimiter = ',', default_value = "f32,i8")]
     precision: Vec<Precision>,
-    /// Write the modelled times to this CSV file, one per row.
-    #[arg(long, value_name = "FILE")]
-    csv: Option<PathBuf>,
-}
-
-#[derive(Args, Debug)]
-pub struct PiLiveArgs {
-    /// Model file [default: street-128 of assets/weights].
-    #[arg(long, value_name = "FILE")]
-    model: Option<PathBuf>,
-    /// Capture of the first seconds of a drive, such as that of `gen-drive --seconds 1`.
-    short: PathBuf,
-    /// Capture of more seconds of the same drive; their difference is modelled.
-    long: PathBuf,
-}
-
-/// Models `infer-cpu live` between the ends of two captures.
-pub fn run_live(args: &PiLiveArgs) -> Result<()> {
-    let street = || workspace::root().join("assets/weights/street-128.safetensors");
-    let counter = Board::open()?.counter(&args.model.clone().unwrap_or_else(street))?;
-    print!("{}", live::table(&counter, [&args.short, &args.long], Machine::PI_5)?);
-    Ok(())
 }
 
 /// Models what `args` ask for and prints it. Fails without an llvm-mca that knows the core.
@@ -78,12 +52,8 @@ pub fn run(args: &PiModelArgs) -> Result<()> {
     };
     let counter = board.counter(&model).inspect_err(warn).ok();
     let rows = rows::rows(args, &network, &board.kernels, counter.as_ref())?;
-    let times = rows::times(&rows);
-    print!("{times}");
+    print!("{}", rows::times(&rows));
     println!("\n{}", rows::LEFT_OUT);
-    if let Some(file) = &args.csv {
-        atomic::write_bytes(file, times.to_csv()?)?;
-    }
     Ok(())
 }
 

@@ -14,8 +14,6 @@ pub enum Sampler {
     Fps,
     /// A Critical Points Layer with a front end of its own.
     Cpl,
-    /// A Critical Points Layer that pools the trunk of the coordinates' T-Net.
-    CplStn,
 }
 
 impl Sampler {
@@ -26,7 +24,6 @@ impl Sampler {
             Self::All => "all",
             Self::Fps => "fps",
             Self::Cpl => "cpl:own",
-            Self::CplStn => "cpl:stn",
         }
     }
 }
@@ -102,73 +99,55 @@ pub fn stages(
     (from, points): (usize, usize),
     precision: Precision,
 ) -> Option<Vec<Stage>> {
-    let formats = Formats::of(precision);
+    let number = match precision {
+        Precision::F32 => Number::F32,
+        Precision::I8 => Number::I8,
+    };
     let mut stages = Vec::new();
     match sampler {
         // What this does is all outside the inner loops.
         Sampler::All => {}
         Sampler::Fps => stages.push(Stage::Farthest { points: from, picks: points }),
-        Sampler::Cpl | Sampler::CplStn => {
-            let front = if sampler == Sampler::Cpl { &network.front } else { &network.stn };
-            formats.pass(&mut stages, from, &[], &front.convs)?;
-        }
+        Sampler::Cpl => number.pass(&mut stages, from, &[], &network.front.convs)?,
     }
     if !network.stn.convs.is_empty() {
-        // A critical point of the cloud is critical for the points that are kept.
-        if sampler != Sampler::CplStn {
-            formats.pass(&mut stages, points, &[], &network.stn.convs)?;
-        }
-        formats.vectors(&mut stages, &network.stn);
+        number.pass(&mut stages, points, &[], &network.stn.convs)?;
+        number.vectors(&mut stages, &network.stn);
     }
     let Net { convs: trunk, fcs: _ } = &network.trunk;
     let (stem, rest) = trunk.split_at_checked(network.transform_after)?;
     if let Some(first) = network.abstractions.first() {
         // The centres of the other levels are the first of these.
         stages.push(Stage::Farthest { points, picks: first.centres.min(points) });
-        formats.levels(&mut stages, points, network);
+        number.levels(&mut stages, points, network);
     } else if network.fstn.convs.is_empty() {
-        formats.pass(&mut stages, points, &[], trunk)?;
+        number.pass(&mut stages, points, &[], trunk)?;
     } else {
-        formats.pass(&mut stages, points, stem, &network.fstn.convs)?;
-        formats.vectors(&mut stages, &network.fstn);
+        number.pass(&mut stages, points, stem, &network.fstn.convs)?;
+        number.vectors(&mut stages, &network.fstn);
         let after = *rest.first()?;
         let transform = Layer { inputs: after.inputs, outputs: after.inputs };
         // Activations of int8 have no sign, and a transform's have.
-        if formats.points == Number::I8 || folding_pays(points, after.outputs) {
+        if number == Number::I8 || folding_pays(points, after.outputs) {
             let product = Product { layer: after, number: Number::F32 };
             stages.push(Stage::Alone { rows: transform.outputs, product });
-            formats.pass(&mut stages, points, stem, rest)?;
+            number.pass(&mut stages, points, stem, rest)?;
         } else {
             let through: Vec<Layer> = stem.iter().copied().chain([transform]).collect();
-            formats.pass(&mut stages, points, &through, rest)?;
+            number.pass(&mut stages, points, &through, rest)?;
         }
     }
-    formats.vectors(&mut stages, &network.trunk);
+    number.vectors(&mut stages, &network.trunk);
     Some(stages)
 }
 
-struct Formats {
-    /// Point-wise layers but for the first.
-    points: Number,
-    /// Weights of vector layers.
-    stored: Number,
-}
-
-impl Formats {
-    fn of(precision: Precision) -> Self {
-        let (points, stored) = match precision {
-            Precision::F32 => (Number::F32, Number::F32),
-            Precision::F32Fc16 => (Number::F32, Number::F16),
-            Precision::F16 => (Number::F16, Number::F16),
-            Precision::I8 => (Number::I8, Number::I8),
-        };
-        Self { points, stored }
-    }
-
+/// The stages of a network whose point-wise layers but for the first, and weights of vector layers,
+/// are in a format.
+impl Number {
     /// `rows` points through `stem` and then `layers`, the last of which is
     /// pooled, in runs of blocks; `None` without a last layer.
     fn pass(
-        &self,
+        self,
         stages: &mut Vec<Stage>,
         rows: usize,
         stem: &[Layer],
@@ -177,8 +156,8 @@ impl Formats {
         let (&last, hidden) = layers.split_last()?;
         let layers: Vec<Layer> = stem.iter().chain(hidden).copied().collect();
         let products = self.of_points(&layers);
-        let screened = self.points == Number::F32 && prefilter_pays(last.inputs);
-        let number = if screened { Number::I8 } else { self.points };
+        let screened = self == Self::F32 && prefilter_pays(last.inputs);
+        let number = if screened { Self::I8 } else { self };
         let product = Product { layer: last, number };
         for first in (0..rows).step_by(BLOCK * RUN_BLOCKS) {
             let rows = (rows - first).min(BLOCK * RUN_BLOCKS);
@@ -189,19 +168,19 @@ impl Formats {
     }
 
     /// Layers that begin with one that takes coordinates, which is in fp32 whatever the precision.
-    fn of_points(&self, layers: &[Layer]) -> Vec<Product> {
+    fn of_points(self, layers: &[Layer]) -> Vec<Product> {
         let mut products = self.products(layers);
-        products.iter_mut().take(1).for_each(|first| first.number = Number::F32);
+        products.iter_mut().take(1).for_each(|first| first.number = Self::F32);
         products
     }
 
-    fn products(&self, layers: &[Layer]) -> Vec<Product> {
-        layers.iter().map(|&layer| Product { layer, number: self.points }).collect()
+    fn products(self, layers: &[Layer]) -> Vec<Product> {
+        layers.iter().map(|&layer| Product { layer, number: self }).collect()
     }
 
     /// The trunk on all points, and the layers of each set abstraction on its centres. The poolings
     /// are all outside the inner loops.
-    fn levels(&self, stages: &mut Vec<Stage>, points: usize, network: &Network) {
+    fn levels(self, stages: &mut Vec<Stage>, points: usize, network: &Network) {
         let trunk = (points, self.of_points(&network.trunk.convs));
         let abstractions = network.abstractions.iter();
         let centres =
@@ -214,9 +193,8 @@ impl Formats {
         }
     }
 
-    fn vectors(&self, stages: &mut Vec<Stage>, net: &Net) {
-        let stored = self.stored;
-        stages.extend(net.fcs.iter().map(|&layer| Stage::Vector { layer, stored }));
+    fn vectors(self, stages: &mut Vec<Stage>, net: &Net) {
+        stages.extend(net.fcs.iter().map(|&layer| Stage::Vector { layer, stored: self }));
     }
 }
 
@@ -228,11 +206,9 @@ mod tests {
     use infer_cpu::sampler::FrontChoice;
 
     #[test]
-    fn samplers_are_called_as_infer_cpu_calls_them() {
-        for sampler in [Sampler::Cpl, Sampler::CplStn] {
-            let (kind, front) = sampler.word().split_once(':').unwrap();
-            assert!(kind == "cpl" && front.parse::<FrontChoice>().is_ok(), "{kind}:{front}");
-        }
+    fn critical_points_are_called_as_infer_cpu_calls_them() {
+        let (kind, front) = Sampler::Cpl.word().split_once(':').unwrap();
+        assert!(kind == "cpl" && front.parse::<FrontChoice>().is_ok(), "{kind}:{front}");
     }
 
     fn macs(sampler: Sampler, from: usize, points: usize) -> usize {
@@ -252,11 +228,10 @@ mod tests {
     }
 
     #[test]
-    fn a_critical_points_layer_costs_its_front_end_or_nothing_twice() {
+    fn a_critical_points_layer_costs_its_front_end() {
         let all = macs(Sampler::All, 64, 64);
         let front_end = 3 * 64 + 64 * 128 + 128 * 1024;
         assert_eq!(macs(Sampler::Cpl, 1024, 64), all + 1024 * front_end);
-        assert_eq!(macs(Sampler::CplStn, 1024, 64), all + (1024 - 64) * front_end);
         let mut plain = baseline();
         plain.front = Net::default();
         assert_eq!(stages(&plain, Sampler::Cpl, (1024, 64), Precision::F32), None);

@@ -47,8 +47,7 @@ fn settings(args: &PiModelArgs) -> impl Iterator<Item = Setting> {
     let all = args.points.iter().map(|&n| (Sampler::All, n, n));
     let fewer = args.points.iter().filter(|&&points| points < FROM);
     let fps = fewer.map(|&points| (Sampler::Fps, FROM, points));
-    let cpl = [Sampler::Cpl, Sampler::CplStn].map(|kind| (kind, FROM, CRITICAL));
-    all.chain(fps).chain(cpl).flat_map(|(sampler, from, points)| {
+    all.chain(fps).chain([(Sampler::Cpl, FROM, CRITICAL)]).flat_map(|(sampler, from, points)| {
         let precisions = args.precision.iter();
         precisions.map(move |&precision| Setting { sampler, from, points, precision })
     })
@@ -133,14 +132,12 @@ pub fn times(rows: &[PiRow]) -> Table {
 
 /// The inner loops and their costs by llvm-mca.
 pub fn kernels(kernels: &Kernels, version: &str) -> Table {
-    let share = |kernel: &Kernel| Some(format!("{:.1}", kernel.share_of_peak()? * 100.0));
-    let columns: [Column<'_, &Kernel>; 6] = [
+    let columns: [Column<'_, &Kernel>; 5] = [
         ("inner loop", &|kernel| kernel.name.clone()),
         ("products", &|kernel| kernel.work.to_string()),
         ("instructions", &|kernel| format!("{:.0}", kernel.cost.instructions)),
         ("cycles", &|kernel| format!("{:.2}", kernel.cost.cycles)),
         ("products/cycle", &|kernel| format!("{:.2}", kernel.work as f64 / kernel.cost.cycles)),
-        ("% of peak", &|kernel| share(kernel).unwrap_or_default()),
     ];
     let title = format!("Inner loops as compiled, one round, by {version} as Neoverse N1");
     Table::of(title, &kernels.all().collect::<Vec<_>>(), &columns)

@@ -10,28 +10,28 @@ use crate::measure::backends::{self, Backend, short};
 use crate::measure::bench_mesh::{self, BenchMesh, target};
 use crate::measure::machine::{self, Machine};
 use crate::measure::ray_set::{sweep_pose, vlp32c};
-use crate::study::casting::{speed, to_disk};
-use crate::study::devices;
+use crate::study::{speed, to_disk};
 use crate::table::{Column, Table, digits, write_json};
 use anyhow::{Context, Error, Result, bail};
 use clap::Args;
-use edgepuck_program::Outcome;
-use edgepuck_shapes::{ShapeClass, write_tree};
-use formats::atomic;
+use edgepuck_mesh::TriangleMesh;
+use edgepuck_mesh::frame::{Normalize, Up, to_world};
+use edgepuck_shapes::{ShapeClass, generate, write_tree};
+use glam::DVec3;
 use harness::adversarial::{from_inside, missed, moved_sphere};
 use harness::casting::job;
 use harness::effects::{EffectVerdict, judge_effects};
 use harness::meshes::{cube, icosphere, soup};
-use infer_cpu::{Classifier, Options};
+use program::Outcome;
 use serde::Serialize;
 use serde_json::{Value, json};
 use sim_gpu::effects::{Dropout, Effects, Intensity, Noise, NoiseModel};
-use sim_gpu::internals::bvh::Builder;
 use sim_gpu::internals::caster::OpenCaster;
 use sim_gpu::internals::gpu::{AdapterKind, list_adapters};
-use sim_gpu::internals::mesh::TriangleMesh;
+use sim_gpu::internals::resolve::{Hit, resolve};
 use sim_gpu::{Caster, Mesh, Moves, Pose, Scene, Sensor};
-use std::path::{Path, PathBuf};
+use std::f64::consts::TAU;
+use std::path::PathBuf;
 use std::time::Instant;
 use xtask::workspace::root;
 
@@ -40,7 +40,7 @@ pub struct GpuArgs {
     /// Meshes to scan in addition to the generated ones, at most 512: a file or a folder [default:
     /// assets/meshes of the workspace, if it is there].
     meshes: Option<PathBuf>,
-    /// Folder in which to write gpu.json, and devices.csv with a row for each scan.
+    /// Folder in which to write gpu.json.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Measure all adapters, also software Vulkan [default: the best GPU].
@@ -114,7 +114,7 @@ pub fn run(args: &GpuArgs) -> Result<Outcome> {
     let backends = report.open(args)?;
     let others = &backends[1..];
     let meshes = meshes(args, &size)?;
-    report.part("scans", &backends, || scans(args, &meshes, &size, &backends))?;
+    report.part("scans", &backends, || scans(&meshes, &size, &backends))?;
     report.part("rays at vertices and edges", &backends, || lost(&size, &backends))?;
     report.part("effects", &backends, || effects(&meshes, others))?;
     report.part("speed", &backends, || {
@@ -132,7 +132,7 @@ fn meshes(args: &GpuArgs, size: &Size) -> Result<Vec<BenchMesh>> {
     let named = |(name, mesh): (&str, TriangleMesh)| BenchMesh { name: name.to_owned(), mesh };
     let made = [("soup", soup(2000, 0.2)), ("sphere", icosphere(4)), ("cube", cube())];
     let mut all: Vec<BenchMesh> = made.into_iter().map(named).collect();
-    all.extend(ShapeClass::ALL.into_iter().take(size.meshes).map(devices::shape));
+    all.extend(ShapeClass::ALL.into_iter().take(size.meshes).map(shape));
     let given = args.meshes.clone();
     let folder = given.or_else(|| Some(root().join("assets/meshes")).filter(|path| path.is_dir()));
     if let Some(folder) = folder {
@@ -141,28 +141,52 @@ fn meshes(args: &GpuArgs, size: &Size) -> Result<Vec<BenchMesh>> {
     Ok(all)
 }
 
-/// Ranges, points and classes of scans, on every adapter and on the CPU:
+fn shape(class: ShapeClass) -> BenchMesh {
+    let mesh = to_world(&generate(class, 0, 0), Up::Z, Normalize::UnitSphere).mesh;
+    BenchMesh { name: format!("shape {class}"), mesh }
+}
+
+/// The hits of scans, which every adapter finds as the CPU does, to the bit:
 /// `shaders/{trace,traverse,intersect}.wgsl`.
-fn scans(args: &GpuArgs, meshes: &[BenchMesh], size: &Size, backends: &[Backend]) -> Result<Found> {
-    let mut classifier = Classifier::load(Path::new("edge-64"), &Options::default())?;
-    let others = &backends[1..];
-    let all = devices::compare(meshes, size.views, (&backends[0], others), &mut classifier)?;
-    atomic::write_bytes(&args.out.join("devices.csv"), devices::csv(&all)?)?;
-    let check = |backend: &Backend| {
-        let own = all.iter().filter(|c| c.adapter == backend.name());
-        let (equal, unequal): (Vec<_>, Vec<_>) = own.partition(|c| c.is_equal());
-        let mut found = format!("{} equal, {} unequal", equal.len(), unequal.len());
-        unequal.iter().take(3).for_each(|c| found += &format!(", {}", c.mesh));
-        Check::new("scans", backend, found, unequal.is_empty() && !equal.is_empty())
-    };
-    let checks = others.iter().map(check).collect();
-    Ok((serde_json::to_value(&all)?, vec![devices::summary(&all, others)], checks))
+fn scans(meshes: &[BenchMesh], size: &Size, backends: &[Backend]) -> Result<Found> {
+    /// From the middle of a mesh of the unit sphere, metres.
+    const DISTANCE_M: f64 = 3.0;
+    let pattern = vlp32c().pattern();
+    let (mut points, mut unequal) = (0, vec![Vec::new(); backends.len()]);
+    for bench_mesh in meshes {
+        let target = target(bench_mesh.mesh.clone());
+        for view in 0..size.views {
+            let azimuth_rad = TAU * f64::from(view) / f64::from(size.views) + 0.3;
+            let pose = Pose::view(DISTANCE_M, 20f64.to_radians(), azimuth_rad, DVec3::ZERO);
+            let job = job(&target, &pose, &pattern);
+            let hits = |backend: &Backend| -> Result<Vec<Hit>> {
+                let cast = backend.caster.cast(std::slice::from_ref(&job))?.swap_remove(0);
+                Ok(resolve(&job, &cast, &pattern, &Effects::default()).hits)
+            };
+            let of_cpu = hits(&backends[0])?;
+            points += of_cpu.len();
+            for (backend, unequal) in backends.iter().zip(&mut unequal).skip(1) {
+                if hits(backend)? != of_cpu {
+                    unequal.push(format!("{}, view {view}", bench_mesh.name));
+                }
+            }
+        }
+    }
+    let (mut figures, mut checks) = (Vec::new(), Vec::new());
+    for (backend, unequal) in backends.iter().zip(&unequal).skip(1) {
+        let n_scans = meshes.len() * size.views as usize;
+        let first = unequal.first().map(|name| format!(": {name}")).unwrap_or_default();
+        let found = format!("{points} points, {} of {n_scans} unequal{first}", unequal.len());
+        checks.push(Check::new("scans", backend, found, unequal.is_empty() && points > 0));
+        figures.push(json!({ "adapter": backend.name(), "scans": n_scans, "unequal": unequal }));
+    }
+    Ok((figures.into(), vec![], checks))
 }
 
 /// Rays from within a closed sphere through its vertices and edges: none may miss, neither
 /// before f64 decides on rays that f32 leaves open, nor after.
 fn lost(size: &Size, backends: &[Backend]) -> Result<Found> {
-    let target = target(moved_sphere(size.sphere_level), Builder::Sah);
+    let target = target(moved_sphere(size.sphere_level));
     let (mut figures, mut checks) = (Vec::new(), Vec::new());
     for backend in backends {
         let (mut rays, mut lost) = (0, [0, 0]);
@@ -211,7 +235,7 @@ fn effect_verdicts(meshes: &[BenchMesh], backend: &Backend) -> Result<Vec<Effect
         };
         let caster = OpenCaster::open(&backend.request(), &effects)?;
         for bench_mesh in meshes {
-            let target = target(bench_mesh.mesh.clone(), Builder::Sah);
+            let target = target(bench_mesh.mesh.clone());
             let job = job(&target, &sweep_pose(), &pattern);
             let cast = caster.cast(std::slice::from_ref(&job))?.swap_remove(0);
             verdicts.extend(judge_effects(&job, &pattern, &cast, &effects));

@@ -1,4 +1,4 @@
-use crate::primitives::{Builder, DVec3, Sampler, block, rod};
+use crate::primitives::{Builder, DVec3, Sampler, block, dvec3, rod};
 
 /// A stretch of fence along y about the origin.
 struct Stretch {
@@ -27,25 +27,24 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
     if s.chance(0.25) {
         // A low wall that carries the fence.
         let high_m = s.uniform(0.1, 0.4) * stretch.high_m;
-        block(b, 0.5 * high_m * DVec3::Z, DVec3::new(0.2, stretch.long_m, high_m));
+        block(b, 0.5 * high_m * DVec3::Z, dvec3(0.2, stretch.long_m, high_m));
     }
 }
 
 impl Stretch {
     fn posts(&self, b: &mut Builder) {
         let n = (self.long_m / self.apart_m).ceil();
-        let size = DVec3::new(2.0 * self.post_m, 2.0 * self.post_m, self.high_m + 0.05);
+        let size = dvec3(2.0 * self.post_m, 2.0 * self.post_m, self.high_m + 0.05);
         for k in 0..=n as usize {
             let y = (k as f64 / n - 0.5) * self.long_m;
-            block(b, DVec3::new(0.0, y, 0.5 * size.z), size);
+            block(b, dvec3(0.0, y, 0.5 * size.z), size);
         }
     }
 
     /// Adds level rails `at` these shares of the height.
     fn rails(&self, b: &mut Builder, at: &[f64], thick_m: f64) {
         for share in at {
-            let size = DVec3::new(thick_m, self.long_m, 1.5 * thick_m);
-            block(b, share * self.high_m * DVec3::Z, size);
+            block(b, share * self.high_m * DVec3::Z, dvec3(thick_m, self.long_m, 1.5 * thick_m));
         }
     }
 
@@ -55,8 +54,7 @@ impl Stretch {
         for k in 0..n {
             let y = ((k as f64 + 0.5) / n as f64 - 0.5) * self.long_m;
             if !missing(y) {
-                let middle = DVec3::new(size.x, y, self.high_m - 0.5 * size.z);
-                block(b, middle, size);
+                block(b, dvec3(size.x, y, self.high_m - 0.5 * size.z), size);
             }
         }
     }
@@ -66,7 +64,7 @@ impl Stretch {
 fn pickets(b: &mut Builder, s: &mut Sampler, stretch: &Stretch) {
     let wide_m = s.uniform(0.07, 0.18);
     let pitch_m = wide_m * s.pick(&[1.02, 1.3, 1.8]);
-    let size = DVec3::new(0.025, wide_m, s.uniform(0.88, 0.98) * stretch.high_m);
+    let size = dvec3(0.025, wide_m, s.uniform(0.88, 0.98) * stretch.high_m);
     let gap_m = s.uniform(-2.0, 2.0) * stretch.long_m;
     stretch.rails(b, &[0.2, 0.8], 0.05);
     stretch.uprights(b, pitch_m, size, |y| (y - gap_m).abs() < 0.2);
@@ -75,7 +73,7 @@ fn pickets(b: &mut Builder, s: &mut Sampler, stretch: &Stretch) {
 /// Upright bars of iron 0.08 to 0.14 m apart between two rails.
 fn bars(b: &mut Builder, s: &mut Sampler, stretch: &Stretch) {
     let thick_m = s.uniform(0.015, 0.03);
-    let size = DVec3::new(thick_m, thick_m, 0.95 * stretch.high_m);
+    let size = dvec3(thick_m, thick_m, 0.95 * stretch.high_m);
     stretch.rails(b, &[0.12, 0.9], 0.03);
     stretch.uprights(b, s.uniform(0.08, 0.14), size, |_| false);
 }
@@ -84,10 +82,10 @@ fn bars(b: &mut Builder, s: &mut Sampler, stretch: &Stretch) {
 fn planks(b: &mut Builder, s: &mut Sampler, stretch: &Stretch) {
     let n = s.pick(&[2, 3, 4, 9]);
     let pitch_m = stretch.high_m / n as f64;
-    let size = DVec3::new(0.03, stretch.long_m, pitch_m * s.uniform(0.4, 0.97));
+    let size = dvec3(0.03, stretch.long_m, pitch_m * s.uniform(0.4, 0.97));
     for plank in 0..n {
         let z = (plank as f64 + 0.5) * pitch_m;
-        block(b, DVec3::new(0.03, 0.0, z), size);
+        block(b, dvec3(0.03, 0.0, z), size);
     }
 }
 
@@ -111,7 +109,7 @@ fn wire(b: &mut Builder, s: &mut Sampler, stretch: &Stretch) {
     if slant_m == 0.0 {
         stretch.rails(b, &[0.2, 0.35, 0.5, 0.65, 0.8], 2.0 * r);
     }
-    rod(b, DVec3::new(0.0, -half_m, high_m), DVec3::new(0.0, half_m, high_m), [0.02, 0.02]);
+    rod(b, dvec3(0.0, -half_m, high_m), dvec3(0.0, half_m, high_m), [0.02, 0.02]);
 }
 
 /// A wire that rises from `foot` by `slant_m` along y, cut at the ends of the fence: two crossed
@@ -124,7 +122,7 @@ fn strand(b: &mut Builder, foot: f64, slant_m: f64, [half_m, high_m]: [f64; 2], 
     if high - low < 0.01 {
         return;
     }
-    let at = |share: f64| DVec3::new(0.0, foot + share * slant_m, share * high_m);
+    let at = |share: f64| dvec3(0.0, foot + share * slant_m, share * high_m);
     for half in [r * DVec3::X, r * DVec3::Y] {
         let row = |share: f64| vec![at(share) - half, at(share) + half];
         b.grid(&[row(low), row(high)], false);

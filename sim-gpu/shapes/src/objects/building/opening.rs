@@ -1,6 +1,6 @@
 //! A part of a wall, with or without a window or a door.
 
-use crate::primitives::{Builder, DVec2, DVec3, block};
+use crate::primitives::{Builder, DVec2, DVec3, block, dvec3};
 
 /// An upright rectangle across x, in (y, z).
 #[derive(Clone, Copy)]
@@ -14,7 +14,7 @@ impl Rect {
     fn corners(self, x: f64) -> Vec<DVec3> {
         let [low, high] = [self.low, self.high];
         [(low.x, low.y), (high.x, low.y), (high.x, high.y), (low.x, high.y)]
-            .map(|(y, z)| DVec3::new(x, y, z))
+            .map(|(y, z)| dvec3(x, y, z))
             .to_vec()
     }
 
@@ -52,7 +52,7 @@ pub struct Opening {
 /// Adds a wall without an opening, which faces +x at x = 0.
 pub fn blank(b: &mut Builder, cell: Rect) {
     let [low, high] = [cell.low, cell.high];
-    let row = |z: f64| vec![DVec3::new(0.0, low.x, z), DVec3::new(0.0, high.x, z)];
+    let row = |z: f64| vec![dvec3(0.0, low.x, z), dvec3(0.0, high.x, z)];
     b.grid(&[row(low.y), row(high.y)], false);
 }
 
@@ -63,15 +63,14 @@ impl Opening {
         let [outside, inside] = [self.hole, inner].map(|rect| rect.corners(-self.recess_m));
         b.grid(&[cell.corners(0.0), self.hole.corners(0.0), outside, inside.clone()], true);
         let middle = inner.middle();
-        let centre = DVec3::new(-self.recess_m, middle.x, middle.y);
+        let centre = dvec3(-self.recess_m, middle.x, middle.y);
         let pane = [inside, vec![centre]];
         match self.filling {
             Filling::Solid => b.grid(&pane, true),
             Filling::Glass => b.glass(|b| b.grid(&pane, true)),
             Filling::Panes => {
                 b.glass(|b| b.grid(&pane, true));
-                let bar = DVec3::new(0.05, 0.08, inner.size_m().y);
-                block(b, centre, bar);
+                block(b, centre, dvec3(0.05, 0.08, inner.size_m().y));
             }
         }
     }

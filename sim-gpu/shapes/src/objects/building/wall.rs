@@ -1,5 +1,5 @@
 use crate::objects::plant::uneven::{Ripple, warped_box};
-use crate::primitives::{Builder, DAffine3, DVec3, Sampler, block};
+use crate::primitives::{Builder, DAffine3, DVec3, Sampler, block, dvec3};
 
 struct Masonry {
     thick_m: f64,
@@ -33,15 +33,14 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
     if s.chance(0.2) {
         let side_m = s.uniform(0.5, 0.6 * long_m + 0.5);
         let turned = DAffine3::from_rotation_z(std::f64::consts::FRAC_PI_2);
-        let corner = 0.5 * side_m * DVec3::NEG_X;
-        b.turned(corner, turned, |b| masonry.piece(b, s, side_m, high_m));
+        b.turned(0.5 * side_m * DVec3::NEG_X, turned, |b| masonry.piece(b, s, side_m, high_m));
     }
 }
 
 impl Masonry {
     /// Adds `long_m` of wall along y about the origin.
     fn piece(&self, b: &mut Builder, s: &mut Sampler, long_m: f64, high_m: f64) {
-        let size = DVec3::new(self.thick_m, long_m, high_m);
+        let size = dvec3(self.thick_m, long_m, high_m);
         if self.rough_m > 0.0 {
             let stones = Ripple::draw(s, 0.4, self.rough_m);
             let out = |p: DVec3| p + stones.at(p) * p.with_z(0.0).normalize_or(DVec3::X);
@@ -51,15 +50,15 @@ impl Masonry {
             block(b, 0.5 * size * DVec3::Z, size);
         }
         if self.coping_m > 0.0 {
-            let coping = DVec3::new(self.thick_m + 2.0 * self.coping_m, long_m, 0.08);
+            let coping = dvec3(self.thick_m + 2.0 * self.coping_m, long_m, 0.08);
             block(b, (high_m + 0.04) * DVec3::Z, coping);
         }
         let Some(apart_m) = self.piers_m else { return };
         let n = (long_m / apart_m).round().max(1.0);
-        let pier = DVec3::new(self.thick_m + 0.15, self.thick_m + 0.12, high_m + 0.12);
+        let pier = dvec3(self.thick_m + 0.15, self.thick_m + 0.12, high_m + 0.12);
         for k in 0..=n as usize {
             let y = (k as f64 / n - 0.5) * long_m;
-            block(b, DVec3::new(0.0, y, 0.5 * pier.z), pier);
+            block(b, dvec3(0.0, y, 0.5 * pier.z), pier);
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::form::{Form, Style};
 use super::panel::{Arch, in_order, lid, lower_edge_m};
-use crate::primitives::{Builder, DVec2, DVec3, Sampler, block_between};
+use crate::primitives::{Builder, DVec2, DVec3, Sampler, block_between, dvec2, dvec3};
 
 /// The rows of points of the shell, as shares of its height.
 const ROWS: [f64; 6] = [0.0, 0.2, 0.42, 0.65, 0.88, 1.0];
@@ -66,7 +66,7 @@ impl<'a> Body<'a> {
             stations[1..stations.len() - 1]
                 .iter()
                 .rev()
-                .map(move |&p| self.point(p, t) * DVec3::new(1.0, -1.0, 1.0))
+                .map(move |&p| self.point(p, t) * dvec3(1.0, -1.0, 1.0))
         };
         let rows: Vec<Vec<_>> = ROWS.iter().map(|&t| right(t).chain(left(t)).collect()).collect();
         b.grid(&rows, true);
@@ -99,7 +99,7 @@ impl<'a> Body<'a> {
         let side = in_order(arches.chain(bends).chain(feet), [-corner_x, corner_x]);
         let side = side.into_iter().map(|x| (x, self.plan_y(x)));
         let outline = ends(-1.0).chain(side).chain(ends(1.0).rev());
-        outline.map(|(x, y)| DVec2::new(x, -y)).collect()
+        outline.map(|(x, y)| dvec2(x, -y)).collect()
     }
 
     /// The point of the shell above the outline's point `plan`, at the share `t` of the height
@@ -117,7 +117,7 @@ impl<'a> Body<'a> {
         let above_bumper = ((z - 0.55) / 0.06).clamp(0.0, 1.0);
         let back_m = self.lean_m[forward] * rise + self.bumper_m[forward] * above_bumper;
         let y = plan.y * (1.0 - self.side_inset_m(z, t) / form.half.y);
-        DVec3::new(plan.x - plan.x.signum() * end * back_m, y, z)
+        dvec3(plan.x - plan.x.signum() * end * back_m, y, z)
     }
 
     /// How far the side leans in at height `z`. It is widest at 0.55 m, and its upper edge is
@@ -136,7 +136,7 @@ impl<'a> Body<'a> {
         let [from, to] = [-form.half.x + 0.12 + self.lean_m[0] + self.bumper_m[0], form.rear[0]];
         let y = 0.86 * form.half.y;
         let [floor_m, rim_m] = [form.top_m(from) - 0.46, form.top_m(from) - 0.01];
-        let corner = |x: f64, side: f64, z: f64| DVec3::new(x, side * y, z);
+        let corner = |x: f64, side: f64, z: f64| dvec3(x, side * y, z);
         let ring = |z: f64| {
             vec![
                 corner(from, 1.0, z),
@@ -150,7 +150,7 @@ impl<'a> Body<'a> {
         b.mirrored_y(|b| {
             b.surface([1, 1], |u, v| {
                 let x = from + u * (to - from);
-                DVec3::new(x, y + v * (self.shoulder_y(x) - y), form.top_m(x))
+                dvec3(x, y + v * (self.shoulder_y(x) - y), form.top_m(x))
             });
         });
     }
@@ -164,7 +164,7 @@ impl<'a> Body<'a> {
         let side = 0.9 * form.half.y;
         let between = side - 0.3;
         let block = |b: &mut Builder, [from, to]: [f64; 2], y: f64, high: f64| {
-            block_between(b, DVec3::new(from, -y, low), DVec3::new(to, y, high));
+            block_between(b, dvec3(from, -y, low), dvec3(to, y, high));
         };
         block(b, [rear + reach_m, front - reach_m], side, low + 0.1);
         let bay_m = 0.85 * form.nose_m;

@@ -3,7 +3,7 @@
 use super::body::Body;
 use super::form::{Form, Style};
 use super::panel::{Column, lid, wall};
-use crate::primitives::{Builder, DVec3, Sampler};
+use crate::primitives::{Builder, DVec3, Sampler, dvec3};
 
 /// The right half of the cabin, as columns from the middle of the rear window to the middle of the
 /// windscreen.
@@ -25,7 +25,7 @@ impl Roof<'_> {
         let along = (x - 0.6 * front - 0.4 * rear) / (front - rear).max(0.5);
         let [side_m, end_m] = self.fall_m;
         let fall_m = side_m * (y / self.half_y).powi(2) + end_m * 2.0 * along * along;
-        DVec3::new(x, y, self.form.height_m - fall_m)
+        dvec3(x, y, self.form.height_m - fall_m)
     }
 }
 
@@ -49,7 +49,7 @@ impl Cabin {
             let y = -0.8 * share * body.shoulder_y(rear_foot + 0.12).min(form.half.y);
             let foot_x = rear_foot + bow_m;
             let head = roof.at(rear_head + 0.6 * bow_m, -0.84 * share * roof.half_y);
-            let foot = DVec3::new(foot_x, y, form.top_m(foot_x));
+            let foot = dvec3(foot_x, y, form.top_m(foot_x));
             columns.push(Column { foot, head, pane: pane.filter(|_| share < 1.0) });
         }
         columns.extend(side(s, &roof, body, bow_m));
@@ -57,7 +57,7 @@ impl Cabin {
         for share in [1.0, 0.5, 0.0] {
             let [foot_x, head_x] = [form.screen[0], form.screen[1]];
             let x = foot_x - bow_m * share * share;
-            let foot = DVec3::new(x, -0.86 * share * body.shoulder_y(foot_x), form.top_m(x) + 0.01);
+            let foot = dvec3(x, -0.86 * share * body.shoulder_y(foot_x), form.top_m(x) + 0.01);
             let x = head_x - 0.5 * bow_m * share * share;
             let head = roof.at(x, -0.88 * share * roof.half_y);
             columns.push(Column { foot, head, pane: Some([0.02, 0.96]) });
@@ -99,7 +99,7 @@ fn side(s: &mut Sampler, roof: &Roof, body: &Body, rear_bow_m: f64) -> Vec<Colum
     }
     let column = |share: f64, pane: Option<[f64; 2]>| {
         let x = feet[0] + share * (feet[1] - feet[0]);
-        let foot = DVec3::new(x, 0.01 - body.shoulder_y(x), form.top_m(x));
+        let foot = dvec3(x, 0.01 - body.shoulder_y(x), form.top_m(x));
         let x = heads[0] + share * (heads[1] - heads[0]);
         Column { foot, head: roof.at(x, -roof.half_y), pane }
     };

@@ -2,7 +2,7 @@
 
 use std::sync::LazyLock;
 
-use glam::DVec2;
+use glam::{DVec2, dvec2};
 use serde::Deserialize;
 
 use crate::primitives::Sampler;
@@ -106,7 +106,7 @@ impl Form {
         let rear_overhang_m = length_m * s.uniform(0.15, 0.23);
         Self {
             style,
-            half: DVec2::new(half_m, width_m / 2.0),
+            half: dvec2(half_m, width_m / 2.0),
             height_m,
             sill_m: if is_tall { s.uniform(0.2, 0.28) } else { s.uniform(0.14, 0.21) },
             nose_m,

@@ -1,6 +1,6 @@
 //! Walls of vehicles: panels with panes, and edges with wheel arches.
 
-use glam::DVec3;
+use glam::{DVec3, dvec3};
 
 use crate::primitives::Builder;
 
@@ -42,7 +42,7 @@ pub fn lid(b: &mut Builder, edge: &[DVec3], crown_m: f64) {
         }
         let rise_m = crown_m * (p.y / widest_m).powi(2);
         [-1.0, -0.5, 0.5, 1.0f64]
-            .map(|share| DVec3::new(p.x, share * p.y, p.z + rise_m * (1.0 - share * share)))
+            .map(|share| dvec3(p.x, share * p.y, p.z + rise_m * (1.0 - share * share)))
             .to_vec()
     };
     let rows: Vec<_> = edge.iter().map(row).collect();

@@ -1,4 +1,4 @@
-use crate::primitives::{Builder, DVec3, Sampler, block, block_between};
+use crate::primitives::{Builder, DVec3, Sampler, block, block_between, dvec3};
 
 /// The measures of a shelf that is open to +x, with its width along y.
 struct Frame {
@@ -19,15 +19,14 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
     };
     let n = (frame.high_m / s.uniform(0.28, 0.5)).round().max(2.0) as usize;
     frame.sides(b, s.chance(0.7));
-    let rear = DVec3::new(-frame.half_deep_m, -frame.half_wide_m, 0.0);
+    let rear = dvec3(-frame.half_deep_m, -frame.half_wide_m, 0.0);
     if s.chance(0.5) {
-        let far = DVec3::new(0.01 - frame.half_deep_m, frame.half_wide_m, frame.high_m);
-        block_between(b, rear, far);
+        block_between(b, rear, dvec3(0.01 - frame.half_deep_m, frame.half_wide_m, frame.high_m));
     }
     let fullness = s.uniform(0.0, 1.0);
     for level in 0..=n {
         let z = 0.06 + (frame.high_m - 0.07) * level as f64 / n as f64;
-        let board = DVec3::new(2.0 * frame.half_deep_m, 2.0 * frame.half_wide_m, frame.board_m);
+        let board = dvec3(2.0 * frame.half_deep_m, 2.0 * frame.half_wide_m, frame.board_m);
         block(b, z * DVec3::Z, board);
         if level < n && s.chance(fullness) {
             frame.fill(b, s, z + 0.5 * frame.board_m, 0.85 * frame.high_m / n as f64);
@@ -41,13 +40,12 @@ impl Frame {
         let thick_m = if boards { self.board_m } else { 0.035 };
         for y in [-self.half_wide_m, self.half_wide_m] {
             if boards {
-                let size = DVec3::new(2.0 * self.half_deep_m, thick_m, self.high_m);
-                block(b, DVec3::new(0.0, y, 0.5 * self.high_m), size);
+                let size = dvec3(2.0 * self.half_deep_m, thick_m, self.high_m);
+                block(b, dvec3(0.0, y, 0.5 * self.high_m), size);
                 continue;
             }
             for x in [-self.half_deep_m, self.half_deep_m] {
-                let size = DVec3::new(thick_m, thick_m, self.high_m);
-                block(b, DVec3::new(x, y, 0.5 * self.high_m), size);
+                block(b, dvec3(x, y, 0.5 * self.high_m), dvec3(thick_m, thick_m, self.high_m));
             }
         }
     }
@@ -58,13 +56,13 @@ impl Frame {
         while y < 0.8 * self.half_wide_m {
             // Books of one height are one block.
             let wide_m = s.uniform(0.05, 0.35).min(self.half_wide_m - self.board_m - y);
-            let size = DVec3::new(
+            let size = dvec3(
                 self.half_deep_m * s.uniform(0.9, 1.7),
                 wide_m,
                 room_m * s.uniform(0.5, 0.95),
             );
             let x = 0.5 * size.x - self.half_deep_m + 0.02;
-            block(b, DVec3::new(x, y + 0.5 * wide_m, z + 0.5 * size.z), size);
+            block(b, dvec3(x, y + 0.5 * wide_m, z + 0.5 * size.z), size);
             y += wide_m + s.pick(&[0.0, 0.0, 0.1, 0.4]);
         }
     }

@@ -1,4 +1,4 @@
-use crate::primitives::{Builder, DVec3, Sampler, block_between, cushion, cylinder};
+use crate::primitives::{Builder, DVec3, Sampler, block_between, cushion, cylinder, dvec3};
 
 /// Builds a sofa that faces +x: one to four seats of 0.62 to 0.75 m width at 0.38 to 0.48 m height,
 /// a back up to 0.7 to 0.95 m (usual measures in Neufert's Architects' Data), and perhaps a long
@@ -18,8 +18,7 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
         cushion(b, (low + high) / 2.0, size, soft_m.min(0.4 * size.min_element()));
     };
     let base_m = seat_top_m - 0.15;
-    let low = DVec3::new(-back_deep_m, -half_m, feet_m);
-    block_between(b, low, DVec3::new(deep_m - 0.03, half_m, base_m));
+    block_between(b, dvec3(-back_deep_m, -half_m, feet_m), dvec3(deep_m - 0.03, half_m, base_m));
     soft(b, [-back_deep_m, -half_m, feet_m], [0.0, half_m, back_top_m - 0.1]);
     for seat in 0..n {
         let y = seat as f64 * seat_m - half_m;
@@ -47,6 +46,6 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
         (deep_m - 0.06, -1.0),
         (deep_m - 0.06, 1.0),
     ] {
-        cylinder(b, DVec3::new(x, y * (feet_y - 0.06), 0.0), 0.025, feet_m + 0.02);
+        cylinder(b, dvec3(x, y * (feet_y - 0.06), 0.0), 0.025, feet_m + 0.02);
     }
 }

@@ -3,7 +3,7 @@ use std::ops::Range;
 use super::shell::Shell;
 use crate::objects::car::panel::Arch;
 use crate::objects::car::wheel;
-use crate::primitives::{Builder, DVec3, Sampler, block, block_between, outline};
+use crate::primitives::{Builder, Sampler, block, block_between, dvec3, outline};
 
 /// The measures of a bus, metres.
 ///
@@ -124,8 +124,8 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
     }
     if s.chance(0.6) {
         let length_m = s.uniform(1.5, 3.5);
-        let at = DVec3::new(-s.uniform(0.3, 0.7) * bus.length_m, 0.0, bus.height_m + 0.06);
-        block(b, at, DVec3::new(length_m, s.uniform(1.3, 1.9), s.uniform(0.16, 0.3)));
+        let at = dvec3(-s.uniform(0.3, 0.7) * bus.length_m, 0.0, bus.height_m + 0.06);
+        block(b, at, dvec3(length_m, s.uniform(1.3, 1.9), s.uniform(0.16, 0.3)));
     }
 }
 
@@ -149,7 +149,7 @@ fn doors(s: &mut Sampler, bus: &Bus, [rear_axle, front_axle]: [f64; 2]) -> Vec<R
 fn wheels(b: &mut Builder, bus: &Bus, axles: &[f64]) {
     for &x in axles {
         for side in [-1.0, 1.0] {
-            let at = DVec3::new(x, side * (bus.half_width_m - 0.05), bus.wheel_m);
+            let at = dvec3(x, side * (bus.half_width_m - 0.05), bus.wheel_m);
             b.shifted(at, |b| wheel::wheel(b, [bus.wheel_m, 0.29, 0.08], side));
         }
     }
@@ -158,8 +158,8 @@ fn wheels(b: &mut Builder, bus: &Bus, axles: &[f64]) {
 /// Floor, engine, rows of seats, a driver's place.
 fn inside(b: &mut Builder, s: &mut Sampler, bus: &Bus, [rear_x, front_x]: [f64; 2]) {
     let y = bus.half_width_m - 0.35;
-    let low = DVec3::new(rear_x + 0.2, -y, bus.sill_m + 0.02);
-    block_between(b, low, DVec3::new(front_x, y, bus.floor_m.max(bus.sill_m + 0.05)));
+    let low = dvec3(rear_x + 0.2, -y, bus.sill_m + 0.02);
+    block_between(b, low, dvec3(front_x, y, bus.floor_m.max(bus.sill_m + 0.05)));
     let seat_m = if bus.is_coach { bus.floor_m } else { bus.floor_m + 0.15 };
     let pitch_m = s.uniform(0.75, 1.05);
     let rows = ((front_x - rear_x - 2.0) / pitch_m) as usize;
@@ -170,28 +170,27 @@ fn inside(b: &mut Builder, s: &mut Sampler, bus: &Bus, [rear_x, front_x]: [f64; 
                 // The back and the cushion are thin, so that sheets represent them.
                 let y = side * 0.7 * bus.half_width_m - 0.42;
                 b.surface([1, 1], |u, v| {
-                    DVec3::new(x - 0.12 * v, y + 0.84 * u, seat_m + 0.4 + 0.75 * v)
+                    dvec3(x - 0.12 * v, y + 0.84 * u, seat_m + 0.4 + 0.75 * v)
                 });
-                b.surface([1, 1], |u, v| DVec3::new(x + 0.42 * v, y + 0.84 * u, seat_m + 0.42));
+                b.surface([1, 1], |u, v| dvec3(x + 0.42 * v, y + 0.84 * u, seat_m + 0.42));
             }
         }
     }
-    let driver =
-        DVec3::new(front_x - 1.0, -bus.door_side * 0.55 * bus.half_width_m, bus.floor_m + 1.0);
-    block(b, driver, DVec3::new(0.14, 0.5, 0.9));
-    let dash = DVec3::new(front_x + 0.05, 0.0, 0.85 * bus.waist_m);
-    block(b, dash, DVec3::new(0.3, 1.8 * bus.half_width_m, 0.3 * bus.waist_m));
+    let driver = dvec3(front_x - 1.0, -bus.door_side * 0.55 * bus.half_width_m, bus.floor_m + 1.0);
+    block(b, driver, dvec3(0.14, 0.5, 0.9));
+    let dash = dvec3(front_x + 0.05, 0.0, 0.85 * bus.waist_m);
+    block(b, dash, dvec3(0.3, 1.8 * bus.half_width_m, 0.3 * bus.waist_m));
 }
 
 /// Mirrors in front of the windscreen's upper corners, or at the sides.
 fn mirrors(b: &mut Builder, s: &mut Sampler, bus: &Bus) {
-    let size = DVec3::new(0.12, 0.22, s.uniform(0.35, 0.6));
+    let size = dvec3(0.12, 0.22, s.uniform(0.35, 0.6));
     let ahead_m = s.uniform(-0.2, 0.3);
-    let at = DVec3::new(ahead_m, bus.half_width_m + 0.12, bus.lintel_m - s.uniform(0.2, 0.6));
+    let at = dvec3(ahead_m, bus.half_width_m + 0.12, bus.lintel_m - s.uniform(0.2, 0.6));
     b.mirrored_y(|b| {
         block(b, at, size);
-        let arm = DVec3::new(-0.3 * ahead_m.abs() - 0.1, -0.12, 0.5 * size.z);
-        block(b, at + arm, DVec3::new(0.3, 0.08, 0.06));
+        let arm = dvec3(-0.3 * ahead_m.abs() - 0.1, -0.12, 0.5 * size.z);
+        block(b, at + arm, dvec3(0.3, 0.08, 0.06));
     });
 }
 

@@ -1,6 +1,6 @@
 use super::shell::Shell;
 use crate::objects::car::panel::Arch;
-use crate::primitives::{Builder, DVec3, Sampler, block, block_between, loft, outline};
+use crate::primitives::{Builder, Sampler, block, block_between, dvec3, loft, outline};
 
 /// The measures of a cab. The front of the vehicle is at x = 0.
 pub struct Cab {
@@ -55,7 +55,7 @@ impl Cab {
             let y = 0.85 * self.half_width_m;
             b.surface([1, 1], |u, v| {
                 let z = top_m + v * (self.roof_m - top_m);
-                DVec3::new(rear + v * (front - rear), y * (2.0 * u - 1.0), z)
+                dvec3(rear + v * (front - rear), y * (2.0 * u - 1.0), z)
             });
         }
     }
@@ -64,15 +64,15 @@ impl Cab {
     fn inside(&self, b: &mut Builder, s: &mut Sampler, waist_m: f64, front_x: f64) {
         let y = self.half_width_m - 0.08;
         let floor_m = waist_m - 0.75;
-        let low = DVec3::new(self.rear_x + 0.05, -0.6 * y, 0.5);
-        block_between(b, low, DVec3::new(front_x - 0.25, 0.6 * y, floor_m));
-        let low = DVec3::new(front_x - 0.65, -y, floor_m);
-        block_between(b, low, DVec3::new(front_x - 0.3, y, waist_m - 0.05));
+        let low = dvec3(self.rear_x + 0.05, -0.6 * y, 0.5);
+        block_between(b, low, dvec3(front_x - 0.25, 0.6 * y, floor_m));
+        let low = dvec3(front_x - 0.65, -y, floor_m);
+        block_between(b, low, dvec3(front_x - 0.3, y, waist_m - 0.05));
         let x = (front_x - s.uniform(1.35, 1.5)).max(self.rear_x + 0.15);
         b.mirrored_y(|b| {
-            let back = DVec3::new(x, 0.55 * y, floor_m + 0.75);
-            block(b, back, DVec3::new(0.14, 0.5, 0.75));
-            block(b, back + DVec3::new(0.3, 0.0, -0.4), DVec3::new(0.5, 0.5, 0.2));
+            let back = dvec3(x, 0.55 * y, floor_m + 0.75);
+            block(b, back, dvec3(0.14, 0.5, 0.75));
+            block(b, back + dvec3(0.3, 0.0, -0.4), dvec3(0.5, 0.5, 0.2));
         });
     }
 
@@ -80,10 +80,10 @@ impl Cab {
     fn mirrors(&self, b: &mut Builder, s: &mut Sampler, waist_m: f64, front_x: f64) {
         let high_m = s.uniform(0.35, 0.8);
         let x = front_x - s.uniform(0.05, 0.25);
-        let at = DVec3::new(x, self.half_width_m + 0.16, waist_m + 0.1 + 0.5 * high_m);
+        let at = dvec3(x, self.half_width_m + 0.16, waist_m + 0.1 + 0.5 * high_m);
         b.mirrored_y(|b| {
-            block(b, at, DVec3::new(0.1, 0.2, high_m));
-            block(b, at - DVec3::new(0.05, 0.12, -0.45 * high_m), DVec3::new(0.05, 0.2, 0.05));
+            block(b, at, dvec3(0.1, 0.2, high_m));
+            block(b, at - dvec3(0.05, 0.12, -0.45 * high_m), dvec3(0.05, 0.2, 0.05));
         });
     }
 
@@ -101,13 +101,13 @@ impl Cab {
             ],
         );
         let outer = self.half_width_m;
-        block_between(b, DVec3::new(-0.25, -outer, 0.4), DVec3::new(0.0, outer, 0.75));
+        block_between(b, dvec3(-0.25, -outer, 0.4), dvec3(0.0, outer, 0.75));
         b.mirrored_y(|b| {
             b.surface([6, 1], |u, v| {
                 let (sin, cos) = libm::sincos(u * std::f64::consts::PI);
                 let r = self.wheel_m + 0.1;
                 let across = y + v * (outer - y);
-                DVec3::new(self.axle_x + r * cos, across, self.wheel_m + r * sin)
+                dvec3(self.axle_x + r * cos, across, self.wheel_m + r * sin)
             });
         });
     }

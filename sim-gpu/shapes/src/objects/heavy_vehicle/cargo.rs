@@ -1,8 +1,6 @@
 //! Bodies on the frame of a lorry, and their loads.
 
-use crate::primitives::{
-    Builder, DVec2, DVec3, Sampler, bar, block, block_between, cap, cushion, loft, outline, rod,
-};
+use crate::primitives::*;
 
 /// The space for a body, from `rear_x` to `front_x`, and from the upper side of the frame at
 /// `deck_m` up to `top_m`.
@@ -23,7 +21,7 @@ impl Space {
     }
 
     fn at(&self, along: f64, across: f64, z: f64) -> DVec3 {
-        DVec3::new(self.rear_x + along * self.length_m(), across * self.half_width_m, z)
+        dvec3(self.rear_x + along * self.length_m(), across * self.half_width_m, z)
     }
 
     /// A closed box with smooth sides or with ribs, and sometimes with a tail lift.
@@ -39,8 +37,8 @@ impl Space {
             });
         }
         if s.chance(0.3) {
-            let low = DVec3::new(self.rear_x - 0.1, -0.95 * self.half_width_m, self.deck_m - 0.35);
-            let high = DVec3::new(self.rear_x - 0.02, 0.95 * self.half_width_m, self.deck_m + 1.4);
+            let low = dvec3(self.rear_x - 0.1, -0.95 * self.half_width_m, self.deck_m - 0.35);
+            let high = dvec3(self.rear_x - 0.02, 0.95 * self.half_width_m, self.deck_m + 1.4);
             block_between(b, low, high);
         }
         if s.chance(0.25) {
@@ -78,7 +76,7 @@ impl Space {
             block_between(
                 b,
                 self.at(1.0, -0.95, top_m),
-                self.at(1.0, 0.95, top_m) + DVec3::new(0.9, 0.0, 0.06),
+                self.at(1.0, 0.95, top_m) + dvec3(0.9, 0.0, 0.06),
             );
         }
         if s.chance(0.6) {
@@ -126,11 +124,9 @@ impl Space {
             }
             1 | 2 => {
                 for _ in 0..s.count(2, 6) {
-                    let size =
-                        DVec3::new(s.uniform(0.6, 1.6), s.uniform(0.6, 1.4), s.uniform(0.4, 1.5));
+                    let size = dvec3(s.uniform(0.6, 1.6), s.uniform(0.6, 1.4), s.uniform(0.4, 1.5));
                     let along = s.uniform(0.15, 0.85);
-                    let middle = self.at(along, s.uniform(-0.4, 0.4), floor_m + 0.5 * size.z);
-                    block(b, middle, size);
+                    block(b, self.at(along, s.uniform(-0.4, 0.4), floor_m + 0.5 * size.z), size);
                 }
             }
             _ => {}
@@ -142,16 +138,12 @@ impl Space {
         let half_z = s.uniform(0.7, 1.0).min(0.5 * (self.top_m - self.deck_m));
         let half_y = (half_z * s.uniform(1.0, 1.35)).min(self.half_width_m);
         let z = self.deck_m + 0.1 + half_z;
-        let ring = |along: f64, share: f64| -> Vec<DVec3> {
-            let ring = outline::superellipse(share * DVec2::new(half_y, half_z), 2.4, 20);
-            ring.iter().map(|p| self.at(along, 0.0, z) + DVec3::new(0.0, p.x, p.y)).collect()
+        let ring = |along: f64, share: f64| {
+            let ring = outline::superellipse(share * dvec2(half_y, half_z), 2.4, 20);
+            outline::across_x(&ring, self.at(along, 0.0, z))
         };
         loft(b, &[ring(0.0, 0.75), ring(0.04, 1.0), ring(0.96, 1.0), ring(1.0, 0.75)]);
-        block(
-            b,
-            self.at(0.5, 0.0, z + half_z + 0.05),
-            DVec3::new(0.7 * self.length_m(), 0.6, 0.12),
-        );
+        block(b, self.at(0.5, 0.0, z + half_z + 0.05), dvec3(0.7 * self.length_m(), 0.6, 0.12));
     }
 
     /// The drum of a concrete mixer, with its mouth to the rear, and its chute.
@@ -159,12 +151,11 @@ impl Space {
         let r = s.uniform(1.0, 1.1);
         let [low, high] = [self.deck_m + 0.15, self.deck_m + 0.7];
         let axis = |along: f64| self.at(along, 0.0, high + along * (low - high) + r);
-        let ring = |along: f64, share: f64| -> Vec<DVec3> {
-            let ring = outline::ellipse(DVec2::splat(share * r), 20);
-            ring.iter().map(|p| axis(along) + DVec3::new(0.0, p.x, p.y)).collect()
-        };
         let drum = [(0.08, 0.45), (0.4, 0.9), (0.62, 1.0), (0.8, 0.95), (0.95, 0.5)];
-        loft(b, &drum.map(|(along, share)| ring(along, share)));
+        let sections = drum.map(|(along, share)| {
+            outline::across_x(&outline::ellipse(DVec2::splat(share * r), 20), axis(along))
+        });
+        loft(b, &sections);
         for along in [0.1, 0.92] {
             let top = axis(along).z;
             block_between(b, self.at(along, -0.5, self.deck_m), self.at(along + 0.03, 0.5, top));
@@ -175,7 +166,7 @@ impl Space {
     /// A refuse collector's body with its rounded hopper.
     pub fn refuse(&self, b: &mut Builder, s: &mut Sampler) {
         let top_m = (self.deck_m + s.uniform(2.0, 2.5)).min(self.top_m);
-        let size = DVec3::new(0.74 * self.length_m(), 2.0 * self.half_width_m, top_m - self.deck_m);
+        let size = dvec3(0.74 * self.length_m(), 2.0 * self.half_width_m, top_m - self.deck_m);
         cushion(b, self.at(0.63, 0.0, 0.5 * (self.deck_m + top_m)), size, 0.12);
         let section = |along: f64, low: f64, high: f64| {
             outline::upright(self.at(along, 0.0, 0.0).x, self.half_width_m, [low, high])

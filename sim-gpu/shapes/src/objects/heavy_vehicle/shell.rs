@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use glam::{DAffine3, DVec2, DVec3};
+use glam::{DAffine3, DVec2, DVec3, dvec2, dvec3};
 
 use crate::objects::car::panel::{Arch, Column, in_order, lid, lower_edge_m, wall};
 use crate::primitives::Builder;
@@ -38,8 +38,7 @@ pub struct Shell {
 impl Shell {
     pub fn build(&self, b: &mut Builder) {
         for side in [-1.0, 1.0] {
-            let mirror = DAffine3::from_scale(DVec3::new(1.0, -side, 1.0));
-            b.place(mirror, |b| self.half(b, side));
+            b.place(DAffine3::from_scale(dvec3(1.0, -side, 1.0)), |b| self.half(b, side));
         }
         let edge = self.plan().into_iter().map(|p| self.head(p)).collect::<Vec<_>>();
         lid(b, &edge, 0.06);
@@ -64,16 +63,16 @@ impl Shell {
         let inner = [self.rear_x + 0.13, self.front_x - self.bow_m - 0.13];
         let corners = [self.rear_x + 0.12, self.front_x - self.bow_m - 0.12];
         let mut plan = vec![
-            DVec2::new(self.rear_x, 0.0),
-            DVec2::new(self.rear_x + 0.02, 0.12 - y),
-            DVec2::new(corners[0], -y),
+            dvec2(self.rear_x, 0.0),
+            dvec2(self.rear_x + 0.02, 0.12 - y),
+            dvec2(corners[0], -y),
         ];
-        plan.extend(in_order(ends.chain(arches), inner).into_iter().map(|x| DVec2::new(x, -y)));
+        plan.extend(in_order(ends.chain(arches), inner).into_iter().map(|x| dvec2(x, -y)));
         plan.extend([
-            DVec2::new(corners[1], -y),
-            DVec2::new(self.front_x - self.bow_m, 0.1 - y),
-            DVec2::new(self.front_x - 0.3 * self.bow_m, -0.5 * y),
-            DVec2::new(self.front_x, 0.0),
+            dvec2(corners[1], -y),
+            dvec2(self.front_x - self.bow_m, 0.1 - y),
+            dvec2(self.front_x - 0.3 * self.bow_m, -0.5 * y),
+            dvec2(self.front_x, 0.0),
         ]);
         plan
     }
@@ -112,7 +111,7 @@ impl Shell {
         let reach_m = 3.0 * self.rake_m + 0.2;
         let forward = ((p.x - self.front_x + reach_m) / reach_m).clamp(0.0, 1.0);
         let y = p.y * (1.0 - self.inset_m / self.half_width_m);
-        DVec3::new(p.x - self.rake_m * forward, y, self.roof_m)
+        dvec3(p.x - self.rake_m * forward, y, self.roof_m)
     }
 }
 

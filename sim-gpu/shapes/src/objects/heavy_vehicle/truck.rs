@@ -1,7 +1,7 @@
 use super::cab::Cab;
 use super::cargo::{Cargo, Space};
 use crate::objects::car::wheel;
-use crate::primitives::{Builder, DVec3, Makes, Sampler, block_between, cylinder, rod};
+use crate::primitives::{Builder, Makes, Sampler, block_between, cylinder, dvec3, rod};
 
 /// The makes, with their weights. They keep to the limits of Directive 96/53/EC: 12 m long, or 16.5
 /// m with a semi-trailer; 2.55 m wide and 4 m high.
@@ -36,21 +36,20 @@ impl Frame {
     fn build(&self, b: &mut Builder, s: &mut Sampler, rear_axles: &[f64]) {
         let [low, high] = [self.top_m - 0.26, self.top_m];
         b.mirrored_y(|b| {
-            let from = DVec3::new(self.rear_x, 0.34, low);
-            block_between(b, from, DVec3::new(self.front_x, 0.43, high));
+            block_between(b, dvec3(self.rear_x, 0.34, low), dvec3(self.front_x, 0.43, high));
         });
         for &x in rear_axles {
             self.axle(b, x, 2.0);
         }
         // The underrun protection.
         let y = 0.92 * self.half_width_m;
-        block_between(b, DVec3::new(self.rear_x, -y, 0.42), DVec3::new(self.rear_x + 0.1, y, 0.56));
+        block_between(b, dvec3(self.rear_x, -y, 0.42), dvec3(self.rear_x + 0.1, y, 0.56));
         if s.chance(0.7) {
             b.mirrored_y(|b| {
                 for x in rear_axles {
                     let rear = x - self.wheel_m - 0.08;
-                    let low = DVec3::new(rear, 0.55 * self.half_width_m, 0.3);
-                    block_between(b, low, DVec3::new(rear + 0.02, y, self.top_m - 0.1));
+                    let low = dvec3(rear, 0.55 * self.half_width_m, 0.3);
+                    block_between(b, low, dvec3(rear + 0.02, y, self.top_m - 0.1));
                 }
             });
         }
@@ -61,12 +60,12 @@ impl Frame {
         let width_m = 0.62 * self.wheel_m * 0.5 * (1.0 + twin);
         let dish_m = if twin > 1.0 { 0.3 * self.wheel_m } else { 0.06 };
         for side in [-1.0, 1.0] {
-            let at = DVec3::new(x, side * (self.half_width_m - 0.02), self.wheel_m);
+            let at = dvec3(x, side * (self.half_width_m - 0.02), self.wheel_m);
             let size = [self.wheel_m, width_m, dish_m];
             b.shifted(at, |b| wheel::wheel(b, size, side));
         }
-        let end = DVec3::new(x, self.half_width_m - 0.4, self.wheel_m);
-        rod(b, end, end * DVec3::new(1.0, -1.0, 1.0), [0.09, 0.09]);
+        let end = dvec3(x, self.half_width_m - 0.4, self.wheel_m);
+        rod(b, end, end * dvec3(1.0, -1.0, 1.0), [0.09, 0.09]);
     }
 
     /// Tanks, boxes and guards between the axles.
@@ -77,13 +76,13 @@ impl Frame {
             if room_m > 0.8 && s.chance(0.7) {
                 let length_m = s.uniform(0.5, 0.95) * room_m.min(1.6);
                 let start = to - length_m - s.uniform(0.0, room_m - length_m);
-                let low = DVec3::new(start, outer - side * 0.6, 0.42);
-                block_between(b, low, DVec3::new(start + length_m, outer - side * 0.06, 0.95));
+                let low = dvec3(start, outer - side * 0.6, 0.42);
+                block_between(b, low, dvec3(start + length_m, outer - side * 0.06, 0.95));
             }
             if room_m > 1.5 && s.chance(0.6) {
                 for z in [0.5, 0.78] {
-                    let low = DVec3::new(from, outer - side * 0.03, z);
-                    block_between(b, low, DVec3::new(to, outer, z + 0.1));
+                    let low = dvec3(from, outer - side * 0.03, z);
+                    block_between(b, low, dvec3(to, outer, z + 0.1));
                 }
             }
         }
@@ -195,7 +194,7 @@ fn articulated(b: &mut Builder, s: &mut Sampler) {
     trailer.build(b, s, &axles);
     // Landing legs, and guards along the sides.
     let legs_x = space.front_x - 2.6;
-    b.mirrored_y(|b| cylinder(b, DVec3::new(legs_x, 0.85, 0.35), 0.07, 0.9));
+    b.mirrored_y(|b| cylinder(b, dvec3(legs_x, 0.85, 0.35), 0.07, 0.9));
     trailer.flanks(b, s, [last + 1.31 * axles.len() as f64, legs_x - 0.3]);
     let cargo = s.weighted(&[
         (7, Space::closed as Cargo),

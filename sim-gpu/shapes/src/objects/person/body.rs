@@ -1,6 +1,6 @@
 //! The parts of a body of a given stature and girth.
 
-use crate::primitives::{Builder, DVec2, DVec3, Sampler, ellipsoid, loft, outline, rod};
+use crate::primitives::*;
 
 /// The measures of a body, metres. Lengths of segments are shares of the stature (Drillis and
 /// Contini 1966, as given by Winter, Biomechanics and Motor Control of Human Movement).
@@ -48,7 +48,7 @@ impl Measures {
     /// The right (-1) or left (1) shoulder joint, relative to the pelvis.
     pub fn shoulder(&self, side: f64) -> DVec3 {
         let y = self.stature_m * 0.108 * (0.5 + 0.5 * self.girth);
-        DVec3::new(0.0, side * y, self.neck_m() - 0.052 * self.stature_m)
+        dvec3(0.0, side * y, self.neck_m() - 0.052 * self.stature_m)
     }
 
     /// Half the distance between the hip joints.
@@ -75,7 +75,7 @@ impl Measures {
         ];
         let sections = sections.map(|(share, deep, broad, ahead)| {
             let cloth_m = if share < 1.0 { self.cloth_m[0] } else { 0.005 };
-            let half = DVec2::new(deep, broad) * h * self.girth + DVec2::splat(cloth_m);
+            let half = dvec2(deep, broad) * h * self.girth + DVec2::splat(cloth_m);
             let ring = outline::superellipse(half, 2.4, 12);
             ring.iter().map(|p| (p + DVec2::X * ahead * h).extend(share * neck_m)).collect()
         });
@@ -90,7 +90,7 @@ impl Measures {
     /// The middle of the head, relative to the foot of the neck.
     pub fn head_middle(&self) -> DVec3 {
         let up_m = self.head_m() + 0.03 * self.stature_m;
-        DVec3::new(0.012 * self.stature_m, 0.0, up_m)
+        dvec3(0.012 * self.stature_m, 0.0, up_m)
     }
 
     /// Neck and head above the foot of the neck. A head is about 0.23 m high, 0.195 m long and
@@ -100,7 +100,7 @@ impl Measures {
         let middle = self.head_middle();
         let r = 0.45 * half_m + 0.003;
         rod(b, -0.03 * DVec3::Z, middle - 0.4 * half_m * DVec3::Z, [1.15 * r, r]);
-        ellipsoid(b, middle, half_m * DVec3::new(0.86, 0.69, 1.0));
+        ellipsoid(b, middle, half_m * dvec3(0.86, 0.69, 1.0));
     }
 
     pub fn leg(&self, b: &mut Builder, hip: DVec3, leg: Leg) {

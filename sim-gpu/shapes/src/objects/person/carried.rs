@@ -1,10 +1,7 @@
 use super::body::Measures;
 use super::pose::Pose;
 use crate::objects::car::wheel;
-use crate::primitives::{
-    Builder, DAffine3, DVec3, Profile, Sampler, Section, block, cushion, ellipsoid, outline, rod,
-    skin,
-};
+use crate::primitives::*;
 
 /// A thing that a person carries, and the place of the hand that holds it.
 pub enum Carried {
@@ -26,7 +23,7 @@ pub fn draw(s: &mut Sampler, measures: &Measures, pose: &mut Pose) -> Carried {
     let grown_up = h > 1.45;
     let one = s.count(0, 1);
     let side = if one == 1 { 1.0 } else { -1.0 };
-    let at = |x: f64, y: f64, z: f64| pose.pelvis + h * DVec3::new(x, y, z);
+    let at = |x: f64, y: f64, z: f64| pose.pelvis + h * dvec3(x, y, z);
     let drawn = s.uniform(0.0, 1.0);
     if drawn < 0.16 {
         Carried::Backpack
@@ -46,7 +43,7 @@ pub fn draw(s: &mut Sampler, measures: &Measures, pose: &mut Pose) -> Carried {
         pose.hands[one] = at(-0.1, 0.15 * side, -0.03);
         Carried::Suitcase(pose.hands[one])
     } else if drawn < 0.465 && grown_up {
-        let handle = DVec3::new(pose.pelvis.x + 0.27 * h, pose.pelvis.y, 1.02);
+        let handle = dvec3(pose.pelvis.x + 0.27 * h, pose.pelvis.y, 1.02);
         pose.hands = [handle - 0.2 * DVec3::Y, handle + 0.2 * DVec3::Y];
         Carried::Pram(handle)
     } else {
@@ -60,35 +57,31 @@ pub fn build(b: &mut Builder, s: &mut Sampler, it: &Carried, measures: &Measures
     match *it {
         Carried::Nothing => {}
         Carried::Backpack => b.place(trunk, |b| {
-            let size = DVec3::new(s.uniform(0.07, 0.14), s.uniform(0.14, 0.2), s.uniform(0.2, 0.3));
+            let size = dvec3(s.uniform(0.07, 0.14), s.uniform(0.14, 0.2), s.uniform(0.2, 0.3));
             let x = -0.068 * h * measures.girth - measures.cloth_m[0] - 0.45 * h * size.x;
             let z = measures.neck_m() - (0.04 + 0.5 * size.z) * h;
-            soft(b, DVec3::new(x, 0.0, z), h * size);
+            soft(b, dvec3(x, 0.0, z), h * size);
         }),
         Carried::ShoulderBag => b.place(trunk, |b| {
-            let side = s.pick(&[-1.0, 1.0]);
-            let y = side * (0.1 * h * measures.girth + measures.cloth_m[0] + 0.05);
-            let size =
-                DVec3::new(s.uniform(0.25, 0.4), s.uniform(0.08, 0.14), s.uniform(0.2, 0.32));
-            let at = DVec3::new(s.uniform(-0.1, 0.06), y, s.uniform(-0.05, 0.1));
-            soft(b, at, size * (h / 1.7));
+            let y = s.pick(&[-1.0, 1.0]) * (0.1 * h * measures.girth + measures.cloth_m[0] + 0.05);
+            let size = dvec3(s.uniform(0.25, 0.4), s.uniform(0.08, 0.14), s.uniform(0.2, 0.32));
+            soft(b, dvec3(s.uniform(-0.1, 0.06), y, s.uniform(-0.05, 0.1)), size * (h / 1.7));
         }),
         Carried::HandBag(hand) => {
-            let size =
-                DVec3::new(s.uniform(0.25, 0.45), s.uniform(0.06, 0.18), s.uniform(0.25, 0.4));
+            let size = dvec3(s.uniform(0.25, 0.45), s.uniform(0.06, 0.18), s.uniform(0.25, 0.4));
             let size = size * (h / 1.7);
             let hang_m = 0.1 * h + 0.5 * size.z;
             soft(b, hand - hang_m * DVec3::Z, size);
         }
         Carried::Box(held) => {
-            let size = DVec3::new(s.uniform(0.2, 0.35), s.uniform(0.3, 0.5), s.uniform(0.15, 0.4));
+            let size = dvec3(s.uniform(0.2, 0.35), s.uniform(0.3, 0.5), s.uniform(0.15, 0.4));
             block(b, held + 0.06 * h * DVec3::X, size);
         }
         Carried::Umbrella(hand) => umbrella(b, s, hand, h),
         Carried::Suitcase(hand) => {
-            let foot = DVec3::new(hand.x - 0.45, hand.y, 0.0);
+            let foot = dvec3(hand.x - 0.45, hand.y, 0.0);
             b.turned(foot, DAffine3::from_rotation_y(0.5), |b| {
-                let size = DVec3::new(0.24, s.uniform(0.35, 0.48), s.uniform(0.5, 0.7));
+                let size = dvec3(0.24, s.uniform(0.35, 0.48), s.uniform(0.5, 0.7));
                 soft(b, (0.5 * size.z + 0.05) * DVec3::Z, size);
             });
             rod(b, foot + 0.5 * DVec3::Z, hand, [0.015, 0.015]);
@@ -115,7 +108,7 @@ fn umbrella(b: &mut Builder, s: &mut Sampler, hand: DVec3, h: f64) {
 fn pram(b: &mut Builder, s: &mut Sampler, handle: DVec3) {
     let half_y = s.uniform(0.22, 0.29);
     let wheel_m = s.uniform(0.09, 0.15);
-    let middle = handle + DVec3::new(s.uniform(0.45, 0.6), 0.0, 0.0);
+    let middle = handle + dvec3(s.uniform(0.45, 0.6), 0.0, 0.0);
     rod(b, handle - half_y * DVec3::Y, handle + half_y * DVec3::Y, [0.02, 0.02]);
     b.mirrored_y(|b| {
         let y = half_y * DVec3::Y;
@@ -131,7 +124,6 @@ fn pram(b: &mut Builder, s: &mut Sampler, handle: DVec3) {
     let section = |x, low, high| outline::upright(middle.x + x, half_y * 0.85, [low, high]);
     skin(b, &[section(-0.32, 0.55, 0.8), section(-0.1, 0.42, 0.8), section(0.4, 0.5, 0.78)]);
     if s.chance(0.7) {
-        let at = DVec3::new(middle.x - 0.12, middle.y, 0.82);
-        ellipsoid(b, at, DVec3::new(0.26, 0.85 * half_y, 0.26));
+        ellipsoid(b, dvec3(middle.x - 0.12, middle.y, 0.82), dvec3(0.26, 0.85 * half_y, 0.26));
     }
 }

@@ -1,14 +1,14 @@
 use super::body::{Leg, Measures};
 use super::pose::Pose;
-use crate::primitives::{Builder, DVec2, DVec3, Sampler, ellipsoid, frustum, outline, skin};
+use crate::primitives::*;
 
 /// A hood on a trunk that is upright above the middle of the hip joints.
 pub fn above_waist(b: &mut Builder, s: &mut Sampler, measures: &Measures) {
     let h = measures.stature_m;
     if s.chance(0.15) {
         // A hood or a thick collar that lies on the shoulders.
-        let at = DVec3::new(-0.045 * h, 0.0, measures.neck_m() - 0.01 * h);
-        ellipsoid(b, at, h * DVec3::new(0.045, 0.065, 0.035));
+        let at = dvec3(-0.045 * h, 0.0, measures.neck_m() - 0.01 * h);
+        ellipsoid(b, at, h * dvec3(0.045, 0.065, 0.035));
     }
 }
 
@@ -29,13 +29,12 @@ pub fn below_waist(b: &mut Builder, s: &mut Sampler, measures: &Measures, pose: 
     };
     let [a, c] = [at_hem(&right), at_hem(&left)];
     let [behind, ahead] = [a.min(c), a.max(c)];
-    let half =
-        DVec2::new(0.07, 0.1) * h * measures.girth + DVec2::splat(measures.cloth_m[0] + 0.01);
+    let half = dvec2(0.07, 0.1) * h * measures.girth + DVec2::splat(measures.cloth_m[0] + 0.01);
     let ring = |half: DVec2, x: f64, z: f64| {
         let outline = outline::ellipse(half, 12);
         outline.iter().map(|p| pose.pelvis + (p + DVec2::X * x).extend(z)).collect()
     };
-    let hem = DVec2::new(0.5 * (ahead - behind) + 0.06 * h, half.y * flare);
+    let hem = dvec2(0.5 * (ahead - behind) + 0.06 * h, half.y * flare);
     let middle = 0.5 * (behind + ahead);
     skin(
         b,
@@ -55,8 +54,8 @@ pub fn on_head(b: &mut Builder, s: &mut Sampler, measures: &Measures) {
     if worn < 0.25 {
         // Long hair, open or as a tail.
         let down = s.uniform(0.3, 1.2) * half_m;
-        let radii = half_m * DVec3::new(0.45, s.uniform(0.4, 0.75), 1.1);
-        ellipsoid(b, middle - DVec3::new(0.6 * half_m, 0.0, down), radii);
+        let radii = half_m * dvec3(0.45, s.uniform(0.4, 0.75), 1.1);
+        ellipsoid(b, middle - dvec3(0.6 * half_m, 0.0, down), radii);
     } else if worn < 0.33 {
         let brim_m = s.uniform(1.1, 1.7) * half_m;
         frustum(b, middle + 0.45 * half_m * DVec3::Z, [brim_m, brim_m], 0.02);
@@ -67,12 +66,12 @@ pub fn on_head(b: &mut Builder, s: &mut Sampler, measures: &Measures) {
             0.75 * half_m,
         );
     } else if worn < 0.45 {
-        ellipsoid(b, middle + 0.3 * half_m * DVec3::Z, half_m * DVec3::new(0.95, 0.8, 0.85));
+        ellipsoid(b, middle + 0.3 * half_m * DVec3::Z, half_m * dvec3(0.95, 0.8, 0.85));
     } else if worn < 0.55 {
-        ellipsoid(b, middle - 0.15 * half_m * DVec3::X, half_m * DVec3::new(1.05, 0.95, 1.2));
+        ellipsoid(b, middle - 0.15 * half_m * DVec3::X, half_m * dvec3(1.05, 0.95, 1.2));
     } else if worn < 0.75 {
         // Hair that adds to the volume of the head.
-        let radii = half_m * DVec3::new(0.9, s.uniform(0.74, 0.95), 0.9);
-        ellipsoid(b, middle + half_m * DVec3::new(-0.15, 0.0, 0.2), radii);
+        let radii = half_m * dvec3(0.9, s.uniform(0.74, 0.95), 0.9);
+        ellipsoid(b, middle + half_m * dvec3(-0.15, 0.0, 0.2), radii);
     }
 }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use glam::DVec3;
+use glam::{DVec3, dvec3};
 
 use super::body::{Leg, Measures, bent};
 use crate::primitives::Sampler;
@@ -87,9 +87,9 @@ impl Pose {
         self.pelvis.z -= lower_m;
         for (k, side) in [-1.0, 1.0].into_iter().enumerate() {
             let apart_m = s.uniform(0.035, 0.11) * h;
-            let ankle = DVec3::new(s.uniform(-0.07, 0.07) * h, side * apart_m, 0.039 * h);
+            let ankle = dvec3(s.uniform(-0.07, 0.07) * h, side * apart_m, 0.039 * h);
             let turned_rad = side * s.uniform(-5.0, 35.0).to_radians();
-            let toes = DVec3::new(libm::cos(turned_rad), libm::sin(turned_rad), 0.0);
+            let toes = dvec3(libm::cos(turned_rad), libm::sin(turned_rad), 0.0);
             self.legs[k] = self.leg_to(measures, side, ankle, toes);
             let [arm_rad, elbow_rad] = [s.uniform(-0.15, 0.25), s.uniform(0.05, 0.5)];
             self.hands[k] = self.hanging(measures, side, arm_rad, elbow_rad);
@@ -103,22 +103,22 @@ impl Pose {
         self.lean_rad = s.uniform(-15.0, 20.0).to_radians();
         for (k, side) in [-1.0, 1.0].into_iter().enumerate() {
             let apart_m = s.uniform(0.03, 0.12) * h;
-            let ankle = DVec3::new(s.uniform(0.18, 0.3) * h, side * apart_m, 0.039 * h);
+            let ankle = dvec3(s.uniform(0.18, 0.3) * h, side * apart_m, 0.039 * h);
             self.legs[k] = self.leg_to(measures, side, ankle, DVec3::X);
-            self.hands[k] = self.pelvis + DVec3::new(0.18 * h, side * 0.06 * h, 0.07 * h);
+            self.hands[k] = self.pelvis + dvec3(0.18 * h, side * 0.06 * h, 0.07 * h);
         }
     }
 
     /// The leg with these angles of hip, knee and sole in the plane of walking.
     fn leg(&self, measures: &Measures, side: f64, angles_rad: [f64; 3]) -> Leg {
         let [hip_rad, knee_rad, sole_rad] = angles_rad;
-        let down = |angle: f64| DVec3::new(libm::sin(angle), 0.0, -libm::cos(angle));
+        let down = |angle: f64| dvec3(libm::sin(angle), 0.0, -libm::cos(angle));
         let hip = self.pelvis + side * measures.hip_joint_m() * DVec3::Y;
         let knee = hip + measures.stature_m * Measures::THIGH * down(hip_rad);
         let inwards = -0.012 * side * measures.stature_m * DVec3::Y;
         let ankle =
             knee + inwards + measures.stature_m * Measures::SHANK * down(hip_rad - knee_rad);
-        let toes = DVec3::new(libm::cos(sole_rad), 0.1 * side, -libm::sin(sole_rad));
+        let toes = dvec3(libm::cos(sole_rad), 0.1 * side, -libm::sin(sole_rad));
         Leg { knee, ankle, toes }
     }
 
@@ -126,14 +126,14 @@ impl Pose {
     fn leg_to(&self, measures: &Measures, side: f64, ankle: DVec3, toes: DVec3) -> Leg {
         let hip = self.pelvis + side * measures.hip_joint_m() * DVec3::Y;
         let lengths = [Measures::THIGH, Measures::SHANK].map(|share| share * measures.stature_m);
-        let [knee, ankle] = bent(hip, ankle, lengths, DVec3::new(1.0, 0.15 * side, 0.2));
+        let [knee, ankle] = bent(hip, ankle, lengths, dvec3(1.0, 0.15 * side, 0.2));
         Leg { knee, ankle, toes }
     }
 
     /// The wrist of a hanging arm that is swung forward by `arm_rad` and bent by `elbow_rad`.
     fn hanging(&self, measures: &Measures, side: f64, arm_rad: f64, elbow_rad: f64) -> DVec3 {
         let h = measures.stature_m;
-        let down = |angle: f64| DVec3::new(libm::sin(angle), 0.0, -libm::cos(angle));
+        let down = |angle: f64| dvec3(libm::sin(angle), 0.0, -libm::cos(angle));
         let out = side * (0.035 + 0.04 * (measures.girth - 0.9)) * h * DVec3::Y;
         let shoulder = self.pelvis
             + measures.shoulder(side).with_x(measures.neck_m() * libm::sin(self.lean_rad));
@@ -145,13 +145,11 @@ impl Pose {
     fn occupy_hands(&mut self, s: &mut Sampler, measures: &Measures) {
         let h = measures.stature_m;
         let ahead_m = measures.neck_m() * libm::sin(self.lean_rad);
-        let at =
-            |x: f64, y: f64, z: f64| self.pelvis + h * DVec3::new(x, y, z) + ahead_m * DVec3::X;
+        let at = |x: f64, y: f64, z: f64| self.pelvis + h * dvec3(x, y, z) + ahead_m * DVec3::X;
         let side = s.pick(&[-1.0, 1.0]);
         let one = usize::from(side > 0.0);
         let chest_m = 0.11 + 0.1 * (measures.girth - 1.0);
-        let reach =
-            DVec3::new(s.uniform(-0.05, 0.35), side * s.uniform(0.1, 0.4), s.uniform(0.1, 0.4));
+        let reach = dvec3(s.uniform(-0.05, 0.35), side * s.uniform(0.1, 0.4), s.uniform(0.1, 0.4));
         match s.count(0, 6) {
             0 => self.hands = [at(0.0, -0.11, 0.02), at(0.0, 0.11, 0.02)],
             1 => self.hands[one] = at(0.045, 0.055 * side, 0.37),

@@ -3,7 +3,7 @@ use std::f64::consts::TAU;
 use super::foliage::{Clump, blade, fill, leaf, leaf_length_m};
 use super::uneven::{Lump, Ripple, direction};
 use super::wood::{Branch, Stem};
-use crate::primitives::{Builder, DAffine3, DVec2, DVec3, Makes, Sampler};
+use crate::primitives::{Builder, DAffine3, DVec3, Makes, Sampler, dvec2, dvec3};
 
 pub const MAKES: Makes =
     &[(5, loose), (6, trimmed), (2, thicket), (1, bare), (1, grass), (1, standard)];
@@ -13,13 +13,13 @@ fn loose(b: &mut Builder, s: &mut Sampler) {
     let height_m = s.log_uniform(0.6, 2.5);
     let reach_m = (height_m * s.uniform(0.35, 0.9)).max(0.3);
     let deep_m = reach_m * s.uniform(0.7, 1.0);
-    clumps(b, s, DVec3::new(reach_m, deep_m, height_m));
+    clumps(b, s, dvec3(reach_m, deep_m, height_m));
 }
 
 /// Several bushes that have grown together.
 fn thicket(b: &mut Builder, s: &mut Sampler) {
     let height_m = s.uniform(0.6, 2.3);
-    let half_m = DVec2::new(s.uniform(1.0, 2.2), s.uniform(0.4, 1.2));
+    let half_m = dvec2(s.uniform(1.0, 2.2), s.uniform(0.4, 1.2));
     clumps(b, s, half_m.extend(height_m));
 }
 
@@ -32,15 +32,14 @@ fn clumps(b: &mut Builder, s: &mut Sampler, size_m: DVec3) {
     let clump = |_| {
         let out = libm::cbrt(s.uniform(0.0, 1.0)) * s.uniform(1.0 - ragged, 1.0);
         let place = direction(s);
-        let radii_m = clump_m * s.uniform(0.5, 1.0) * DVec3::new(1.0, 1.0, s.uniform(0.6, 1.2));
+        let radii_m = clump_m * s.uniform(0.5, 1.0) * dvec3(1.0, 1.0, s.uniform(0.6, 1.2));
         let inner_m = (size_m - radii_m).max(0.3 * size_m);
         let at = out * place.with_z(place.z.abs()) * inner_m;
         Clump { centre: at.with_z(at.z.max(0.4 * radii_m.z)), radii_m }
     };
     let clumps: Vec<_> = (0..n).map(clump).collect();
     for clump in &clumps {
-        let foot = 0.15 * clump.centre.with_z(0.0);
-        blade(b, foot, clump.centre, 0.04);
+        blade(b, 0.15 * clump.centre.with_z(0.0), clump.centre, 0.04);
     }
     let layers = s.uniform(0.8, 2.5);
     fill(b, s, &clumps, 1400, layers);
@@ -57,7 +56,7 @@ fn trimmed(b: &mut Builder, s: &mut Sampler) {
     let rough_m = s.uniform(0.005, 0.05) * half_m;
     let body = Lump {
         centre: middle_m * DVec3::Z,
-        radii_m: DVec3::new(half_m, depth_m, height_m - middle_m),
+        radii_m: dvec3(half_m, depth_m, height_m - middle_m),
         exponent: s.pick(&[2.0, 2.0, 2.0, 2.5, 4.0]),
         ripple: Ripple::draw(s, half_m * 0.7, rough_m),
     };
@@ -73,7 +72,7 @@ fn trimmed(b: &mut Builder, s: &mut Sampler) {
 /// Adds `body`, or a smaller core of it, and leaves in its surface above the ground.
 fn coated(b: &mut Builder, s: &mut Sampler, body: &Lump) {
     let heart = s.pick(&[1.0, 0.9, 0.75]);
-    b.place(DAffine3::from_scale(DVec3::new(heart, heart, 1.0)), |b| body.build(b));
+    b.place(DAffine3::from_scale(dvec3(heart, heart, 1.0)), |b| body.build(b));
     let deep = 1.2 * (1.0 - heart);
     let high_m = body.radii_m.z + body.centre.z.min(body.radii_m.z);
     let area_m2 = TAU * body.radii_m.x * high_m;

@@ -1,6 +1,6 @@
 use super::foliage::{blade, leaf, leaf_length_m};
 use super::uneven::{BoxFace, Ripple, warped_box};
-use crate::primitives::{Builder, DVec3, Sampler};
+use crate::primitives::{Builder, DVec3, Sampler, dvec3};
 
 /// A piece of hedge without a gap, which stands on the ground along x.
 struct Piece {
@@ -24,9 +24,9 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
     let mut x = 0.0;
     for _ in 0..n {
         let share_m = long_m / n as f64 * s.uniform(0.85, 1.0);
-        let size_m = DVec3::new(share_m, wide_m, height_m * s.uniform(0.93, 1.0));
+        let size_m = dvec3(share_m, wide_m, height_m * s.uniform(0.93, 1.0));
         let ripple = Ripple::draw(s, 0.6, rough_m);
-        let middle = DVec3::new(x + 0.5 * share_m, s.uniform(-0.05, 0.05), 0.0);
+        let middle = dvec3(x + 0.5 * share_m, s.uniform(-0.05, 0.05), 0.0);
         b.shifted(middle, |b| plant(b, s, &Piece { size_m, taper, round, ripple }));
         x += share_m + s.pick(&[0.1, 0.3, 0.8]);
     }
@@ -38,7 +38,7 @@ impl Piece {
         let across = 2.0 * p.y / self.size_m.y;
         let narrow = 1.0 - (1.0 - self.taper) * p.z / self.size_m.z;
         let z = p.z * (1.0 - self.round * across.powi(4));
-        let bent = DVec3::new(p.x, p.y * narrow, z);
+        let bent = dvec3(p.x, p.y * narrow, z);
         let out = (bent - 0.5 * self.size_m.z * DVec3::Z).normalize_or(DVec3::Z);
         let moved = bent + self.ripple.at(bent) * out;
         moved.with_z(moved.z.max(0.0))
@@ -73,7 +73,7 @@ impl Piece {
 
 /// Leaves on an opaque body.
 fn dense(b: &mut Builder, s: &mut Sampler, piece: &Piece) {
-    warped_box(b, piece.size_m, 0.3, |p| piece.warp(p * DVec3::new(0.97, 0.85, 0.95)));
+    warped_box(b, piece.size_m, 0.3, |p| piece.warp(p * dvec3(0.97, 0.85, 0.95)));
     let layers = s.uniform(0.3, 0.7);
     piece.leaves(b, s, [0.1, layers], |_| true);
 }
@@ -95,7 +95,6 @@ fn loose(b: &mut Builder, s: &mut Sampler, piece: &Piece) {
     for _ in 0..(8.0 * piece.size_m.x) as usize {
         let x = s.uniform(-half_m.x, half_m.x);
         let y = 0.5 * s.uniform(-half_m.y, half_m.y);
-        let top = DVec3::new(x + s.uniform(-0.2, 0.2), 1.5 * y, 1.6 * half_m.z);
-        blade(b, DVec3::new(x, y, 0.0), top, 0.05);
+        blade(b, dvec3(x, y, 0.0), dvec3(x + s.uniform(-0.2, 0.2), 1.5 * y, 1.6 * half_m.z), 0.05);
     }
 }

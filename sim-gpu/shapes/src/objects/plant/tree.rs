@@ -8,7 +8,7 @@ use std::f64::consts::TAU;
 use super::foliage::{Clump, fill, leaf, leaf_length_m};
 use super::uneven::{Lump, Ripple, direction};
 use super::wood::{Branch, Stem, bough};
-use crate::primitives::{Builder, DVec2, DVec3, Makes, Sampler};
+use crate::primitives::{Builder, DVec2, DVec3, Makes, Sampler, dvec3};
 
 pub const MAKES: Makes = &[(6, broadleaved), (2, conifer), (2, bare), (1, column), (1, palm)];
 
@@ -33,7 +33,7 @@ impl Form {
 
     fn crown(&self) -> (DVec3, DVec3) {
         let half_m = 0.5 * (self.height_m - self.crown_m);
-        let radii_m = DVec3::new(self.reach_m, self.reach_m, half_m);
+        let radii_m = dvec3(self.reach_m, self.reach_m, half_m);
         ((self.crown_m + half_m) * DVec3::Z, radii_m)
     }
 
@@ -64,7 +64,7 @@ fn broadleaved(b: &mut Builder, s: &mut Sampler) {
     let size = s.uniform(0.75, 1.1) / libm::cbrt(n as f64);
     let clump = |_| {
         let out = libm::cbrt(s.uniform(0.1, 1.0)) * (1.0 - 0.6 * size);
-        let flat = DVec3::new(1.0, 1.0, s.uniform(0.6, 1.0));
+        let flat = dvec3(1.0, 1.0, s.uniform(0.6, 1.0));
         let radii_m = size * s.uniform(0.7, 1.3) * crown_m * flat;
         Clump { centre: middle + out * direction(s) * crown_m, radii_m }
     };
@@ -99,7 +99,7 @@ fn conifer(b: &mut Builder, s: &mut Sampler) {
             let turn_rad = (branch as f64 + s.uniform(0.0, 1.0)) / n as f64 * TAU;
             let along = length_m * DVec2::from_angle(turn_rad).extend(droop);
             for part in [0.4, 0.8] {
-                let radii_m = length_m * DVec3::new(0.3, 0.3, 0.16);
+                let radii_m = length_m * dvec3(0.3, 0.3, 0.16);
                 clumps.push(Clump { centre: z * DVec3::Z + part * along, radii_m });
             }
         }
@@ -130,16 +130,15 @@ fn column(b: &mut Builder, s: &mut Sampler) {
     let half_m = (height_m * s.uniform(0.07, 0.2)).max(0.42);
     let rough_m = s.uniform(0.02, 0.08) * half_m;
     let ripple = Ripple::draw(s, half_m, rough_m);
-    let radii_m = DVec3::new(half_m, half_m, 0.5 * height_m);
+    let radii_m = dvec3(half_m, half_m, 0.5 * height_m);
     let body = Lump { centre: 0.5 * height_m * DVec3::Z, radii_m, exponent: 2.0, ripple };
     body.build(b);
     let length_m = leaf_length_m(1500, TAU * half_m * height_m, s.uniform(0.2, 0.5));
     for _ in 0..1500 {
         let out = direction(s);
         // The cube puts more points on the long side than at the ends.
-        let out = DVec3::new(out.x, out.y, out.z.powi(3)).normalize_or(DVec3::X);
-        let at = body.at(out) * DVec3::new(1.03, 1.03, 1.0);
-        leaf(b, s, at, length_m);
+        let out = dvec3(out.x, out.y, out.z.powi(3)).normalize_or(DVec3::X);
+        leaf(b, s, body.at(out) * dvec3(1.03, 1.03, 1.0), length_m);
     }
 }
 

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::foliage::{blade, leaf};
 use super::uneven::direction;
 use super::wood::{Stem, bough};
-use crate::primitives::{Builder, DVec3, Sampler};
+use crate::primitives::{Builder, DVec3, Sampler, dvec3};
 
 pub fn build(b: &mut Builder, s: &mut Sampler) {
     let radius_m = s.log_uniform(0.05, 0.5);
@@ -20,8 +20,7 @@ pub fn build(b: &mut Builder, s: &mut Sampler) {
         fork(b, s, top, radius_m, height_m - fork_m);
     }
     for _ in 0..s.pick(&[0, 0, 0, 1, 2, 4]) {
-        let share = s.uniform(0.4, 1.0);
-        let from = stem.at(share);
+        let from = stem.at(s.uniform(0.4, 1.0));
         let out = direction(s) + 0.8 * DVec3::Z;
         bough(b, from, from + s.uniform(0.2, 1.0) * out, 0.3 * radius_m, 0.05);
     }
@@ -39,11 +38,10 @@ fn fork(b: &mut Builder, s: &mut Sampler, from: DVec3, radius_m: f64, rise_m: f6
     let turn_rad = s.uniform(0.0, TAU);
     for limb in 0..n {
         let (sin, cos) = libm::sincos(turn_rad + limb as f64 / n as f64 * TAU);
-        let apart = rise_m * s.uniform(0.12, 0.5) * DVec3::new(cos, sin, 0.0);
+        let apart = rise_m * s.uniform(0.12, 0.5) * dvec3(cos, sin, 0.0);
         let foot = from - 0.4 * radius_m * DVec3::Z;
         let thick_m = radius_m * s.uniform(0.5, 0.8);
-        let top = from + apart + rise_m * DVec3::Z;
-        Stem::draw(s, foot, top, [thick_m, 0.8 * thick_m]).build(b);
+        Stem::draw(s, foot, from + apart + rise_m * DVec3::Z, [thick_m, 0.8 * thick_m]).build(b);
     }
 }
 
@@ -63,7 +61,7 @@ fn ivy(b: &mut Builder, s: &mut Sampler, stem: &Stem) {
 fn shoots(b: &mut Builder, s: &mut Sampler, radius_m: f64) {
     for _ in 0..80 {
         let (sin, cos) = libm::sincos(s.uniform(0.0, TAU));
-        let foot = radius_m * s.uniform(1.0, 1.6) * DVec3::new(cos, sin, 0.0);
+        let foot = radius_m * s.uniform(1.0, 1.6) * dvec3(cos, sin, 0.0);
         let top = foot + s.uniform(0.1, 0.5) * (DVec3::Z + 0.4 * direction(s));
         blade(b, foot, top.with_z(top.z.max(0.05)), 0.02);
     }

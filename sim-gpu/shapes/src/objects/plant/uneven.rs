@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::primitives::{Builder, DVec3, Sampler};
+use crate::primitives::{Builder, DVec3, Sampler, dvec3};
 
 /// The number of waves in a ripple, enough to show no pattern.
 const N_WAVES: usize = 12;
@@ -15,7 +15,7 @@ pub fn direction(s: &mut Sampler) -> DVec3 {
     let z = s.uniform(-1.0, 1.0);
     let (sin, cos) = libm::sincos(s.uniform(0.0, TAU));
     let across = (1.0 - z * z).sqrt();
-    DVec3::new(across * cos, across * sin, z)
+    dvec3(across * cos, across * sin, z)
 }
 
 /// A height that varies smoothly and irregularly with the place.
@@ -71,7 +71,7 @@ impl Lump {
             let n = if j == 0 || j == N_AROUND / 2 { 1 } else { N_AROUND };
             let point = |i: usize| {
                 let (y, x) = libm::sincos(i as f64 / N_AROUND as f64 * TAU);
-                self.at(DVec3::new(sin * x, sin * y, -cos))
+                self.at(dvec3(sin * x, sin * y, -cos))
             };
             (0..n).map(point).collect()
         };
@@ -117,9 +117,9 @@ impl BoxFace {
     pub fn at(self, size_m: DVec3, u: f64, v: f64) -> DVec3 {
         let [across, up] = [u - 0.5, v - 0.5];
         let unit = match self {
-            Self::End(side) => DVec3::new(0.5 * side, across * side, v),
-            Self::Side(side) => DVec3::new(-across * side, 0.5 * side, v),
-            Self::Top => DVec3::new(across, up, 1.0),
+            Self::End(side) => dvec3(0.5 * side, across * side, v),
+            Self::Side(side) => dvec3(-across * side, 0.5 * side, v),
+            Self::Top => dvec3(across, up, 1.0),
         };
         unit * size_m
     }

@@ -1,10 +1,7 @@
 //! Lamp posts: columns of 3 to 10 m (EN 40-2) with one or two luminaires.
 
 use super::shaft;
-use crate::primitives::{
-    Builder, DAffine3, DVec3, Makes, Profile, Sampler, Section, block, cushion, cylinder,
-    ellipsoid, frustum, rod, smooth_tube,
-};
+use crate::primitives::*;
 
 pub const MAKES: Makes = &[(4, arm), (3, post_top), (2, lantern)];
 
@@ -25,14 +22,13 @@ fn arm(b: &mut Builder, s: &mut Sampler) {
     let reach_m = s.uniform(0.3, 2.0);
     let rise_m = s.uniform(0.0, 0.8);
     column(b, s, height_m);
-    let size = DVec3::new(s.uniform(0.4, 0.9), s.uniform(0.2, 0.4), s.uniform(0.08, 0.2));
+    let size = dvec3(s.uniform(0.4, 0.9), s.uniform(0.2, 0.4), s.uniform(0.08, 0.2));
     let curved = s.chance(0.5);
     let build = |b: &mut Builder| {
         let from = height_m * DVec3::Z;
-        let to = from + DVec3::new(reach_m, 0.0, rise_m);
+        let to = from + dvec3(reach_m, 0.0, rise_m);
         if curved {
-            let bend = from + DVec3::new(0.25 * reach_m, 0.0, 0.85 * rise_m);
-            smooth_tube(b, &[from, bend, to], 3, 0.04);
+            smooth_tube(b, &[from, from + dvec3(0.25 * reach_m, 0.0, 0.85 * rise_m), to], 3, 0.04);
         } else {
             rod(b, from, to, [0.04, 0.03]);
         }
@@ -80,6 +76,6 @@ fn lantern(b: &mut Builder, s: &mut Sampler) {
         .line(0.0, 0.8);
     b.shifted(height_m * DVec3::Z, |b| lamp.revolve(b, section));
     if s.chance(0.3) {
-        block(b, 0.92 * height_m * DVec3::Z, DVec3::new(0.05, 0.8, 0.05));
+        block(b, 0.92 * height_m * DVec3::Z, dvec3(0.05, 0.8, 0.05));
     }
 }

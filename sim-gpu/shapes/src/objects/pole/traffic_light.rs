@@ -6,25 +6,21 @@
 use std::f64::consts::PI;
 
 use super::shaft;
-use crate::primitives::{
-    Builder, DAffine3, DVec3, Makes, Sampler, Section, block, cushion, rod, sheet,
-};
+use crate::primitives::*;
 
 pub const MAKES: Makes = &[(4, mast), (2, gantry), (2, pedestrian)];
 
 /// A head with `n` lenses that faces +x, with its middle at `centre`.
 fn head(b: &mut Builder, s: &mut Sampler, centre: DVec3, n: usize, lens_m: f64) {
     let pitch_m = 1.12 * lens_m;
-    let size = DVec3::new(s.uniform(0.12, 0.25), 1.25 * lens_m, pitch_m * n as f64 + 0.03);
+    let size = dvec3(s.uniform(0.12, 0.25), 1.25 * lens_m, pitch_m * n as f64 + 0.03);
     cushion(b, centre, size, 0.03);
     for lens in 0..n {
         let z = (lens as f64 - 0.5 * (n - 1) as f64) * pitch_m;
-        let front = centre + DVec3::new(0.5 * size.x, 0.0, z);
-        visor(b, front, 0.5 * lens_m);
+        visor(b, centre + dvec3(0.5 * size.x, 0.0, z), 0.5 * lens_m);
     }
     if s.chance(0.3) {
-        let margin = DVec3::new(0.0, 0.3, 0.3);
-        block(b, centre, (size + margin).with_x(0.01));
+        block(b, centre, (size + dvec3(0.0, 0.3, 0.3)).with_x(0.01));
     }
 }
 
@@ -32,7 +28,7 @@ fn head(b: &mut Builder, s: &mut Sampler, centre: DVec3, n: usize, lens_m: f64) 
 fn visor(b: &mut Builder, lens: DVec3, radius_m: f64) {
     sheet(b, [PI * radius_m, radius_m], |u, v| {
         let (sin, cos) = libm::sincos(PI * (1.2 * u - 0.1));
-        lens + DVec3::new(1.2 * v * radius_m, radius_m * cos, radius_m * sin)
+        lens + dvec3(1.2 * v * radius_m, radius_m * cos, radius_m * sin)
     });
 }
 
@@ -47,27 +43,27 @@ fn mast(b: &mut Builder, s: &mut Sampler) {
     let places = [vec![0.0], vec![wide_m], vec![-wide_m, wide_m], vec![0.0, wide_m]];
     for y in s.pick(&places) {
         let n = s.pick(&[2, 3, 3, 3, 4]);
-        let out = DVec3::new(radius_m + 0.13, y, middle_m);
+        let out = dvec3(radius_m + 0.13, y, middle_m);
         rod(b, middle_m * DVec3::Z, out, [0.03, 0.03]);
         let turn = DAffine3::from_rotation_z(s.pick(&[0.0, 0.0, 0.4, 1.6]));
         b.turned(out, turn, |b| head(b, s, DVec3::ZERO, n, lens_m));
     }
     if s.chance(0.2) {
-        let panel = DVec3::new(0.02, s.uniform(0.4, 1.6), s.uniform(0.25, 0.6));
-        block(b, DVec3::new(radius_m, 0.0, middle_m - 2.6 * lens_m), panel);
+        let panel = dvec3(0.02, s.uniform(0.4, 1.6), s.uniform(0.25, 0.6));
+        block(b, dvec3(radius_m, 0.0, middle_m - 2.6 * lens_m), panel);
     }
     if s.chance(0.6) {
         push_button(b, radius_m);
     }
     if s.chance(0.3) {
-        let cabinet = DVec3::new(0.3, 0.35, s.uniform(0.5, 1.2));
-        block(b, DVec3::new(-0.25, 0.0, 0.5 * cabinet.z), cabinet);
+        let cabinet = dvec3(0.3, 0.35, s.uniform(0.5, 1.2));
+        block(b, dvec3(-0.25, 0.0, 0.5 * cabinet.z), cabinet);
     }
 }
 
 /// The push button for pedestrians, at the height of a hand.
 fn push_button(b: &mut Builder, radius_m: f64) {
-    block(b, DVec3::new(radius_m + 0.05, 0.0, 1.0), DVec3::new(0.1, 0.12, 0.25));
+    block(b, dvec3(radius_m + 0.05, 0.0, 1.0), dvec3(0.1, 0.12, 0.25));
 }
 
 /// A tall mast with an arm over the road.
@@ -76,12 +72,12 @@ fn gantry(b: &mut Builder, s: &mut Sampler) {
     let arm_m = s.uniform(5.2, 6.5);
     let reach_m = s.uniform(2.5, 6.0);
     shaft(b, [radius_m, 0.8 * radius_m], arm_m + 0.3, Section::Round);
-    let end = DVec3::new(0.0, reach_m, arm_m + s.uniform(0.0, 0.4));
+    let end = dvec3(0.0, reach_m, arm_m + s.uniform(0.0, 0.4));
     rod(b, arm_m * DVec3::Z, end, [0.7 * radius_m, 0.4 * radius_m]);
-    head(b, s, end + DVec3::new(0.15, -0.2, -0.2), 3, 0.3);
+    head(b, s, end + dvec3(0.15, -0.2, -0.2), 3, 0.3);
     if s.chance(0.6) {
         let lens_m = s.pick(&[0.2, 0.3]);
-        head(b, s, DVec3::new(radius_m + 0.15, 0.0, 2.8), 3, lens_m);
+        head(b, s, dvec3(radius_m + 0.15, 0.0, 2.8), 3, lens_m);
     }
 }
 
@@ -91,7 +87,7 @@ fn pedestrian(b: &mut Builder, s: &mut Sampler) {
     let z = s.uniform(2.2, 2.6);
     shaft(b, [radius_m, radius_m], z + 0.35, Section::Round);
     let lens_m = s.pick(&[0.2, 0.3]);
-    head(b, s, DVec3::new(radius_m + 0.12, 0.0, z), 2, lens_m);
+    head(b, s, dvec3(radius_m + 0.12, 0.0, z), 2, lens_m);
     if s.chance(0.7) {
         push_button(b, radius_m);
     }

@@ -8,17 +8,14 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::{draw_section, shaft};
-use crate::primitives::{
-    Builder, DAffine3, DVec2, DVec3, Makes, Sampler, Section, block, outline, prism,
-};
+use crate::primitives::*;
 
 pub const MAKES: Makes = &[(6, single), (3, board), (2, low_panel), (1, street_name), (2, stele)];
 
 /// Adds a plate across x with its middle at `centre`. The axes of `outline` point up and to the
 /// left.
 fn plate(b: &mut Builder, outline: &[DVec2], centre: DVec3, thick_m: f64) {
-    let upright = DAffine3::from_rotation_y(-FRAC_PI_2);
-    b.turned(centre, upright, |b| {
+    b.turned(centre, DAffine3::from_rotation_y(-FRAC_PI_2), |b| {
         prism(b, outline, -0.5 * thick_m, 0.5 * thick_m, 1.0);
     });
 }
@@ -40,7 +37,7 @@ fn draw_outline(s: &mut Sampler) -> Vec<DVec2> {
         2 => corners(3, apex_m, s.pick(&[0.0, 0.5 * TAU])),
         3 => corners(8, 0.54 * octagon_m, TAU / 16.0),
         4 => corners(4, square_m * 0.5_f64.sqrt(), s.pick(&[0.0, TAU / 8.0])),
-        _ => outline::rectangle(DVec2::new(s.uniform(0.6, 1.2), square_m) / 2.0),
+        _ => outline::rectangle(dvec2(s.uniform(0.6, 1.2), square_m) / 2.0),
     }
 }
 
@@ -58,7 +55,7 @@ fn single(b: &mut Builder, s: &mut Sampler) {
         let tablet = number > 0 && s.chance(0.6);
         let high_m = s.uniform(0.2, 0.42);
         let outline = if tablet {
-            outline::rectangle(DVec2::new(high_m, s.uniform(0.42, 0.6)) / 2.0)
+            outline::rectangle(dvec2(high_m, s.uniform(0.42, 0.6)) / 2.0)
         } else {
             draw_outline(s)
         };
@@ -67,8 +64,7 @@ fn single(b: &mut Builder, s: &mut Sampler) {
         z += below_m;
         let y = flag * outline.iter().map(|p| p.y).fold(0.0, f64::max);
         for side in if back_to_back { vec![1.0, -1.0] } else { vec![1.0] } {
-            let centre = DVec3::new(side * (radius_m + 0.015), y, z);
-            plate(b, &outline, centre, 0.01);
+            plate(b, &outline, dvec3(side * (radius_m + 0.015), y, z), 0.01);
         }
         z += above_m + 0.03;
     }
@@ -81,8 +77,8 @@ fn board(b: &mut Builder, s: &mut Sampler) {
     let high_m = wide_m * s.uniform(0.25, 0.8);
     let low_m = s.uniform(1.0, 2.3);
     let post_m = s.uniform(0.03, 0.08);
-    let panel = DVec3::new(s.uniform(0.01, 0.06), wide_m, high_m);
-    block(b, DVec3::new(post_m + 0.5 * panel.x, 0.0, low_m + 0.5 * high_m), panel);
+    let panel = dvec3(s.uniform(0.01, 0.06), wide_m, high_m);
+    block(b, dvec3(post_m + 0.5 * panel.x, 0.0, low_m + 0.5 * high_m), panel);
     let y = 0.5 * wide_m * s.uniform(0.5, 0.9);
     for side in [-1.0, 1.0] {
         b.shifted(side * y * DVec3::Y, |b| {
@@ -94,30 +90,30 @@ fn board(b: &mut Builder, s: &mut Sampler) {
 /// A panel at the height of a car: a chevron, an obstacle marker, or the beacon of a road work on
 /// its foot.
 fn low_panel(b: &mut Builder, s: &mut Sampler) {
-    let size = DVec3::new(0.03, s.uniform(0.25, 0.6), s.uniform(0.5, 1.0));
+    let size = dvec3(0.03, s.uniform(0.25, 0.6), s.uniform(0.5, 1.0));
     let top_m = s.uniform(1.25, 1.9);
     block(b, (top_m - 0.5 * size.z) * DVec3::Z + 0.05 * DVec3::X, size);
     shaft(b, [0.03, 0.03], top_m, draw_section(s));
     if s.chance(0.4) {
-        block(b, 0.06 * DVec3::Z, DVec3::new(0.8, 0.4, 0.12));
+        block(b, 0.06 * DVec3::Z, dvec3(0.8, 0.4, 0.12));
     }
 }
 
 /// One or two street name signs, at right angles.
 fn street_name(b: &mut Builder, s: &mut Sampler) {
     let z = s.uniform(2.2, 3.0);
-    let size = DVec3::new(0.02, s.uniform(0.6, 1.1), s.uniform(0.15, 0.25));
+    let size = dvec3(0.02, s.uniform(0.6, 1.1), s.uniform(0.15, 0.25));
     shaft(b, [0.03, 0.03], z, draw_section(s));
     block(b, (z + 0.5 * size.z) * DVec3::Z, size);
     if s.chance(0.7) {
-        block(b, (z + 1.5 * size.z) * DVec3::Z, DVec3::new(size.y, size.x, size.z));
+        block(b, (z + 1.5 * size.z) * DVec3::Z, dvec3(size.y, size.x, size.z));
     }
 }
 
 /// A narrow board on the ground or on a low foot, about as high as a person: a town map, a price
 /// board, a shop board.
 fn stele(b: &mut Builder, s: &mut Sampler) {
-    let size = DVec3::new(s.log_uniform(0.03, 0.3), s.log_uniform(0.3, 1.2), s.uniform(1.25, 2.4));
+    let size = dvec3(s.log_uniform(0.03, 0.3), s.log_uniform(0.3, 1.2), s.uniform(1.25, 2.4));
     let low_m = s.pick(&[0.0, 0.0, 0.3, 0.7]);
     block(b, (low_m + 0.5 * size.z) * DVec3::Z, size);
     if low_m > 0.0 {

@@ -1,7 +1,4 @@
-use crate::primitives::{
-    Builder, DAffine3, DVec2, DVec3, Makes, Profile, Sampler, Section, Vessel, Wall, block,
-    cylinder, ellipsoid, loft, outline, prism, rod,
-};
+use crate::primitives::*;
 
 pub const MAKES: Makes =
     &[(3, litter), (4, two_wheels), (3, four_wheels), (1, skip), (1, bottle_bank), (2, group)];
@@ -36,12 +33,12 @@ fn litter(b: &mut Builder, s: &mut Sampler) {
         .line(radius_m, lift_m + height_m);
     Vessel::new(profile, Wall::Solid(0.02), section).build(b);
     if lift_m > 0.0 {
-        let post = DVec3::new(-radius_m - 0.04, 0.0, 0.0);
+        let post = dvec3(-radius_m - 0.04, 0.0, 0.0);
         cylinder(b, post, 0.04, lift_m + height_m + s.uniform(0.0, 0.3));
     }
     let top = (lift_m + height_m) * DVec3::Z;
     match s.count(0, 2) {
-        0 => ellipsoid(b, top, DVec3::new(radius_m, radius_m, 0.12)),
+        0 => ellipsoid(b, top, dvec3(radius_m, radius_m, 0.12)),
         1 => {
             cylinder(b, top + 0.2 * DVec3::Z, 1.05 * radius_m, 0.04);
             for y in [-0.8 * radius_m, 0.8 * radius_m] {
@@ -57,14 +54,13 @@ fn litter(b: &mut Builder, s: &mut Sampler) {
 fn two_wheels(b: &mut Builder, s: &mut Sampler) {
     let [deep_m, wide_m, high_m] = sized(s, &TWO_WHEELS_M);
     let rim_m = 0.92 * high_m;
-    let size = DVec2::new(0.88 * deep_m, wide_m);
-    body(b, size, s.uniform(0.72, 0.85), 0.05, rim_m);
-    lid(b, s, DVec3::new(deep_m, wide_m, high_m - rim_m), rim_m);
+    body(b, dvec2(0.88 * deep_m, wide_m), s.uniform(0.72, 0.85), 0.05, rim_m);
+    lid(b, s, dvec3(deep_m, wide_m, high_m - rim_m), rim_m);
     // The handle and the wheels are at the rear.
-    let handle = DVec3::new(-0.5 * deep_m, 0.0, rim_m - 0.03);
+    let handle = dvec3(-0.5 * deep_m, 0.0, rim_m - 0.03);
     rod(b, handle - 0.4 * wide_m * DVec3::Y, handle + 0.4 * wide_m * DVec3::Y, [0.015, 0.015]);
     for side in [-1.0, 1.0] {
-        wheel(b, DVec3::new(-0.36 * deep_m, side * 0.42 * wide_m, 0.1), 0.1);
+        wheel(b, dvec3(-0.36 * deep_m, side * 0.42 * wide_m, 0.1), 0.1);
     }
 }
 
@@ -72,7 +68,7 @@ fn two_wheels(b: &mut Builder, s: &mut Sampler) {
 fn lid(b: &mut Builder, s: &mut Sampler, size: DVec3, rim_m: f64) {
     let open = s.chance(0.08);
     let turn_rad = if open { -s.uniform(1.7, 4.3) } else { -s.uniform(-0.03, 0.06) };
-    let hinge = DVec3::new(-0.46 * size.x, 0.0, rim_m);
+    let hinge = dvec3(-0.46 * size.x, 0.0, rim_m);
     let row = |share: f64, z: f64| -> Vec<DVec3> {
         let outline = outline::rectangle(0.5 * share * size.truncate());
         outline.iter().map(|p| (p + 0.46 * size.x * DVec2::X).extend(z)).collect()
@@ -90,19 +86,19 @@ fn wheel(b: &mut Builder, centre: DVec3, radius_m: f64) {
 fn four_wheels(b: &mut Builder, s: &mut Sampler) {
     let [deep_m, wide_m, high_m] = sized(s, &FOUR_WHEELS_M);
     let rim_m = 0.85 * high_m;
-    body(b, DVec2::new(0.95 * deep_m, 0.95 * wide_m), s.uniform(0.78, 0.9), 0.2, rim_m);
+    body(b, dvec2(0.95 * deep_m, 0.95 * wide_m), s.uniform(0.78, 0.9), 0.2, rim_m);
     if s.chance(0.5) {
-        let half = DVec3::new(0.5 * deep_m, 0.5 * wide_m, high_m - rim_m);
+        let half = dvec3(0.5 * deep_m, 0.5 * wide_m, high_m - rim_m);
         b.shifted(rim_m * DVec3::Z, |b| loft(b, &[-1.0, 1.0].map(|side| arch(half, side))));
     } else {
-        lid(b, s, DVec3::new(deep_m, wide_m, high_m - rim_m), rim_m);
+        lid(b, s, dvec3(deep_m, wide_m, high_m - rim_m), rim_m);
     }
     for (x, y) in [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)] {
-        wheel(b, DVec3::new(0.33 * x * deep_m, 0.38 * y * wide_m, 0.1), 0.1);
+        wheel(b, dvec3(0.33 * x * deep_m, 0.38 * y * wide_m, 0.1), 0.1);
     }
     for side in [-1.0, 1.0] {
         // The trunnions, where lorries lift the bin.
-        let at = DVec3::new(0.0, side * 0.5 * wide_m, 0.8 * high_m);
+        let at = dvec3(0.0, side * 0.5 * wide_m, 0.8 * high_m);
         rod(b, at, at + 0.06 * side * DVec3::Y, [0.025, 0.025]);
     }
 }
@@ -110,15 +106,15 @@ fn four_wheels(b: &mut Builder, s: &mut Sampler) {
 /// One end of a round lid: an arch over the x axis.
 fn arch(half: DVec3, side: f64) -> Vec<DVec3> {
     let at = |k: usize| libm::sincos(k as f64 / 6.0 * std::f64::consts::PI);
-    (0..=6).map(at).map(|(sin, cos)| half * DVec3::new(cos, side, sin)).collect()
+    (0..=6).map(at).map(|(sin, cos)| half * dvec3(cos, side, sin)).collect()
 }
 
 /// An open container with sloping ends.
 fn skip(b: &mut Builder, s: &mut Sampler) {
-    let half = DVec2::new(s.uniform(1.4, 1.95), s.uniform(0.8, 0.95));
+    let half = dvec2(s.uniform(1.4, 1.95), s.uniform(0.8, 0.95));
     let high_m = s.uniform(1.0, 1.6);
     let section = |share: f64, z: f64, inset: f64| {
-        let half = (1.0 - inset) * half * DVec2::new(share, 1.0);
+        let half = (1.0 - inset) * half * dvec2(share, 1.0);
         outline::at_height(&outline::rectangle(half), z)
     };
     let foot = s.uniform(0.55, 0.75);
@@ -128,7 +124,7 @@ fn skip(b: &mut Builder, s: &mut Sampler) {
     let inner = [section(filled, floor_m, 0.02), vec![floor_m * DVec3::Z]];
     b.grid(&rows.into_iter().chain(inner).collect::<Vec<_>>(), true);
     for x in [-0.4 * half.x, 0.4 * half.x] {
-        block(b, DVec3::new(x, 0.0, 0.05), DVec3::new(0.2, 1.6 * half.y, 0.1));
+        block(b, dvec3(x, 0.0, 0.05), dvec3(0.2, 1.6 * half.y, 0.1));
     }
 }
 
@@ -142,18 +138,16 @@ fn bottle_bank(b: &mut Builder, s: &mut Sampler) {
             .curve(&[(0.85 * half_m, 0.75 * high_m), (0.4 * half_m, 0.97 * high_m), (0.0, high_m)])
             .revolve(b, s.pick(&[Section::Round, Section::Square(5.0)]));
     }
-    let outline = outline::rounded_rectangle(half_m * DVec2::new(0.9, 1.0), 0.1, 2);
-    prism(b, &outline, 0.05, high_m, 1.0);
-    block(b, DVec3::new(0.9 * half_m, 0.0, 0.75 * high_m), DVec3::new(0.1, 0.8 * half_m, 0.25));
+    prism(b, &outline::rounded_rectangle(half_m * dvec2(0.9, 1.0), 0.1, 2), 0.05, high_m, 1.0);
+    block(b, dvec3(0.9 * half_m, 0.0, 0.75 * high_m), dvec3(0.1, 0.8 * half_m, 0.25));
 }
 
 /// Bins beside each other, as on the day of their collection.
 fn group(b: &mut Builder, s: &mut Sampler) {
     let mut y = 0.0;
     for _ in 0..s.count(2, 4) {
-        let place = DVec3::new(s.uniform(-0.08, 0.08), y, 0.0);
-        let turn = DAffine3::from_rotation_z(s.uniform(-0.15, 0.15));
-        b.turned(place, turn, |b| two_wheels(b, s));
+        let place = dvec3(s.uniform(-0.08, 0.08), y, 0.0);
+        b.turned(place, DAffine3::from_rotation_z(s.uniform(-0.15, 0.15)), |b| two_wheels(b, s));
         y += s.uniform(0.66, 0.8);
     }
 }

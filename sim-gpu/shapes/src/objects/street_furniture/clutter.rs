@@ -2,10 +2,7 @@
 
 use crate::objects::plant::bush;
 use crate::objects::plant::uneven::{Lump, Ripple, direction};
-use crate::primitives::{
-    Builder, DAffine3, DVec2, DVec3, Makes, Profile, Sampler, Section, block, build_one, outline,
-    rod,
-};
+use crate::primitives::*;
 
 pub const MAKES: Makes = &[
     (3, boxes),
@@ -23,15 +20,14 @@ pub const MAKES: Makes = &[
 fn boxes(b: &mut Builder, s: &mut Sampler) {
     let mut top = DVec3::ZERO;
     for _ in 0..s.count(1, 7) {
-        let size = DVec3::new(s.uniform(0.25, 0.8), s.uniform(0.25, 0.8), s.uniform(0.15, 0.7));
+        let size = dvec3(s.uniform(0.25, 0.8), s.uniform(0.25, 0.8), s.uniform(0.15, 0.7));
         let turn = DAffine3::from_rotation_z(s.uniform(-0.5, 0.5));
         let low = if s.chance(0.5) && top.z < 1.2 {
             top + 0.1 * direction(s).with_z(0.0)
         } else {
             1.2 * s.uniform(0.4, 1.0) * direction(s).with_z(0.0)
         };
-        let middle = low + 0.5 * size.z * DVec3::Z;
-        b.turned(middle, turn, |b| block(b, DVec3::ZERO, size));
+        b.turned(low + 0.5 * size.z * DVec3::Z, turn, |b| block(b, DVec3::ZERO, size));
         top = low + size.z * DVec3::Z;
     }
 }
@@ -42,7 +38,7 @@ fn rocks(b: &mut Builder, s: &mut Sampler) {
     let heap_m = if n > 1 { s.uniform(0.3, 1.0) } else { 0.0 };
     for _ in 0..n {
         let size_m = if n > 1 { s.log_uniform(0.3, 0.8) } else { s.log_uniform(0.3, 1.2) };
-        let radii_m = size_m * DVec3::new(1.0, s.uniform(0.6, 1.0), s.uniform(0.5, 0.9));
+        let radii_m = size_m * dvec3(1.0, s.uniform(0.6, 1.0), s.uniform(0.5, 0.9));
         let rough_m = s.uniform(0.02, 0.12) * size_m;
         let at = heap_m * direction(s).with_z(0.0);
         Lump {
@@ -77,14 +73,12 @@ fn hydrant(b: &mut Builder, s: &mut Sampler) {
 
 /// A roadside cabinet for electricity or telephone, 0.8 to 1.8 m high.
 fn cabinet(b: &mut Builder, s: &mut Sampler) {
-    let size = DVec3::new(s.uniform(0.25, 0.6), s.uniform(0.4, 1.8), s.uniform(0.75, 1.8));
+    let size = dvec3(s.uniform(0.25, 0.6), s.uniform(0.4, 1.8), s.uniform(0.75, 1.8));
     let foot_m = s.uniform(0.05, 0.2);
-    block(b, 0.5 * foot_m * DVec3::Z, size.with_z(foot_m) * DVec3::new(0.85, 0.95, 1.0));
+    block(b, 0.5 * foot_m * DVec3::Z, size.with_z(foot_m) * dvec3(0.85, 0.95, 1.0));
     block(b, (foot_m + 0.5 * size.z) * DVec3::Z, size);
-    let roof = DVec3::new(size.x + 0.06, size.y + 0.06, 0.05);
-    block(b, (foot_m + size.z + 0.025) * DVec3::Z, roof);
-    let handle = DVec3::new(0.5 * size.x + 0.015, 0.1, foot_m + 0.55 * size.z);
-    block(b, handle, DVec3::new(0.03, 0.04, 0.15));
+    block(b, (foot_m + size.z + 0.025) * DVec3::Z, dvec3(size.x + 0.06, size.y + 0.06, 0.05));
+    block(b, dvec3(0.5 * size.x + 0.015, 0.1, foot_m + 0.55 * size.z), dvec3(0.03, 0.04, 0.15));
 }
 
 /// A tub or trough of stone with plants in it.
@@ -99,15 +93,14 @@ fn flower_tub(b: &mut Builder, s: &mut Sampler) {
         .revolve(b, section);
     let plants = s.uniform(0.25, 0.5);
     let lift = DAffine3::from_translation((high_m - 0.06) * DVec3::Z);
-    let size = DAffine3::from_scale(DVec3::splat(plants));
-    b.place(lift * size, |b| build_one(bush::MAKES, b, s));
+    b.place(lift * DAffine3::from_scale(DVec3::splat(plants)), |b| build_one(bush::MAKES, b, s));
 }
 
 /// A shopping trolley of wire on four wheels.
 fn trolley(b: &mut Builder, s: &mut Sampler) {
     let [long_m, wide_m] = [s.uniform(0.75, 1.0), s.uniform(0.5, 0.6)];
     let ring = |share: f64, z: f64| {
-        let half = DVec2::new(0.5 * long_m * share, 0.5 * wide_m * (0.6 + 0.4 * share));
+        let half = dvec2(0.5 * long_m * share, 0.5 * wide_m * (0.6 + 0.4 * share));
         outline::at_height(&outline::rectangle(half), z)
     };
     let [floor, rim] = [ring(0.75, 0.5), ring(1.0, 0.95)];
@@ -120,18 +113,18 @@ fn trolley(b: &mut Builder, s: &mut Sampler) {
             let from = floor[side].lerp(floor[next], share);
             rod(b, from, rim[side].lerp(rim[next], share), [0.005, 0.005]);
         }
-        let foot = DVec3::new(0.9 * rim[side].x, 0.9 * rim[side].y, 0.06);
+        let foot = dvec3(0.9 * rim[side].x, 0.9 * rim[side].y, 0.06);
         rod(b, foot, floor[side], [0.015, 0.015]);
         rod(b, foot - 0.015 * DVec3::Y, foot + 0.015 * DVec3::Y, [0.06, 0.06]);
     }
-    let handle = DVec3::new(-0.55 * long_m, 0.0, 1.02);
+    let handle = dvec3(-0.55 * long_m, 0.0, 1.02);
     rod(b, handle - 0.5 * wide_m * DVec3::Y, handle + 0.5 * wide_m * DVec3::Y, [0.015, 0.015]);
 }
 
 /// Two boards that lean against each other, in front of a shop.
 fn a_board(b: &mut Builder, s: &mut Sampler) {
     let high_m = s.uniform(0.8, 1.3);
-    let size = DVec3::new(0.025, s.uniform(0.5, 0.8), high_m);
+    let size = dvec3(0.025, s.uniform(0.5, 0.8), high_m);
     let lean_rad = s.uniform(0.12, 0.35);
     for side in [-1.0, 1.0] {
         let top = high_m * libm::cos(lean_rad) * DVec3::Z;
@@ -146,17 +139,17 @@ fn pallets(b: &mut Builder, s: &mut Sampler) {
     for pallet in 0..n {
         let turn = DAffine3::from_rotation_z(s.uniform(-0.05, 0.05));
         b.turned(0.144 * pallet as f64 * DVec3::Z, turn, |b| {
-            block(b, 0.133 * DVec3::Z, DVec3::new(0.8, 1.2, 0.022));
+            block(b, 0.133 * DVec3::Z, dvec3(0.8, 1.2, 0.022));
             for x in [-0.35, 0.0, 0.35] {
-                block(b, DVec3::new(x, 0.0, 0.011), DVec3::new(0.1, 1.2, 0.022));
+                block(b, dvec3(x, 0.0, 0.011), dvec3(0.1, 1.2, 0.022));
                 for y in [-0.53, 0.0, 0.53] {
-                    block(b, DVec3::new(x, y, 0.072), DVec3::new(0.1, 0.14, 0.1));
+                    block(b, dvec3(x, y, 0.072), dvec3(0.1, 0.14, 0.1));
                 }
             }
         });
     }
     if n < 4 && s.chance(0.6) {
-        let load = DVec3::new(0.78, 1.15, s.uniform(0.4, 1.5));
+        let load = dvec3(0.78, 1.15, s.uniform(0.4, 1.5));
         block(b, (0.144 * n as f64 + 0.5 * load.z) * DVec3::Z, load);
     }
 }

@@ -1,6 +1,6 @@
 use super::Contacts;
 use super::parts::{Filling, handlebar, mudguard, wheel};
-use crate::primitives::{Builder, DVec3, Sampler, block, cushion, ellipsoid, rod, tube};
+use crate::primitives::{Builder, DVec3, Sampler, block, cushion, dvec3, ellipsoid, rod, tube};
 
 /// The measures of a bicycle, metres. The middle between its axles is at x = 0.
 ///
@@ -28,7 +28,7 @@ impl Bicycle {
         let tyre_m = if racing { 0.028 } else { s.uniform(0.032, 0.06) };
         let wheelbase_m = s.uniform(0.98, 1.02) + if racing { 0.0 } else { s.uniform(0.0, 0.16) };
         let saddle_m = s.uniform(0.85, 1.03);
-        let saddle = DVec3::new(-0.2 * saddle_m + s.uniform(-0.04, 0.02), 0.0, saddle_m);
+        let saddle = dvec3(-0.2 * saddle_m + s.uniform(-0.04, 0.02), 0.0, saddle_m);
         let grip_m = saddle_m + if racing { s.uniform(-0.1, 0.0) } else { s.uniform(0.0, 0.2) };
         let back_m = if racing { s.uniform(-0.05, 0.05) } else { s.uniform(0.05, 0.25) };
         let half_bar_m = if racing { s.uniform(0.2, 0.22) } else { s.uniform(0.27, 0.38) };
@@ -37,8 +37,8 @@ impl Bicycle {
             tyre_m,
             wheelbase_m,
             saddle,
-            grip: DVec3::new(0.38 - back_m, half_bar_m, grip_m),
-            crank: DVec3::new(-0.08, 0.0, s.uniform(0.26, 0.3)),
+            grip: dvec3(0.38 - back_m, half_bar_m, grip_m),
+            crank: dvec3(-0.08, 0.0, s.uniform(0.26, 0.3)),
             crank_rad: s.uniform(0.0, 360.0).to_radians(),
             low_entry: !racing && s.chance(0.4),
             tube_m: s.uniform(0.014, 0.024),
@@ -54,28 +54,26 @@ impl Bicycle {
     /// The middle of the right (-1) or left (1) pedal, on a crank of 0.17 m.
     fn pedal(&self, side: f64) -> DVec3 {
         let (sin, cos) = libm::sincos(self.crank_rad);
-        self.crank + DVec3::new(-0.17 * side * cos, 0.12 * side, -0.17 * side * sin)
+        self.crank + dvec3(-0.17 * side * cos, 0.12 * side, -0.17 * side * sin)
     }
 
     pub fn build(&self, b: &mut Builder, s: &mut Sampler) {
         let half_m = 0.5 * self.wheelbase_m;
-        let [rear, front] = [-half_m, half_m].map(|x| DVec3::new(x, 0.0, self.wheel_m));
+        let [rear, front] = [-half_m, half_m].map(|x| dvec3(x, 0.0, self.wheel_m));
         // Spokes are 2 mm thick. A beam is a few centimetres wide and returns from spokes that a
         // thin ray would miss.
         let filling = Filling::Spokes(s.pick(&[12, 14, 16, 18]), s.uniform(0.004, 0.009));
         wheel(b, rear, self.tyre_m, filling);
         wheel(b, front, self.tyre_m, filling);
         self.frame(b, rear, front);
-        let saddle_size = DVec3::new(0.27, s.uniform(0.13, 0.22), 0.06);
-        cushion(b, self.saddle - 0.03 * DVec3::Z, saddle_size, 0.025);
+        cushion(b, self.saddle - 0.03 * DVec3::Z, dvec3(0.27, s.uniform(0.13, 0.22), 0.06), 0.025);
         // The chain wheel, cranks and pedals.
         let aside = 0.06 * DVec3::Y;
         rod(b, self.crank - 1.1 * aside, self.crank - 0.9 * aside, [0.08, 0.08]);
         for side in [-1.0, 1.0] {
             let pedal = self.pedal(side);
-            let end = pedal - 0.05 * side * DVec3::Y;
-            rod(b, self.crank + side * aside, end, [0.012, 0.012]);
-            block(b, pedal, DVec3::new(0.09, 0.1, 0.025));
+            rod(b, self.crank + side * aside, pedal - 0.05 * side * DVec3::Y, [0.012, 0.012]);
+            block(b, pedal, dvec3(0.09, 0.1, 0.025));
         }
         if !self.racing {
             self.additions(b, s, rear, front);
@@ -85,11 +83,11 @@ impl Bicycle {
     /// Tubes, fork, stem and bar.
     fn frame(&self, b: &mut Builder, rear: DVec3, front: DVec3) {
         let r = self.tube_m;
-        let seat = self.saddle - DVec3::new(-0.02, 0.0, 0.05);
+        let seat = self.saddle - dvec3(-0.02, 0.0, 0.05);
         let clamp = seat.lerp(self.crank, 0.25);
-        let stem = DVec3::new(front.x - 0.2, 0.0, self.grip.z);
+        let stem = dvec3(front.x - 0.2, 0.0, self.grip.z);
         // The steering axis is 70 degrees steep and meets the fork's upper end.
-        let crown = DVec3::new(front.x - 0.1, 0.0, 2.0 * self.wheel_m + 0.05);
+        let crown = dvec3(front.x - 0.1, 0.0, 2.0 * self.wheel_m + 0.05);
         let head = crown.lerp(stem, 0.45);
         rod(b, seat, self.crank, [0.8 * r, r]);
         rod(b, crown.lerp(head, 0.2), self.crank, [1.1 * r, 1.1 * r]);
@@ -106,9 +104,9 @@ impl Bicycle {
                 // The drop of the bar.
                 let down = [
                     self.grip,
-                    self.grip + DVec3::new(0.09, 0.0, -0.02),
-                    self.grip + DVec3::new(0.08, 0.0, -0.1),
-                    self.grip + DVec3::new(-0.03, 0.0, -0.13),
+                    self.grip + dvec3(0.09, 0.0, -0.02),
+                    self.grip + dvec3(0.08, 0.0, -0.1),
+                    self.grip + dvec3(-0.03, 0.0, -0.13),
                 ];
                 tube(b, &down, 0.015);
             }
@@ -123,35 +121,33 @@ impl Bicycle {
             mudguard(b, front, mudguard_m, [20.0, 150.0]);
         }
         let rack_m = 2.0 * self.wheel_m + 0.07;
-        let rack = DVec3::new(rear.x - 0.03, 0.0, rack_m);
+        let rack = dvec3(rear.x - 0.03, 0.0, rack_m);
         if s.chance(0.6) {
-            block(b, rack, DVec3::new(0.38, 0.13, 0.015));
+            block(b, rack, dvec3(0.38, 0.13, 0.015));
             b.mirrored_y(|b| {
                 rod(b, rear + 0.07 * DVec3::Y, rack + 0.06 * DVec3::Y, [0.006, 0.006]);
             });
             let load = s.uniform(0.0, 1.0);
             if load < 0.15 {
                 // A pair of bags beside the wheel.
-                let size = DVec3::new(s.uniform(0.28, 0.38), s.uniform(0.1, 0.17), 0.33);
+                let size = dvec3(s.uniform(0.28, 0.38), s.uniform(0.1, 0.17), 0.33);
                 b.mirrored_y(|b| {
-                    cushion(b, rack + DVec3::new(0.0, 0.09 + 0.5 * size.y, -0.17), size, 0.03);
+                    cushion(b, rack + dvec3(0.0, 0.09 + 0.5 * size.y, -0.17), size, 0.03);
                 });
             } else if load < 0.23 {
                 // A child's seat.
-                block(b, rack + 0.12 * DVec3::Z, DVec3::new(0.3, 0.28, 0.2));
-                block(b, rack + DVec3::new(-0.14, 0.0, 0.35), DVec3::new(0.05, 0.3, 0.5));
+                block(b, rack + 0.12 * DVec3::Z, dvec3(0.3, 0.28, 0.2));
+                block(b, rack + dvec3(-0.14, 0.0, 0.35), dvec3(0.05, 0.3, 0.5));
             } else if load < 0.33 {
-                let size = DVec3::new(0.38, 0.3, s.uniform(0.15, 0.3));
+                let size = dvec3(0.38, 0.3, s.uniform(0.15, 0.3));
                 block(b, rack + 0.5 * size.z * DVec3::Z, size);
             }
         }
         if s.chance(0.2) {
-            let size = DVec3::new(0.26, 0.36, 0.24);
-            block(b, DVec3::new(front.x + 0.04, 0.0, rack_m + 0.16), size);
+            block(b, dvec3(front.x + 0.04, 0.0, rack_m + 0.16), dvec3(0.26, 0.36, 0.24));
         }
         if s.chance(0.5) {
-            let lamp = DVec3::new(front.x - 0.02, 0.0, rack_m + 0.08);
-            ellipsoid(b, lamp, DVec3::new(0.04, 0.035, 0.035));
+            ellipsoid(b, dvec3(front.x - 0.02, 0.0, rack_m + 0.08), dvec3(0.04, 0.035, 0.035));
         }
     }
 }

@@ -1,8 +1,6 @@
 use super::Contacts;
 use super::parts::{Filling, handlebar, mudguard, wheel};
-use crate::primitives::{
-    Builder, DVec2, DVec3, Sampler, block, cushion, ellipsoid, loft, outline, rod, sheet,
-};
+use crate::primitives::*;
 
 /// The measures of a motorcycle, metres. The middle between its axles is at x = 0.
 ///
@@ -36,8 +34,8 @@ impl Motorcycle {
             wheel_m: [front_m - s.uniform(0.0, 0.02), front_m],
             tyre_m: [rear_tyre_m, tyre_m],
             wheelbase_m,
-            saddle: DVec3::new(-s.uniform(0.16, 0.28), 0.0, saddle_m),
-            grip: DVec3::new(grip_x, s.uniform(0.3, 0.42), grip_m),
+            saddle: dvec3(-s.uniform(0.16, 0.28), 0.0, saddle_m),
+            grip: dvec3(grip_x, s.uniform(0.3, 0.42), grip_m),
             half_m: s.uniform(0.12, 0.19),
             fairing: !scooter && s.chance(0.5),
         }
@@ -45,18 +43,18 @@ impl Motorcycle {
 
     pub fn contacts(&self) -> Contacts {
         let sole = if self.scooter {
-            DVec3::new(0.22, 0.12, 0.31)
+            dvec3(0.22, 0.12, 0.31)
         } else {
-            DVec3::new(self.saddle.x + 0.2, self.half_m + 0.06, 0.32)
+            dvec3(self.saddle.x + 0.2, self.half_m + 0.06, 0.32)
         };
-        let soles = [-1.0, 1.0].map(|side| DVec3::new(sole.x, side * sole.y, sole.z));
+        let soles = [-1.0, 1.0].map(|side| dvec3(sole.x, side * sole.y, sole.z));
         Contacts { saddle: self.saddle, grip: self.grip, soles }
     }
 
     pub fn build(&self, b: &mut Builder, s: &mut Sampler) {
         let half_m = 0.5 * self.wheelbase_m;
-        let rear = DVec3::new(-half_m, 0.0, self.wheel_m[0]);
-        let front = DVec3::new(half_m, 0.0, self.wheel_m[1]);
+        let rear = dvec3(-half_m, 0.0, self.wheel_m[0]);
+        let front = dvec3(half_m, 0.0, self.wheel_m[1]);
         let spokes = Filling::Spokes(s.pick(&[5, 6, 10]), s.uniform(0.03, 0.05));
         let filling = if self.scooter || s.chance(0.3) { Filling::Disc } else { spokes };
         wheel(b, rear, self.tyre_m[0], filling);
@@ -71,29 +69,29 @@ impl Motorcycle {
         }
         self.exhaust(b, rear);
         if s.chance(if self.scooter { 0.35 } else { 0.2 }) {
-            let at = DVec3::new(rear.x - 0.02, 0.0, self.saddle.z + 0.22);
-            cushion(b, at, DVec3::new(0.38, 0.42, 0.32), 0.06);
+            let at = dvec3(rear.x - 0.02, 0.0, self.saddle.z + 0.22);
+            cushion(b, at, dvec3(0.38, 0.42, 0.32), 0.06);
         }
         if !self.scooter && s.chance(0.15) {
-            let at = DVec3::new(rear.x + 0.02, self.half_m + 0.14, self.saddle.z - 0.15);
-            b.mirrored_y(|b| cushion(b, at, DVec3::new(0.45, 0.2, 0.32), 0.05));
+            let at = dvec3(rear.x + 0.02, self.half_m + 0.14, self.saddle.z - 0.15);
+            b.mirrored_y(|b| cushion(b, at, dvec3(0.45, 0.2, 0.32), 0.05));
         }
     }
 
     /// Fork, bar, lamp, mirrors, windshield.
     fn front_end(&self, b: &mut Builder, s: &mut Sampler, front: DVec3) {
-        let stem = DVec3::new(self.grip.x + 0.06, 0.0, self.grip.z - 0.06);
+        let stem = dvec3(self.grip.x + 0.06, 0.0, self.grip.z - 0.06);
         handlebar(b, stem, self.grip, 0.018);
         let fork_y = 0.5 * self.tyre_m[1] + 0.035;
         b.mirrored_y(|b| {
             let aside = fork_y * DVec3::Y;
             rod(b, front + aside, stem + aside - 0.05 * DVec3::Z, [0.028, 0.022]);
-            let mirror = self.grip + DVec3::new(0.08, -0.03, 0.2);
+            let mirror = self.grip + dvec3(0.08, -0.03, 0.2);
             rod(b, self.grip - 0.1 * DVec3::Y, mirror, [0.006, 0.006]);
-            ellipsoid(b, mirror, DVec3::new(0.02, 0.065, 0.045));
+            ellipsoid(b, mirror, dvec3(0.02, 0.065, 0.045));
         });
-        let lamp = DVec3::new(stem.x + 0.1, 0.0, stem.z - 0.08);
-        ellipsoid(b, lamp, DVec3::new(0.09, 0.09, 0.09));
+        let lamp = dvec3(stem.x + 0.1, 0.0, stem.z - 0.08);
+        ellipsoid(b, lamp, dvec3(0.09, 0.09, 0.09));
         if s.chance(0.4) {
             let half_y = s.uniform(0.15, 0.24);
             let high_m = s.uniform(0.2, 0.5);
@@ -102,7 +100,7 @@ impl Motorcycle {
                     let across = 2.0 * u - 1.0;
                     let back = 0.4 * high_m * v + 0.08 * across * across;
                     let y = half_y * across * (1.0 - 0.3 * v);
-                    lamp + DVec3::new(0.08 - back, y, 0.05 + high_m * v)
+                    lamp + dvec3(0.08 - back, y, 0.05 + high_m * v)
                 });
             });
         }
@@ -112,39 +110,37 @@ impl Motorcycle {
     fn motorcycle_body(&self, b: &mut Builder, rear: DVec3, front: DVec3) {
         let saddle = self.saddle;
         let w = self.half_m;
-        let tank = DVec3::new(0.5 * (saddle.x + self.grip.x) + 0.08, 0.0, saddle.z + 0.05);
-        ellipsoid(b, tank, DVec3::new(0.29, w, 0.15));
-        let tail = DVec3::new(rear.x - 0.12, 0.0, saddle.z + 0.06);
-        let section = |at: DVec3, half: DVec2| -> Vec<DVec3> {
-            let ring = outline::superellipse(half, 3.0, 8);
-            ring.iter().map(|p| at + DVec3::new(0.0, p.x, p.y)).collect()
-        };
-        let seat_front = DVec3::new(saddle.x + 0.25, 0.0, saddle.z - 0.05);
-        let middle = saddle - DVec3::new(0.1, 0.0, 0.06);
+        let tank = dvec3(0.5 * (saddle.x + self.grip.x) + 0.08, 0.0, saddle.z + 0.05);
+        ellipsoid(b, tank, dvec3(0.29, w, 0.15));
+        let tail = dvec3(rear.x - 0.12, 0.0, saddle.z + 0.06);
+        let section =
+            |at: DVec3, half: DVec2| outline::across_x(&outline::superellipse(half, 3.0, 8), at);
+        let seat_front = dvec3(saddle.x + 0.25, 0.0, saddle.z - 0.05);
+        let middle = saddle - dvec3(0.1, 0.0, 0.06);
         let sections = [
-            section(seat_front, DVec2::new(0.5 * w, 0.05)),
-            section(middle, DVec2::new(w.min(0.15), 0.07)),
-            section(tail, DVec2::new(0.5 * w, 0.045)),
+            section(seat_front, dvec2(0.5 * w, 0.05)),
+            section(middle, dvec2(w.min(0.15), 0.07)),
+            section(tail, dvec2(0.5 * w, 0.045)),
         ];
         loft(b, &sections);
-        let engine = DVec3::new(0.02, 0.0, 0.42);
-        cushion(b, engine, DVec3::new(0.5, 1.7 * w, 0.4), 0.08);
-        block(b, DVec3::new(0.5 * front.x, 0.0, 0.5), DVec3::new(0.1, 1.5 * w, 0.3));
+        let engine = dvec3(0.02, 0.0, 0.42);
+        cushion(b, engine, dvec3(0.5, 1.7 * w, 0.4), 0.08);
+        block(b, dvec3(0.5 * front.x, 0.0, 0.5), dvec3(0.1, 1.5 * w, 0.3));
         b.mirrored_y(|b| {
             let aside = 0.6 * w * DVec3::Y;
-            let pivot = DVec3::new(-0.22, 0.0, 0.4) + aside;
+            let pivot = dvec3(-0.22, 0.0, 0.4) + aside;
             rod(b, rear + aside, pivot, [0.025, 0.035]);
             rod(b, pivot, tail + 0.2 * DVec3::X + 0.5 * aside, [0.02, 0.015]);
             rod(b, pivot + 0.25 * DVec3::Z, tank + 0.25 * DVec3::X, [0.025, 0.03]);
         });
         if self.fairing {
-            let nose = DVec3::new(front.x - 0.02, 0.0, self.grip.z - 0.1);
-            let waist = DVec3::new(0.3 * front.x, 0.0, 0.62);
+            let nose = dvec3(front.x - 0.02, 0.0, self.grip.z - 0.1);
+            let waist = dvec3(0.3 * front.x, 0.0, 0.62);
             let sections = [
-                section(nose, DVec2::new(0.1, 0.1)),
-                section(nose - DVec3::new(0.2, 0.0, 0.03), DVec2::new(1.3 * w, 0.2)),
-                section(waist, DVec2::new(1.25 * w, 0.34)),
-                section(engine, DVec2::new(1.1 * w, 0.24)),
+                section(nose, dvec2(0.1, 0.1)),
+                section(nose - dvec3(0.2, 0.0, 0.03), dvec2(1.3 * w, 0.2)),
+                section(waist, dvec2(1.25 * w, 0.34)),
+                section(engine, dvec2(1.1 * w, 0.24)),
             ];
             loft(b, &sections);
         }
@@ -153,8 +149,8 @@ impl Motorcycle {
     /// Leg shield, step, and the body under the saddle.
     fn scooter_body(&self, b: &mut Builder, rear: DVec3, front: DVec3) {
         let w = self.half_m + 0.02;
-        let shield_top = DVec3::new(self.grip.x + 0.08, 0.0, self.grip.z - 0.12);
-        let shield_foot = DVec3::new(0.5 * front.x + 0.05, 0.0, 0.3);
+        let shield_top = dvec3(self.grip.x + 0.08, 0.0, self.grip.z - 0.12);
+        let shield_foot = dvec3(0.5 * front.x + 0.05, 0.0, 0.3);
         sheet(b, [2.0 * w, 0.6], |u, v| {
             let across = 2.0 * u - 1.0;
             let half_y = 1.35 * w * (1.0 - 0.35 * (2.0 * v - 1.0).powi(2));
@@ -162,11 +158,11 @@ impl Motorcycle {
             shield_foot.lerp(shield_top, v) + bow + DVec3::Y * half_y * across
         });
         let step = [self.saddle.x + 0.2, shield_foot.x + 0.03];
-        let middle = DVec3::new(0.5 * (step[0] + step[1]), 0.0, 0.27);
-        block(b, middle, DVec3::new((step[1] - step[0]).max(0.1), 2.2 * w, 0.08));
-        let section = |x: f64, low: f64, high: f64, half: f64| -> Vec<DVec3> {
-            let ring = outline::superellipse(DVec2::new(half, 0.5 * (high - low)), 3.0, 10);
-            ring.iter().map(|p| DVec3::new(x, p.x, 0.5 * (low + high) + p.y)).collect()
+        let middle = dvec3(0.5 * (step[0] + step[1]), 0.0, 0.27);
+        block(b, middle, dvec3((step[1] - step[0]).max(0.1), 2.2 * w, 0.08));
+        let section = |x: f64, low: f64, high: f64, half: f64| {
+            let ring = outline::superellipse(dvec2(half, 0.5 * (high - low)), 3.0, 10);
+            outline::across_x(&ring, dvec3(x, 0.0, 0.5 * (low + high)))
         };
         let top = self.saddle.z;
         let sections = [
@@ -176,12 +172,12 @@ impl Motorcycle {
             section(rear.x - 0.2, rear.z + 0.3, top - 0.02, 0.5 * w),
         ];
         loft(b, &sections);
-        block(b, DVec3::new(rear.x + 0.2, 0.0, 0.3), DVec3::new(0.4, 1.4 * w, 0.2));
+        block(b, dvec3(rear.x + 0.2, 0.0, 0.3), dvec3(0.4, 1.4 * w, 0.2));
     }
 
     fn exhaust(&self, b: &mut Builder, rear: DVec3) {
         let y = -(0.5 * self.tyre_m[0] + 0.1);
-        let from = DVec3::new(rear.x + 0.45, y, rear.z + 0.02);
-        rod(b, from, DVec3::new(rear.x - 0.1, y, rear.z + 0.12), [0.035, 0.055]);
+        let from = dvec3(rear.x + 0.45, y, rear.z + 0.02);
+        rod(b, from, dvec3(rear.x - 0.1, y, rear.z + 0.12), [0.035, 0.055]);
     }
 }

@@ -1,6 +1,6 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use crate::primitives::{Builder, DAffine3, DVec2, DVec3, Profile, Section, smooth_tube};
+use crate::primitives::{Builder, DAffine3, DVec2, DVec3, Profile, Section, dvec3, smooth_tube};
 
 #[derive(Clone, Copy, PartialEq)]
 pub enum Filling {
@@ -24,13 +24,11 @@ pub fn wheel(b: &mut Builder, axle: DVec3, width_m: f64, filling: Filling) {
         tyre.revolve(b, Section::Round);
         match filling {
             Filling::Disc => {
-                let disc = Profile::from(0.0, 0.3 * half_m).line(rim_m, 0.0);
-                disc.revolve(b, Section::Round);
+                Profile::from(0.0, 0.3 * half_m).line(rim_m, 0.0).revolve(b, Section::Round);
             }
             Filling::Spokes(n, spoke_m) => {
                 let hub_m = 0.1 * rim_m;
-                let hub = Profile::from(hub_m, -half_m).line(hub_m, half_m);
-                hub.revolve(b, Section::Polygon(6));
+                Profile::from(hub_m, -half_m).line(hub_m, half_m).revolve(b, Section::Polygon(6));
                 for k in 0..n {
                     let out = DVec2::from_angle(k as f64 / n as f64 * TAU);
                     let aside = 0.5 * spoke_m * out.perp();
@@ -54,13 +52,13 @@ pub fn mudguard(b: &mut Builder, axle: DVec3, width_m: f64, [from_deg, to_deg]: 
     b.surface([6, 1], |u, v| {
         let angle_rad = (from_deg + u * (to_deg - from_deg)).to_radians();
         let out = DVec2::from_angle(angle_rad) * radius_m;
-        axle + DVec3::new(out.x, (v - 0.5) * width_m, out.y)
+        axle + dvec3(out.x, (v - 0.5) * width_m, out.y)
     });
 }
 
 /// A handlebar through the left `grip` and its mirror image, fixed at `stem`.
 pub fn handlebar(b: &mut Builder, stem: DVec3, grip: DVec3, radius_m: f64) {
-    let mirror = DVec3::new(1.0, -1.0, 1.0);
-    let bend = DVec3::new(0.5 * (stem.x + grip.x) + 0.03, 0.55 * grip.y, grip.z);
+    let mirror = dvec3(1.0, -1.0, 1.0);
+    let bend = dvec3(0.5 * (stem.x + grip.x) + 0.03, 0.55 * grip.y, grip.z);
     smooth_tube(b, &[grip * mirror, bend * mirror, stem, bend, grip], 1, radius_m);
 }

@@ -1,6 +1,6 @@
 use super::Contacts;
 use crate::objects::person::body::{Leg, Measures, bent};
-use crate::primitives::{Builder, DAffine3, DVec3, Sampler, cushion, ellipsoid};
+use crate::primitives::{Builder, DAffine3, DVec3, Sampler, cushion, dvec3, ellipsoid};
 
 /// Builds a rider on the saddle, with hands on the grips and feet on the pedals or rests. The rider
 /// of a motorcycle wears a full helmet.
@@ -11,14 +11,14 @@ pub fn build(b: &mut Builder, s: &mut Sampler, contacts: Contacts, motorised: bo
     let stature_m = if motorised { s.uniform(1.6, 1.9) } else { fitting_m };
     let measures = Measures::draw(s, stature_m);
     let h = stature_m;
-    let pelvis = contacts.saddle + DVec3::new(0.02, 0.0, 0.05 * h);
+    let pelvis = contacts.saddle + dvec3(0.02, 0.0, 0.05 * h);
     let lean_rad = lean_rad(s, &measures, pelvis, contacts.grip);
     let trunk = DAffine3::from_translation(pelvis) * DAffine3::from_rotation_y(lean_rad);
     b.place(trunk, |b| {
         measures.trunk(b);
         if s.chance(0.15) {
-            let at = DVec3::new(-0.09 * h - 0.06, 0.0, measures.neck_m() - 0.18 * h);
-            cushion(b, at, DVec3::new(0.16, 0.3, 0.42), 0.05);
+            let at = dvec3(-0.09 * h - 0.06, 0.0, measures.neck_m() - 0.18 * h);
+            cushion(b, at, dvec3(0.16, 0.3, 0.42), 0.05);
         }
     });
     let neck = trunk.transform_point3(DVec3::Z * measures.neck_m());
@@ -27,23 +27,23 @@ pub fn build(b: &mut Builder, s: &mut Sampler, contacts: Contacts, motorised: bo
         measures.head(b);
         let half_m = measures.head_m();
         if motorised {
-            ellipsoid(b, measures.head_middle(), half_m * DVec3::new(1.2, 1.08, 1.2));
+            ellipsoid(b, measures.head_middle(), half_m * dvec3(1.2, 1.08, 1.2));
         } else if s.chance(0.5) {
             let at = measures.head_middle() + 0.4 * half_m * DVec3::Z;
-            ellipsoid(b, at, half_m * DVec3::new(1.1, 0.88, 0.75));
+            ellipsoid(b, at, half_m * dvec3(1.1, 0.88, 0.75));
         }
     });
     for (side, sole) in [-1.0, 1.0].into_iter().zip(contacts.soles) {
         let hip = pelvis + side * measures.hip_joint_m() * DVec3::Y;
-        let ankle = sole + DVec3::new(-0.07 * h, 0.0, 0.039 * h);
+        let ankle = sole + dvec3(-0.07 * h, 0.0, 0.039 * h);
         let lengths = [Measures::THIGH, Measures::SHANK].map(|share| share * h);
-        let [knee, ankle] = bent(hip, ankle, lengths, DVec3::new(1.0, 0.2 * side, 0.3));
-        let toes = DVec3::new(1.0, 0.05 * side, -0.1);
+        let [knee, ankle] = bent(hip, ankle, lengths, dvec3(1.0, 0.2 * side, 0.3));
+        let toes = dvec3(1.0, 0.05 * side, -0.1);
         measures.leg(b, hip, Leg { knee, ankle, toes });
         let shoulder = trunk.transform_point3(measures.shoulder(side));
-        let grip = contacts.grip * DVec3::new(1.0, side, 1.0);
-        let wrist = grip - DVec3::new(0.04 * h, 0.0, -0.01 * h);
-        measures.arm(b, shoulder, wrist, DVec3::new(-0.3, 0.5 * side, -0.8));
+        let grip = contacts.grip * dvec3(1.0, side, 1.0);
+        let wrist = grip - dvec3(0.04 * h, 0.0, -0.01 * h);
+        measures.arm(b, shoulder, wrist, dvec3(-0.3, 0.5 * side, -0.8));
     }
 }
 

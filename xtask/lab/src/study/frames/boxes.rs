@@ -2,8 +2,7 @@
 
 use super::Asked;
 use crate::table::Table;
-use edgepuck_segment::OrientedBox;
-use formats::labelled_sweep::LabelledBox;
+use formats::geometry::OrientedBox;
 use std::f64::consts::PI;
 
 /// How far a box is off.
@@ -18,10 +17,10 @@ pub struct BoxError {
 }
 
 impl BoxError {
-    pub fn of(found: &OrientedBox, truth: &LabelledBox) -> Self {
-        let off = |i: usize| f64::from(found.centre_m[i]) - truth.centre_m[i];
-        let turned = (f64::from(found.yaw_rad) - truth.yaw_rad + PI / 2.0).rem_euclid(PI);
-        let side = |i: usize| (f64::from(found.size_m[i]) - truth.size_m[i]).abs();
+    pub fn of(found: OrientedBox, truth: OrientedBox) -> Self {
+        let off = |i: usize| found.centre_m[i] - truth.centre_m[i];
+        let turned = (found.yaw_rad - truth.yaw_rad + PI / 2.0).rem_euclid(PI);
+        let side = |i: usize| (found.size_m[i] - truth.size_m[i]).abs();
         Self {
             centre_m: off(0).hypot(off(1)),
             heading_deg: (turned - PI / 2.0).abs().to_degrees(),
@@ -66,18 +65,14 @@ mod tests {
 
     #[test]
     fn a_box_turned_by_half_a_turn_is_right() {
-        let truth = LabelledBox {
-            class: "car".into(),
-            centre_m: [3.0, 4.0, 0.0],
-            size_m: [4.0, 2.0, 1.5],
-            yaw_rad: 3.0,
-        };
+        let truth =
+            OrientedBox { centre_m: [3.0, 4.0, 0.0], size_m: [4.0, 2.0, 1.5], yaw_rad: 3.0 };
         let place =
             |x, yaw_rad| OrientedBox { centre_m: [x, 4.0, 9.0], size_m: [4.5, 2.0, 1.0], yaw_rad };
-        let error = BoxError::of(&place(3.5, 3.0 - std::f32::consts::PI), &truth);
+        let error = BoxError::of(place(3.5, 3.0 - PI), truth);
         assert!(error.heading_deg < 1e-4 && (error.centre_m - 0.5).abs() < 1e-6);
         assert!((error.length_m - 0.5).abs() < 1e-6 && error.width_m < 1e-6);
-        let error = BoxError::of(&place(3.0, 3.0 + 1.5), &truth);
+        let error = BoxError::of(place(3.0, 3.0 + 1.5), truth);
         assert!((error.heading_deg - 1.5f64.to_degrees()).abs() < 1e-3, "{}", error.heading_deg);
     }
 }

@@ -1,0 +1,223 @@
+//! The box around points, and that of the whole object of which they show a part.
+
+use std::f32::consts::FRAC_PI_2;
+
+use super::oriented_box::OrientedBox;
+
+/// The direction is searched over a quarter turn in steps of three degrees, and then by single
+/// degrees around the best of them.
+const COARSE_DEG: i32 = 3;
+const QUARTER_DEG: i32 = 90;
+
+/// Points nearer to an edge than this, in metres, count the same: about the range noise of a sensor
+/// (the paper's d0).
+const NEAR_M: f32 = 0.05;
+
+/// The most points from which the direction is found; of a larger cluster, every second or third.
+const MOST_SEARCHED: usize = 300;
+
+/// A longer side of this many times the usual width, at least and at most, is the width.
+const SHOWS_WIDTH: [f32; 2] = [0.7, 1.4];
+
+impl OrientedBox<f32> {
+    /// The box around `points` with the most points near its edges: a sensor sees the near sides of
+    /// an object, an L from above (closeness criterion of Zhang, Xu, Dong and Dolan, "Efficient
+    /// L-shape fitting for vehicle detection using laser scanners", IV 2017). Points that are not
+    /// finite are left out; without finite points, the box has size 0 at the origin. The length is the
+    /// longer horizontal side, and its direction is in -pi/2..=pi/2: points alone do not tell front
+    /// from rear.
+    #[must_use]
+    pub fn around(points: &[[f32; 3]]) -> Self {
+        let finite = |point: &&[f32; 3]| point.iter().all(|x| x.is_finite());
+        let stride = points.len().div_ceil(MOST_SEARCHED).max(1);
+        let searched = points.iter().step_by(stride).filter(finite);
+        let points = points.iter().filter(finite);
+        let closeness = |degrees: i32| {
+            let angle_rad = (degrees as f32).to_radians();
+            Rectangle::around(searched.clone(), angle_rad).closeness(searched.clone())
+        };
+        let best_of = |directions: &mut dyn Iterator<Item = i32>| {
+            let all = directions.map(|degrees| (closeness(degrees), degrees));
+            all.reduce(|best, other| if other.0 > best.0 { other } else { best }).map_or(0, |b| b.1)
+        };
+        let coarse = best_of(&mut (0..QUARTER_DEG).step_by(COARSE_DEG as usize));
+        let fine = best_of(&mut (coarse + 1 - COARSE_DEG..coarse + COARSE_DEG));
+        let angle_rad = (fine.rem_euclid(QUARTER_DEG) as f32).to_radians();
+        let rectangle = Rectangle::around(points.clone(), angle_rad);
+        let heights = points.map(|point| point[2]);
+        let (low, high) = heights
+            .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), z| (low.min(z), high.max(z)));
+        if low > high {
+            return Self::default();
+        }
+        rectangle.with_heights(low, high)
+    }
+
+    /// The box of the whole object, where this one is around its points, seen from the origin: each
+    /// side is as long as `usual_m`, length and width in metres, or as its points reach, and begins
+    /// where they begin on the side of the sensor. The base is the ground, if it is known. An object
+    /// that shows a side of its usual width shows its front or its rear.
+    #[must_use]
+    pub fn completed(&self, usual_m: [f32; 2], ground_z_m: Option<f32>) -> Self {
+        let ([x, y, z], [long_m, short_m, height_m]) = (self.centre_m, self.size_m);
+        let shows_width =
+            (SHOWS_WIDTH[0] * usual_m[1]..=SHOWS_WIDTH[1] * usual_m[1]).contains(&long_m);
+        let (seen_m, yaw_rad) = match shows_width {
+            // In -pi/2..=pi/2, too.
+            true if self.yaw_rad > 0.0 => ([short_m, long_m], self.yaw_rad - FRAC_PI_2),
+            true => ([short_m, long_m], self.yaw_rad + FRAC_PI_2),
+            false => ([long_m, short_m], self.yaw_rad),
+        };
+        let middle = turned(&self.centre_m, yaw_rad);
+        let (mut size_m, mut along) = ([0.0; 2], [0.0; 2]);
+        for axis in 0..2 {
+            size_m[axis] = seen_m[axis].max(usual_m[axis]);
+            let hidden_m = size_m[axis] - seen_m[axis];
+            along[axis] = middle[axis] + 0.5 * hidden_m.copysign(middle[axis]);
+        }
+        let [x, y] = match size_m == seen_m {
+            true => [x, y],
+            false => unturned(along, yaw_rad),
+        };
+        let top_m = z + 0.5 * height_m;
+        let base_m = ground_z_m.map_or(z - 0.5 * height_m, |ground_m| ground_m.min(z));
+        Self {
+            centre_m: [x, y, top_m.midpoint(base_m)],
+            size_m: [size_m[0], size_m[1], top_m - base_m],
+            yaw_rad,
+        }
+    }
+}
+
+/// Bounds along two axes that are turned by an angle.
+#[derive(Clone, Copy)]
+struct Rectangle {
+    angle_rad: f32,
+    low: [f32; 2],
+    high: [f32; 2],
+}
+
+impl Rectangle {
+    fn around<'a>(points: impl Iterator<Item = &'a [f32; 3]>, angle_rad: f32) -> Self {
+        let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
+        for point in points {
+            let along = turned(point, angle_rad);
+            for axis in 0..2 {
+                low[axis] = low[axis].min(along[axis]);
+                high[axis] = high[axis].max(along[axis]);
+            }
+        }
+        Self { angle_rad, low, high }
+    }
+
+    /// The sum over points of one over the distance to the nearest edge.
+    fn closeness<'a>(&self, points: impl Iterator<Item = &'a [f32; 3]>) -> f32 {
+        let to_edge = |point| {
+            let along = turned(point, self.angle_rad);
+            let distance =
+                |axis: usize| (along[axis] - self.low[axis]).min(self.high[axis] - along[axis]);
+            distance(0).min(distance(1))
+        };
+        points.map(|point| to_edge(point).max(NEAR_M).recip()).sum()
+    }
+
+    fn with_heights(&self, low_m: f32, high_m: f32) -> OrientedBox<f32> {
+        let middle = [0, 1].map(|axis| self.low[axis].midpoint(self.high[axis]));
+        let [x, y] = unturned(middle, self.angle_rad);
+        let [along, across] = [0, 1].map(|axis| self.high[axis] - self.low[axis]);
+        let (length, width, yaw_rad) = match along >= across {
+            true => (along, across, self.angle_rad),
+            false => (across, along, self.angle_rad - FRAC_PI_2),
+        };
+        OrientedBox {
+            centre_m: [x, y, low_m.midpoint(high_m)],
+            size_m: [length, width, high_m - low_m],
+            yaw_rad,
+        }
+    }
+}
+
+/// The horizontal coordinates of a point with these along axes turned by `angle_rad`.
+fn unturned([along, across]: [f32; 2], angle_rad: f32) -> [f32; 2] {
+    let (sin, cos) = libm::sincosf(angle_rad);
+    [cos * along - sin * across, sin * along + cos * across]
+}
+
+/// A point's horizontal coordinates along axes turned by `angle_rad`.
+fn turned(&[x, y, _]: &[f32; 3], angle_rad: f32) -> [f32; 2] {
+    let (sin, cos) = libm::sincosf(angle_rad);
+    [cos * x + sin * y, cos * y - sin * x]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_sides_of_a_car_give_its_box() {
+        for degrees in [-80.0f32, -30.0, 0.0, 17.0, 45.0, 88.0] {
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            let side = (0..=44).map(|i| [i as f32 * 0.1 - 2.2, -0.9]);
+            let rear = (0..=18).map(|i| [-2.2, i as f32 * 0.1 - 0.9]);
+            let points: Vec<[f32; 3]> = side
+                .chain(rear)
+                .flat_map(|[x, y]| {
+                    [0.3, 1.5].map(|z| [10.0 + cos * x - sin * y, 3.0 + sin * x + cos * y, z])
+                })
+                .collect();
+            let found = OrientedBox::around(&points);
+            // The search goes by degrees.
+            assert!((found.yaw_rad.to_degrees() - degrees).abs() < 1.0, "{degrees}: {found:?}");
+            let expected = [4.4, 1.8, 1.2];
+            for (found, expected) in found.size_m.into_iter().zip(expected) {
+                assert!((found - expected).abs() < 0.1, "{degrees}: {found} for {expected}");
+            }
+            assert!(
+                (found.centre_m[0] - 10.0).abs() < 0.1 && (found.centre_m[1] - 3.0).abs() < 0.1
+            );
+        }
+    }
+
+    /// A car, 3.9 by 1.6 m, of which a sensor at the origin sees the near part of a side and the rear, or
+    /// the rear alone, and a longer car.
+    #[test]
+    fn a_seen_box_is_completed_to_the_whole() {
+        let usual_m = [3.9, 1.6];
+        for (centre, size, yaw, whole_centre, whole_size, whole_yaw) in [
+            ([11.0, 4.0], [2.4, 1.5], 0.0, [11.75, 4.05], [3.9, 1.6], 0.0),
+            ([-11.0, -4.0], [2.4, 1.5], 0.0, [-11.75, -4.05], [3.9, 1.6], 0.0),
+            ([10.0, 0.5], [1.6, 0.2], FRAC_PI_2, [11.85, 0.5], [3.9, 1.6], 0.0),
+            ([0.5, -9.0], [1.5, 0.3], 0.0, [0.55, -10.8], [3.9, 1.6], FRAC_PI_2),
+            ([8.0, 2.0], [4.7, 1.8], 0.3, [8.0, 2.0], [4.7, 1.8], 0.3),
+        ] {
+            let seen = OrientedBox {
+                centre_m: [centre[0], centre[1], -0.5],
+                size_m: [size[0], size[1], 1.0],
+                yaw_rad: yaw,
+            };
+            let whole = seen.completed(usual_m, Some(-1.6));
+            let off = |a: f32, b: f32| (a - b).abs() < 1e-5;
+            assert!((0..2).all(|i| off(whole.centre_m[i], whole_centre[i])), "{seen:?}: {whole:?}");
+            assert!((0..2).all(|i| off(whole.size_m[i], whole_size[i])), "{seen:?}: {whole:?}");
+            assert!(off(whole.yaw_rad, whole_yaw), "{seen:?}: {whole:?}");
+            assert!(off(whole.size_m[2], 1.6) && off(whole.centre_m[2], -0.8), "{whole:?}");
+            assert_eq!(seen.completed(usual_m, None).size_m[2], 1.0);
+        }
+    }
+
+    #[test]
+    fn a_box_holds_points_that_are_not_searched() {
+        let line: Vec<[f32; 3]> = (0..602).map(|i| [0.01 * i as f32, 0.0, 0.0]).collect();
+        assert!((OrientedBox::around(&line).size_m[0] - 6.01).abs() < 1e-4);
+    }
+
+    #[test]
+    fn nothing_and_single_points_have_boxes() {
+        let nothing = OrientedBox::default();
+        assert_eq!(OrientedBox::around(&[]), nothing);
+        assert_eq!(OrientedBox::around(&[[f32::NAN, 0.0, 1.0]]), nothing);
+        let point = OrientedBox::around(&[[1.0, 2.0, 3.0]]);
+        assert_eq!(point.size_m, [0.0; 3]);
+        assert!((point.centre_m[0] - 1.0).abs() < 1e-6 && point.centre_m[2] == 3.0);
+    }
+}

@@ -1,0 +1,90 @@
+//! Files that are not of the format that their names say.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+
+use crate::error::FormatError;
+
+/// The beginnings of files that occur in place of others, and what they are.
+const KINDS: [(&[u8], &str); 7] = [
+    (b"version https://git-lfs", "a Git LFS pointer: fetch the file by `git lfs pull`"),
+    (b"\xFF\xFE", UTF_16),
+    (b"\xFE\xFF", UTF_16),
+    (b"\x1F\x8B", COMPRESSED),
+    (ZIP, COMPRESSED),
+    (b"<!DOCTYPE", "a web page"),
+    (b"<html", "a web page"),
+];
+
+const UTF_16: &str = "text in UTF-16: save it as UTF-8";
+const COMPRESSED: &str = "a compressed file: unpack it";
+const ZIP: &[u8] = b"PK\x03\x04";
+/// More bytes than the longest beginning has.
+const EXAMINED: u64 = 64;
+
+/// What a file is that begins with `bytes`, if it is of a kind that often stands in place of others.
+#[must_use]
+pub fn foreign(bytes: &[u8]) -> Option<&'static str> {
+    let begins = |start: &[u8]| {
+        bytes.get(..start.len()).is_some_and(|head| head.eq_ignore_ascii_case(start))
+    };
+    let known = KINDS.iter().find(|(start, _)| begins(start)).map(|(_, what)| *what);
+    known.or(match bytes {
+        [1..=127, 0, 1..=127, 0, ..] | [0, 1..=127, 0, 1..=127, ..] => Some(UTF_16),
+        _ => None,
+    })
+}
+
+/// The first `longest` bytes of the text at `path`, without the byte order mark that Windows'
+/// editors begin files with.
+///
+/// # Errors
+/// The file cannot be read, or it is not UTF-8; the error names the line.
+pub fn read_text(path: &Path, longest: u64) -> io::Result<String> {
+    let mut bytes = Vec::new();
+    File::open(path)?.take(longest).read_to_end(&mut bytes)?;
+    let wrong = |found: String| {
+        let cause = format!("expected text in UTF-8, found {found}");
+        io::Error::new(io::ErrorKind::InvalidData, cause)
+    };
+    if let Some(found) = foreign(&bytes) {
+        return Err(wrong(found.to_owned()));
+    }
+    let text = String::from_utf8(bytes).map_err(|error| {
+        let valid = error.utf8_error().valid_up_to();
+        let (before, after) = error.as_bytes().split_at(valid);
+        let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
+        wrong(format!("the byte 0x{:02X} in line {line}: save it as UTF-8", after[0]))
+    })?;
+    Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
+}
+
+/// `error`, or what was found in `content` in place of what was `expected`. Zip archives keep their
+/// error: NPZ files and PyTorch's checkpoints are such.
+pub(crate) fn or_foreign(
+    path: &Path,
+    content: impl Read,
+    expected: &str,
+    error: FormatError,
+) -> FormatError {
+    let mut start = Vec::new();
+    let read = content.take(EXAMINED).read_to_end(&mut start);
+    let keeps = start.starts_with(ZIP) && ["npz", "safetensors"].contains(&expected);
+    match foreign(&start).filter(|_| read.is_ok() && !keeps) {
+        Some(found) => {
+            FormatError::malformed(path, "format", format!("expected {expected}, found {found}"))
+        }
+        None => error,
+    }
+}
+
+/// As [`or_foreign`], for the file at `path`.
+#[cfg(any(feature = "files", feature = "pcap", feature = "poses"))]
+pub(crate) fn or_foreign_file(path: &Path, expected: &str, error: FormatError) -> FormatError {
+    // Opening a named pipe would wait for a writer.
+    match path.is_file().then(|| File::open(path)) {
+        Some(Ok(file)) => or_foreign(path, file, expected, error),
+        _ => error,
+    }
+}

@@ -1,0 +1,104 @@
+//! Whether a mesh has a size of things that LiDARs see.
+
+use super::Warning;
+use crate::unit::Unit;
+
+/// Sizes of meshes that are expected, metres: beyond them, the unit is probably another.
+const EXPECTED_M: std::ops::RangeInclusive<f64> = 0.01..=100.0;
+
+fn largest(size_m: [f64; 3]) -> f64 {
+    size_m.into_iter().fold(0.0, f64::max)
+}
+
+/// Why the unit of a mesh of this size, metres, is probably not `unit`. A user names another by `remedy`.
+#[must_use]
+pub fn mesh_size(size_m: [f64; 3], unit: Unit, remedy: &'static str) -> Option<Warning> {
+    let most = largest(size_m);
+    let is_expected = most == 0.0 || EXPECTED_M.contains(&most);
+    (!is_expected).then(|| {
+        let likely = match unit {
+            _ if most > 1.0 => Unit::Millimetre,
+            Unit::Metre => Unit::Inch,
+            _ => Unit::Metre,
+        };
+        Warning::MeshSize { size_m, unit, likely: Some(likely).filter(|it| *it != unit), remedy }
+    })
+}
+
+/// As [`mesh_size`], of a mesh of a scene, which may be a terrain: only a solid of more than 200 m, or of
+/// less than 1 cm, has an odd size.
+#[must_use]
+pub fn scene_mesh_size(size_m: [f64; 3], unit: Unit, remedy: &'static str) -> Option<Warning> {
+    let (least, most) = (size_m.into_iter().fold(f64::INFINITY, f64::min), largest(size_m));
+    let is_odd = most > 200.0 && least > most / 10.0 || most < 0.01;
+    mesh_size(size_m, unit, remedy).filter(|_| is_odd)
+}
+
+/// Why the form of a mesh of this size, metres, is not to be seen in scans: noise of a standard deviation
+/// or a quantum of ranges that are as large.
+#[must_use]
+pub fn effect_on_mesh(
+    size_m: [f64; 3],
+    noise_m: Option<f64>,
+    quantum_m: Option<f64>,
+) -> Option<Warning> {
+    let effects = [("noise", noise_m), ("a quantum", quantum_m)];
+    let mut known = effects.into_iter().filter_map(|(what, m)| Some((what, m?)));
+    let (what, found_m) = known.find(|(_, m)| *m >= largest(size_m))?;
+    Some(Warning::EffectOnMesh { what, size_m, found_m })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_of_another_unit_are_named_with_both_sizes() {
+        for (size, unit, expected) in [
+            (
+                950.0,
+                Unit::Metre,
+                Some(
+                    "950 x 950 x 950 m if its unit is the metre (0.95 x 0.95 x 0.95 m if it is millimetres)",
+                ),
+            ),
+            (0.002, Unit::Metre, Some("0.002 x 0.002 x 0.002 m")),
+            (
+                0.002,
+                Unit::Millimetre,
+                Some("if its unit is millimetres (2 x 2 x 2 m if it is metres)"),
+            ),
+            (900.0, Unit::Millimetre, Some("found 900 x 900 x 900 m if its unit is millimetres")),
+            (304.8, Unit::Foot, Some("is feet (1 x 1 x 1 m if it is millimetres)")),
+            (0.0, Unit::Metre, None),
+            (0.01, Unit::Metre, None),
+            (100.0, Unit::Inch, None),
+        ] {
+            let found = mesh_size([size; 3], unit, "").map(|warning| warning.to_string());
+            assert_eq!(found.is_some(), expected.is_some(), "{size}: {found:?}");
+            let (found, part) = (found.unwrap_or_default(), expected.unwrap_or_default());
+            assert!(found.contains(part), "{found}");
+        }
+    }
+
+    #[test]
+    fn terrain_in_a_scene_is_plausible() {
+        let is_odd = |size_m| scene_mesh_size(size_m, Unit::Metre, "").is_some();
+        let solids = [0.001, 1.0, 150.0, 4300.0].map(|size| is_odd([size; 3]));
+        assert_eq!(solids, [true, false, false, true]);
+        assert!(!is_odd([900.0, 900.0, 30.0]));
+    }
+
+    #[test]
+    fn noise_and_quanta_as_large_as_the_mesh_are_named() {
+        for (noise_m, quantum_m, expected) in [
+            (Some(1.9), Some(1.9), None),
+            (Some(2.0), None, Some("noise smaller than the mesh, 2 x 2 x 2 m, found 2 m")),
+            (None, Some(4.0), Some("a quantum smaller than the mesh, 2 x 2 x 2 m, found 4 m")),
+            (None, None, None),
+        ] {
+            let found = effect_on_mesh([2.0; 3], noise_m, quantum_m).map(|it| it.to_string());
+            assert_eq!(found, expected.map(|it| format!("expected {it}")));
+        }
+    }
+}

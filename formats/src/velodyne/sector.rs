@@ -1,0 +1,122 @@
+//! The azimuths that a sensor sends, if it was set to a part of the turn.
+
+use std::f64::consts::TAU;
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use super::packet::{LONGEST_STEP_US, TURN, forward, step_us};
+use super::{Header, PacketError};
+use crate::capture::{Senders, each_packet};
+use crate::error::FormatError;
+
+/// A sector whose azimuths never come is one that the sensor does not send if it is at least this
+/// wide, azimuth units. A packet of a VLP-32C at 1200 rpm spans 4.8 degrees, and one is lost now and
+/// then, but hardly in all turns at the same azimuth.
+const LEAST_UNSENT: u16 = 300;
+
+/// The number of azimuths.
+const N: usize = TURN as usize;
+
+/// As many turns are watched for what is not sent.
+const WATCHED: f64 = 4.0;
+/// Fewer turns do not tell what is lost from what is not sent.
+const FEWEST_WATCHED: f64 = 2.0;
+/// A head that stands still is watched for as many packets.
+const MOST_PACKETS: u32 = 5000;
+
+/// The sector that a sensor sends in each turn, in azimuth units of 0.01 degree, clockwise. By
+/// default it is the whole turn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Sector {
+    /// Where it begins.
+    start: u16,
+    /// The width of the rest of the turn, which is not sent.
+    unsent: u16,
+}
+
+impl Sector {
+    /// The sector of the sensor whose packets the capture at `path` has, from its first turns. It is the
+    /// whole turn if the capture has fewer than two.
+    ///
+    /// # Errors
+    /// A file that is not a capture.
+    pub(crate) fn of_capture(path: &Path, senders: &Senders) -> Result<Self, FormatError> {
+        let mut seen = vec![false; N];
+        let (mut last, mut turned, mut n_packets) = (None::<Header>, 0.0, 0);
+        let is_data = |payload: &[u8]| Header::parse(payload).is_ok();
+        each_packet(path, &mut senders.clone(), is_data, |payload| {
+            let header = Header::parse(payload)?;
+            if let Some(last) = last {
+                let us = step_us(&last, &header).clamp(0.0, LONGEST_STEP_US);
+                turned += last.units_per_us * us / f64::from(TURN);
+            }
+            last = Some(header);
+            n_packets += 1;
+            for (from, width) in header.spans() {
+                (0..width.min(TURN))
+                    .for_each(|i| seen[(usize::from(from) + usize::from(i)) % N] = true);
+            }
+            let is_enough = turned > WATCHED || n_packets > MOST_PACKETS;
+            Ok::<_, PacketError>(match is_enough {
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(()),
+            })
+        })?;
+        Ok(if turned < FEWEST_WATCHED { Self::default() } else { Self::of_seen(&seen) })
+    }
+
+    /// The sector around the widest gap of the azimuths that were `seen`.
+    fn of_seen(seen: &[bool]) -> Self {
+        let (mut widest, mut gap) = (Self::default(), 0);
+        // Twice around, for a gap across the azimuth 0.
+        for (azimuth, is_seen) in seen.iter().chain(seen).enumerate() {
+            if *is_seen && gap > widest.unsent {
+                widest = Self { start: (azimuth % seen.len()) as u16, unsent: gap };
+            }
+            gap = if *is_seen { 0 } else { (gap + 1).min(TURN) };
+        }
+        if widest.unsent < LEAST_UNSENT { Self::default() } else { widest }
+    }
+
+    /// Azimuth units of the turn that are not sent.
+    pub(super) fn unsent(&self) -> f64 {
+        self.unsent.into()
+    }
+
+    /// How far the start of a turn's first packet is from where the turn begins: the start of the sector, or
+    /// this packet if the whole turn is sent. Below 0 is the sector of the turn before.
+    pub(super) fn after_start(&self, azimuth: u16) -> f64 {
+        // Less than a block: a turn of the sector begins with its first block, at any azimuth.
+        const NEAR: u16 = 100;
+        let ahead = forward(self.start, azimuth);
+        match self.unsent {
+            0 => 0.0,
+            _ if ahead < NEAR => ahead.into(),
+            _ => f64::from(ahead) - f64::from(TURN),
+        }
+    }
+
+    /// Whether the head passes what is not sent from one azimuth to a later one of the same turn or
+    /// the next.
+    pub(super) fn is_passed(&self, from: u16, to: u16) -> bool {
+        self.unsent > 0 && forward(self.start, to) < forward(self.start, from)
+    }
+
+    /// [`Self::after_start`] of an azimuth in radians, turns.
+    pub(crate) fn since_start(&self, azimuth_rad: f64) -> f64 {
+        self.after_start(units(azimuth_rad)) / f64::from(TURN)
+    }
+
+    /// The turns that the head passes without sending from one azimuth to a later one, radians.
+    pub(crate) fn unsent_between(&self, from_rad: f64, to_rad: f64) -> f64 {
+        match self.is_passed(units(from_rad), units(to_rad)) {
+            true => self.unsent() / f64::from(TURN),
+            false => 0.0,
+        }
+    }
+}
+
+/// A packet's azimuth, which was converted to radians.
+fn units(azimuth_rad: f64) -> u16 {
+    (azimuth_rad / TAU * f64::from(TURN)).round() as u16 % TURN
+}

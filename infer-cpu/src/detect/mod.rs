@@ -1,0 +1,30 @@
+//! The objects of a sweep: its clusters at several widths, and the classes of those that the network
+//! recognises best.
+//!
+//! ```no_run
+//! use std::path::Path;
+//!
+//! use infer_cpu::Options;
+//! use infer_cpu::detect::{Detector, Sweep};
+//!
+//! let model = Path::new("street-128.safetensors");
+//! let mut detector = Detector::open(model, &Options::default(), 20)?;
+//! // In metres in the sensor's frame, z up.
+//! let points = [[5.0, 1.0, -1.2], [5.0, 1.1, -1.1]];
+//! let found = detector.detect(&Sweep { points: &points, rings: None })?;
+//! for object in &found.objects {
+//!     println!("{} at {:?} m", object.class, object.whole.centre_m);
+//! }
+//! # Ok::<(), infer_cpu::detect::DetectError>(())
+//! ```
+
+pub(crate) mod cluster_classifier;
+mod detector;
+mod object;
+mod rule;
+
+pub use detector::{DetectError, Detections, Detector, LEAST_CONFIDENCE};
+pub use edgepuck_segment::{Label, OrientedBox, Sweep};
+pub use object::Object;
+#[doc(hidden)]
+pub use rule::{MARGIN_OF_WHOLES, Rule};
