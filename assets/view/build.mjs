@@ -1,12 +1,14 @@
-// Bundles the viewer and three.js into one file, viewer.js, or into the file that is named.
+// Bundles the viewer and three.js into one file, viewer.js, or with --check compares it with what is there.
 import { readFileSync } from "node:fs";
 import { build } from "esbuild";
 
 const licence = readFileSync("node_modules/three/LICENSE", "utf8").trim();
 
-await build({
+const checks = process.argv.includes("--check");
+const { outputFiles } = await build({
+  write: !checks,
   entryPoints: ["src/main.js"],
-  outfile: process.argv[2] ?? "viewer.js",
+  outfile: "viewer.js",
   bundle: true,
   minify: true,
   format: "iife",
@@ -17,3 +19,9 @@ await build({
   loader: { ".css": "text" },
   banner: { js: `/*! Edgepuck's viewer, with three.js:\n\n${licence}\n*/` },
 });
+
+if (checks && readFileSync("viewer.js", "utf8") !== outputFiles[0].text) {
+  throw new Error(
+    "assets/view/viewer.js is not what its sources make: `npm ci && npm run build` in assets/view makes it",
+  );
+}

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use formats::atomic;
 use infer_cpu::detect::{
-    DetectError, Detections, Detector, LEAST_CONFIDENCE, Label, Object, OrientedBox, Sweep,
+    DetectError, Detections, Detector, LEAST_CONFIDENCE, Object, OrientedBox, Sweep,
 };
 use infer_cpu::{Options, Precision};
 use serde_json::{Value, json};
@@ -13,10 +13,8 @@ use serde_json::{Value, json};
 use crate::flags::probability;
 use crate::kitti::{Camera, line};
 use crate::points::SweepArgs;
-use crate::segment::{self, tint};
-use crate::view::frame::Placed;
-use crate::view::preview;
-use crate::{Outcome, Usage, colours};
+use crate::segment;
+use crate::{Outcome, Usage};
 use program::outputs::{Overwrite, need_extension};
 
 #[derive(clap::Args)]
@@ -28,8 +26,8 @@ pub(crate) struct DetectArgs {
     #[arg(long, default_value = "street-128", value_name = "MODEL")]
     model: PathBuf,
 
-    /// File for the objects: .json, or .txt with a line of KITTI's labels for each; a picture is
-    /// written beside it, with the extension .png. With --segment-only a folder
+    /// File for the objects: .json, or .txt with a line of KITTI's labels for each. With
+    /// --segment-only a folder
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 
@@ -73,8 +71,7 @@ pub(crate) fn run(args: &DetectArgs) -> anyhow::Result<Outcome> {
     let is_json = args.out.extension().is_some_and(|found| found.eq_ignore_ascii_case("json"));
     let cause = "--calib applies to KITTI's labels: expected --out with the extension .txt";
     anyhow::ensure!(!is_json || args.calib.is_none(), Usage(cause.to_owned()));
-    let picture = args.out.with_extension("png");
-    args.overwrite.check([&*args.out, &picture])?;
+    args.overwrite.check([&*args.out])?;
     let camera = args.calib.as_deref().map(Camera::read).transpose()?;
     let scan = args.input.read_upright()?;
     let options = Options { precision: args.precision, ..Options::default() };
@@ -82,7 +79,7 @@ pub(crate) fn run(args: &DetectArgs) -> anyhow::Result<Outcome> {
     detector.min_confidence = args.min_confidence;
     let started = Instant::now();
     let found = detector.detect(&Sweep { points: &scan.positions, rings: scan.ring.as_deref() })?;
-    let Detections { labels, objects, n_other, .. } = &found;
+    let Detections { objects, n_other, .. } = &found;
     let elapsed_ms = 1e3 * started.elapsed().as_secs_f64();
 
     let written = if is_json {
@@ -101,15 +98,6 @@ pub(crate) fn run(args: &DetectArgs) -> anyhow::Result<Outcome> {
         lines.into_bytes()
     };
     atomic::write_bytes(&args.out, written)?;
-    // Greys: clusters without an object are darker than all around them.
-    let tints = labels.iter().map(|&label| match (found.object(label), label) {
-        (Some(object), _) => colours::of_class(&objects[object].class),
-        (None, Label::Cluster(_)) => tint(Label::Ground),
-        (None, _) => tint(Label::Small),
-    });
-    let tints: Vec<_> = tints.collect();
-    let boxes: Vec<_> = objects.iter().map(placed).collect();
-    preview::draw_sweep(&scan, &tints, &boxes, &picture)?;
     program::say!(
         "{} points in {elapsed_ms:.1} ms: {} objects, {n_other} other clusters: {}",
         scan.len(),
@@ -129,16 +117,6 @@ fn open(model: &Path, options: &Options, min_points: usize) -> anyhow::Result<De
         program::say!("warning: {}: {warning}", model.display());
     }
     Ok(detector)
-}
-
-/// The box of the whole object, for pictures.
-fn placed(object: &Object) -> Placed {
-    Placed {
-        class: Some(object.class.clone()),
-        place: object.whole.widened(),
-        score: Some(object.confidence),
-        ..Placed::default()
-    }
 }
 
 fn json_of(object: &Object) -> Value {

@@ -54,7 +54,7 @@ pub fn run(
 
 /// The colour of a label: grey for the ground, light grey for points in no cluster, and that of its
 /// number for a cluster.
-pub fn tint(label: Label) -> Rgb {
+fn tint(label: Label) -> Rgb {
     match label {
         Label::Ground => colours::of_class("ground"),
         Label::Small | Label::Invalid => colours::of_class("small"),

@@ -5,32 +5,35 @@ from __future__ import annotations
 import json
 import os
 import tempfile
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from . import _edgepuck
 from ._detect import Detection
 from ._mesh import Mesh
 from ._page import View, page_of
 from ._scan import Scan
+from ._scene import Batch, Scene
 from ._scenes import DrawnScene
 
 
 def view(
-    *shown: str | os.PathLike[str] | Scan | DrawnScene | Mesh | Sequence[Detection] | ArrayLike,
-    truth: str | os.PathLike[str] | Sequence[Detection] | None = None,
+    *shown: Any, truth: str | os.PathLike[str] | Sequence[Detection] | None = None
 ) -> View:
     """Show points, meshes and boxes, like `edgepuck view`: in a notebook below the cell, or by
-    `view(...).open()` in the browser. Two clouds or meshes stand side by side.
+    `view(...).open()` in the browser. A mesh lies under the points that are its scan; two others stand side
+    by side.
 
     Args:
-        shown: Each is a `Scan` or a `DrawnScene`, points of shape [n, 3], a `Mesh`, the detections of
-            a sweep, which are drawn in what is named before them, or the path of any file or folder
-            that `edgepuck view` shows.
+        shown: Each is a `Scan`, a `DrawnScene`, or points of shape [n, 3]; a `Mesh` or a `Scene`; a `Batch`,
+            a frame for each pose, in the sensor's frame; a point cloud or a mesh of Open3D or trimesh, or a
+            scene of trimesh; the detections of a sweep, which are drawn in what is named before them; or the
+            path of any file or folder that `edgepuck view` shows.
         truth: Boxes to draw as truth, as detections or as the path of a file.
 
     Raises:
@@ -44,52 +47,176 @@ def view(
     if not shown:
         raise _edgepuck.Error("expected something to show, found nothing")
     with tempfile.TemporaryDirectory(prefix="edgepuck-") as folder:
-        words = [_file(one, Path(folder, f"argument-{number}")) for number, one in enumerate(shown)]
+        words = [
+            _file(one, Path(folder, f"argument-{number}"))
+            for number, one in enumerate(shown)
+        ]
         if truth is not None:
             words += ["--truth", _file(truth, Path(folder, "truth"))]
         return page_of(words, folder)
 
 
-def _file(
-    shown: str | os.PathLike[str] | Scan | DrawnScene | Mesh | Sequence[Detection] | ArrayLike, place: Path
-) -> str:
+def _file(shown: Any, place: Path) -> str:
     """The file of `shown`, which is written in the folder `place` if it is none."""
     if isinstance(shown, (str, os.PathLike)):
         return os.fspath(shown)
     place.mkdir()
+    if hasattr(shown, "graph") and hasattr(shown, "geometry"):
+        shown = Scene.of(shown)
     if isinstance(shown, DrawnScene):
         shown = shown.scan
     if isinstance(shown, Scan):
         file = place / "scan.npz"
         shown.save(file)
     elif isinstance(shown, Mesh):
-        file = place / "mesh.off"
-        file.write_text(_off(shown.vertices, shown.faces))
-    elif isinstance(shown, (list, tuple)) and all(isinstance(one, Detection) for one in shown):
+        file = _save_mesh(place / "mesh.off", shown.vertices, shown.faces)
+    elif isinstance(shown, Scene):
+        return _save_scene(shown, place)
+    elif isinstance(shown, Batch):
+        _save_batch(shown, place)
+        file = place
+    elif (
+        isinstance(shown, (list, tuple))
+        and shown
+        and all(isinstance(one, Detection) for one in shown)
+    ):
         file = place / "detections.json"
-        file.write_text(json.dumps({"objects": [_box(one) for one in shown]}))
+        file.write_text(
+            json.dumps({"objects": [_box(one) for one in shown]}), encoding="utf-8"
+        )
+    elif (mesh := _triangles(shown)) is not None:
+        file = _save_mesh(place / "mesh.off", *mesh)
     else:
-        try:
-            points = np.asarray(shown, dtype=float)
-        except (TypeError, ValueError):
-            points = np.zeros(())
-        if points.ndim == 0:
-            kinds = "points, a Scan, a DrawnScene, a Mesh, detections or a path"
-            raise _edgepuck.Error(f"expected {kinds}, found {type(shown).__name__}")
+        points = _points(shown)
         if points.ndim != 2 or points.shape[1] < 3:
-            raise _edgepuck.Error(f"points: expected an array of shape [n, 3], found {list(points.shape)}")
+            raise _edgepuck.Error(
+                f"points: expected an array of shape [n, 3], found {list(points.shape)}"
+            )
         file = place / "points.npy"
         np.save(file, points[:, :3])
     return os.fspath(file)
 
 
+def _array(found: Any) -> NDArray[Any]:
+    """An array of NumPy, or of a tensor of Open3D."""
+    return np.asarray(found.numpy() if hasattr(found, "numpy") else found)
+
+
+def _triangles(shown: Any) -> tuple[NDArray[Any], NDArray[Any]] | None:
+    """The vertices and the faces of a mesh of trimesh or Open3D."""
+    if hasattr(shown, "triangle") and hasattr(shown, "vertex"):
+        return _array(shown.vertex.positions), _array(shown.triangle.indices)
+    faces = getattr(shown, "faces", getattr(shown, "triangles", None))
+    if faces is None or not hasattr(shown, "vertices"):
+        return None
+    return _array(shown.vertices), _array(faces)
+
+
+def _points(shown: Any) -> NDArray[Any]:
+    """The points of a cloud of Open3D or trimesh, or of an array."""
+    if hasattr(shown, "point") and hasattr(shown.point, "positions"):
+        shown = shown.point.positions
+    shown = getattr(shown, "points", getattr(shown, "vertices", shown))
+    try:
+        points = np.asarray(_array(shown), dtype=float)
+    except (TypeError, ValueError):
+        points = np.zeros(())
+    if points.ndim == 0:
+        kinds = (
+            "points, a Scan, a DrawnScene, a Mesh, a Scene, a Batch, detections, a cloud or a mesh of Open3D or "
+            "trimesh, or a path"
+        )
+        raise _edgepuck.Error(f"expected {kinds}, found {type(shown).__name__}")
+    return points
+
+
+def _save_scene(scene: Scene, place: Path) -> str:
+    """The file of a scene: its own, or one in the folder `place` of what was added to it."""
+    if scene._file is not None and not scene._added:
+        if scene._poses:
+            warnings.warn(
+                f"{scene._file[0]}: shown as the file has it, without what moved",
+                stacklevel=4,
+            )
+        return scene._file[0]
+    if len(scene) == 0:
+        raise _edgepuck.Error(
+            "expected something to show, found a scene without instances"
+        )
+    lines = []
+    first = len(scene) - len(scene._added)
+    if first:
+        assert scene._file is not None
+        warnings.warn(
+            f"{scene._file[0]}: only what was added to the file's scene is shown",
+            stacklevel=4,
+        )
+    for number, (mesh, (scale, name, label, *_)) in enumerate(scene._added, first):
+        rotation, position = _rigid(scene._poses[number])
+        vertices = (mesh.vertices * scale) @ rotation.T + position
+        file = _save_mesh(place / f"{number}.off", vertices, mesh.faces)
+        lines += [
+            "[[object]]",
+            f"mesh = {json.dumps(file.name)}",
+            f"name = {json.dumps(name or f'object {number}')}",
+        ]
+        lines += [f"label = {json.dumps(label)}"] if label else []
+    place = place / "scene.toml"
+    place.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return os.fspath(place)
+
+
+def _rigid(rows: Sequence[float]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The rotation and the position of a pose of a scene: 16 or 7 numbers."""
+    if len(rows) == 16:
+        matrix = np.array(rows).reshape(4, 4)
+        return matrix[:3, :3], matrix[:3, 3]
+    x, y, z, *quaternion = rows
+    w, a, b, c = np.array(quaternion) / np.linalg.norm(quaternion)
+    skew = np.array([[0, -c, b], [c, 0, -a], [-b, a, 0]])
+    return np.eye(3) + 2 * w * skew + 2 * skew @ skew, np.array([x, y, z])
+
+
+def _save_batch(batch: Batch, folder: Path) -> None:
+    """A scan for each row, in the sensor's frame."""
+    for number, ranges in enumerate(batch.ranges):
+        hit = np.isfinite(ranges)
+        columns = {
+            name: None if (all_ := getattr(batch, name)) is None else all_[number][hit]
+            for name in ("intensity", "power")
+        }
+        scan = Scan(
+            positions=(batch.sensor.directions[hit] * ranges[hit, None]).astype(
+                np.float32
+            ),
+            origin=np.zeros(3),
+            range=ranges[hit],
+            ring=batch.sensor.rings[hit],
+            object=batch.object[number][hit].astype(np.uint32),
+            **columns,
+        )
+        scan.save(folder / f"{number:04d}.npz")
+
+
 def _box(of: Detection) -> dict[str, Any]:
-    box = {"centre_m": of.whole_centre, "size_m": of.whole_size, "yaw_deg": of.whole_yaw_deg}
-    return {"class": of.label, "confidence": of.confidence, "points": of.points, "box": box}
+    box = {
+        "centre_m": of.whole_centre,
+        "size_m": of.whole_size,
+        "yaw_deg": of.whole_yaw_deg,
+    }
+    return {
+        "class": of.label,
+        "confidence": of.confidence,
+        "points": of.points,
+        "box": box,
+    }
 
 
-def _off(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> str:
+def _save_mesh(file: Path, vertices: NDArray[Any], faces: NDArray[Any]) -> Path:
     lines = ["OFF", f"{len(vertices)} {len(faces)} 0"]
-    lines += [" ".join(map(repr, row)) for row in vertices.tolist()]
-    lines += ["3 " + " ".join(map(str, row)) for row in faces.tolist()]
-    return "\n".join(lines) + "\n"
+    lines += [
+        " ".join(map(repr, row)) for row in np.asarray(vertices, dtype=float).tolist()
+    ]
+    lines += ["3 " + " ".join(map(str, row)) for row in np.asarray(faces).tolist()]
+    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return file

@@ -21,7 +21,6 @@ mod sensors;
 mod sweeps;
 mod tars;
 mod training;
-mod view;
 mod weather;
 
 use formats::Scan;

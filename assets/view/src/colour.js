@@ -22,7 +22,7 @@ export function classColour(name) {
   return known ? rgb(known) : numberColour(new TextEncoder().encode(name).reduce(mix, 0x811c9dc5));
 }
 
-export const nameOf = (column, value) => column.names?.[value] ?? `${value}`;
+export const nameOf = ({ names }, value) => names?.[value] ?? (value === 0xffffffff ? "air" : `${value}`);
 
 /** How a column's values become colours, by `look`: from `low` to `high`, or each of `entries` its own. */
 export const scaleOf = (column, span) => (column.kind === "number" ? rampOf(span) : entriesOf(column));
@@ -38,6 +38,9 @@ function entriesOf(column) {
   const colours = new Map(entries.map(({ value }) => [value, colour(value)]));
   return { entries, look: (value) => colours.get(value) };
 }
+
+/** Whether colours by this column would differ. */
+export const varies = ({ values }) => values.some((value) => value !== values[0] && !Number.isNaN(value));
 
 /** The span of the colours of these columns without the least and the greatest values: a few far ones would
  * take all colours. Then, whether there are lesser and greater ones. */

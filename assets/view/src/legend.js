@@ -42,6 +42,16 @@ export function boxesHtml(boxes, columns) {
   return boxes.length ? `<b>boxes</b>${entries}<small>${kinds}</small>` : "";
 }
 
+/** The legend of meshes without points. */
+export function meshesHtml(meshes) {
+  const named = new Map(meshes.map((mesh) => [mesh.class ?? mesh.name, mesh.colour]));
+  const entries = [...named].slice(0, MOST_ENTRIES).map(([name, colour]) => entry(colour, name));
+  const more = named.size - entries.length;
+  return entries.length > 1
+    ? `<b>meshes</b>${entries.join("")}${more > 0 ? `<small>and ${more} more</small>` : ""}`
+    : "";
+}
+
 /** A table of names and values. */
 export function factsHtml(title, facts) {
   const text = (value) => escaped(Array.isArray(value) ? value.map(shown).join(", ") : shown(value));

@@ -1,9 +1,9 @@
 import * as THREE from "three";
-import { css, spanOf } from "./colour.js";
-import { boxesHtml, escaped, factsHtml, scaleHtml, shown, titleOf } from "./legend.js";
+import { css, spanOf, varies } from "./colour.js";
+import { boxesHtml, escaped, factsHtml, meshesHtml, scaleHtml, shown, titleOf } from "./legend.js";
 import { Navigation } from "./navigation.js";
 import { pick } from "./picking.js";
-import { boxColour, columnsOf, extentOf, pointMaterial, Stage } from "./stage.js";
+import { boxColour, columnsOf, corners, drawSpan, extentOf, placeOf, pointMaterial, Stage } from "./stage.js";
 import style from "./viewer.css";
 
 /**
@@ -39,12 +39,15 @@ function partsOf(frames) {
   const any = (name, is = () => true) => frames.some((frame) => frame[name]?.some(is));
   const [boxes, truth] = [any("boxes", (box) => !box.truth), any("boxes", (box) => box.truth)];
   const [meshes, sensors, beams] = [any("meshes"), any("sensors"), any("sensors", ({ rays }) => rays?.length)];
-  const parts = { boxes, truth, labels: boxes, meshes, beams, sensors, grid: true };
+  const trails = frames.length > 1 && any("boxes", ({ track }) => Number.isInteger(track));
+  const parts = { boxes, trails, truth, labels: boxes, meshes, beams, sensors, grid: true };
   return Object.keys(parts).filter((name) => parts[name]);
 }
 
-const USUAL_COLOURS = ["class", "cluster", "object", "range", "height"];
+const USUAL_COLOURS = ["class", "cluster", "object", "ring", "range", "height"];
 const MOST_LABELS = 60;
+/** Frames before the shown one, through which trails go. */
+const TRAIL = 20;
 const PLAY_MS = 150;
 
 const countOf = (frame) => (frame?.points?.position.length ?? 0) / 3;
@@ -74,6 +77,16 @@ class Viewer {
     this.#listen();
   }
 
+  /** The frame to begin with: the first with boxes and a half of the most points, or else points. */
+  #firstFrame() {
+    const most = Math.max(0, ...this.frames.map(countOf));
+    const numbers = Array.from({ length: this.nFrames }, (_, i) => i);
+    const at = (number, is) => this.data.panes.some(({ frames }) => frames[number] && is(frames[number]));
+    const isFull = (frame) => 2 * countOf(frame) >= most;
+    const hasBoxes = (frame) => isFull(frame) && frame.boxes?.some((box) => !box.truth);
+    return Math.max(0, numbers.find((i) => at(i, hasBoxes)) ?? numbers.findIndex((i) => at(i, isFull)));
+  }
+
   #listen() {
     const { canvas } = this;
     let down = [0, 0];
@@ -101,6 +114,7 @@ class Viewer {
 
   #press(what) {
     if (what === "reset" || what === "r") this.fit();
+    else if (what === "save") this.save();
     else if (what === "fly" || what === "f") {
       this.navigation.fly(!this.navigation.flies);
       this.#drawBar();
@@ -118,6 +132,7 @@ class Viewer {
     if (name === "colour") this.colourBy(value);
     else if (name === "frame") this.showFrame(Number(value));
     else if (name === "size") this.pixels = Number(value);
+    else if (name === "cut") this.#cut(Number(value));
     else this.hidden[checked ? "delete" : "add"](name);
     this.#hide();
   }
@@ -129,7 +144,8 @@ class Viewer {
     // The first turn of a capture may have only a few points.
     const fullest = (frames) => frames.reduce((a, b) => (countOf(b) > countOf(a) ? b : a), frames[0] ?? {});
     this.extents = data.panes.map(({ frames }) => extentOf(fullest(frames)));
-    this.frame = Math.min(this.frame, this.nFrames - 1);
+    this.names = this.#coloursOf(this.frames);
+    this.frame = fit ? this.#firstFrame() : Math.min(this.frame, this.nFrames - 1);
     this.root.dataset.panes = data.panes.length;
     this.#stageFrames();
     this.#drawBar();
@@ -142,20 +158,36 @@ class Viewer {
     this.panes = this.data.panes.map(({ name, frames }, i) => {
       const frame = frames[Math.min(this.frame, frames.length - 1)] ?? {};
       this.extents[i] = this.#extentFor(frame, this.extents[i]);
-      return { name, frame, stage: new Stage(frame, this.material, this.extents[i]) };
+      const before = frames.slice(Math.max(0, this.frame - TRAIL), this.frame);
+      const colours = this.#coloursOf(frames);
+      return { name, frame, colours, stage: new Stage(frame, before, this.material, this.extents[i]) };
     });
     this.#align();
-    const columns = this.panes.flatMap(({ stage }) => stage.columns);
-    this.names = [...new Set(columns.map(({ name }) => name))];
     const most = Math.max(0, ...this.panes.map(({ frame }) => countOf(frame)));
     this.pixels ??= most < 5e3 ? 5 : most < 4e4 ? 4 : most < 4e5 ? 3 : 2;
     this.unpick();
     this.#hide();
     this.#drawTime();
-    // Beside meshes, points in the colours of their objects could not be seen.
-    const first = this.panes.some(({ stage }) => stage.parts.meshes && stage.parts.points) ? 3 : 0;
-    const usual = USUAL_COLOURS.slice(first).find((name) => this.names.includes(name));
-    this.colourBy(this.names.includes(this.colour) ? this.colour : usual);
+    this.colourBy(this.names.includes(this.colour) ? this.colour : this.#usualOf(this.names));
+  }
+
+  /** The columns by which the points of these frames can be coloured: those that vary. */
+  #coloursOf(frames) {
+    const varying = new Map();
+    for (const { name, values } of frames.flatMap(columnsOf)) {
+      const [first, is] = varying.get(name) ?? [values[0], false];
+      if (!is)
+        varying.set(name, [first ?? values[0], varies({ values }) || (values.length > 0 && values[0] !== first)]);
+    }
+    const known = [...varying.keys()];
+    const found = known.filter((name) => varying.get(name)[1]);
+    return found.length ? found : known.slice(0, 1);
+  }
+
+  /** The usual one of these columns. Beside meshes, points in the colours of their objects could not be seen. */
+  #usualOf(names) {
+    const first = this.panes.some(({ stage }) => stage.parts.meshes && stage.parts.points) ? 4 : 0;
+    return USUAL_COLOURS.slice(first).find((name) => names.includes(name)) ?? names[0];
   }
 
   /** The extent that is shown, or that of the frame, if its points would be a speck there or cut off. */
@@ -169,15 +201,19 @@ class Viewer {
   /** Colours the points by the column of this name. */
   colourBy(name) {
     this.colour = name;
-    for (const pane of this.panes) pane.column = pane.stage.colourBy(name, (column) => this.#spanOf(column));
+    for (const pane of this.panes) {
+      const own = pane.colours.includes(name) ? name : this.#usualOf(pane.colours);
+      pane.column = pane.stage.colourBy(own, (column) => this.#spanOf(column));
+    }
     const coloured = this.panes.filter(({ column }) => column);
     const columns = coloured.map(({ column }) => column);
     const scales = [...new Set(columns.map(scaleHtml))];
     const named = (scale, i) => (scales[1] ? `<small>${escaped(coloured[i].name)}</small>` : "") + scale;
     const boxes = this.panes.flatMap(({ frame }) => frame.boxes ?? []);
+    const meshes = this.panes.flatMap(({ frame }) => (frame.points ? [] : (frame.meshes ?? [])));
     const steps = new Set(this.panes.map(({ stage }) => `${shown(stage.gridStep)} m`));
     const grid = `<small>grid ${[...steps].join(" and ")}</small>`;
-    this.legend.innerHTML = [...scales.map(named), boxesHtml(boxes, columns), grid].join("");
+    this.legend.innerHTML = [...scales.map(named), meshesHtml(meshes), boxesHtml(boxes, columns), grid].join("");
     this.invalidate();
   }
 
@@ -197,6 +233,40 @@ class Viewer {
     this.#stageFrames();
     const isElsewhere = this.extents.some((extent, i) => extent !== before[i]);
     if (isElsewhere) this.fit(this.camera.getWorldDirection(new THREE.Vector3()).negate());
+  }
+
+  /** Hides what is above this share of the height of what is seen. */
+  #cut(share) {
+    const heights = this.extents.map(({ floor, top }) => [floor, top]);
+    const [low, high] = [0, 1].map((i) => heights.reduce((sum, height) => sum + height[i], 0) / heights.length);
+    const ceiling = share < 1 ? low + share * (high - low) : 1e30;
+    this.material.uniforms.ceiling.value = ceiling;
+    this.renderer.clippingPlanes = share < 1 ? [new THREE.Plane(new THREE.Vector3(0, 0, -1), ceiling)] : [];
+  }
+
+  /** Saves what is seen, with the labels, as a PNG file. */
+  save() {
+    this.render();
+    const { canvas } = this;
+    const picture = Object.assign(document.createElement("canvas"), { width: canvas.width, height: canvas.height });
+    const context = picture.getContext("2d");
+    context.drawImage(canvas, 0, 0);
+    const ratio = this.renderer.getPixelRatio();
+    context.font = `600 ${12 * ratio}px sans-serif`;
+    context.textAlign = "center";
+    const { left, top } = this.root.getBoundingClientRect();
+    for (const label of this.labels.children) {
+      const at = label.getBoundingClientRect();
+      context.fillStyle = getComputedStyle(label).color;
+      context.fillText(label.textContent, (at.left + at.width / 2 - left) * ratio, (at.bottom - 4 - top) * ratio);
+    }
+    const name = `${this.panes[0]?.name ?? "view"}.png`;
+    picture.toBlob((blob) => {
+      const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(blob), download: name });
+      link.click();
+      setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+    });
+    return picture;
   }
 
   /** Looks at all, from `back` of it. */
@@ -249,10 +319,11 @@ class Viewer {
     const option = (name) => `<option ${name === this.colour ? "selected" : ""}>${escaped(name)}</option>`;
     const points = `<label>colour <select name="colour">${this.names.map(option).join("")}</select></label>
       <label>size <input type="range" name="size" min="1" max="10" step="0.5" value="${this.pixels}"></label>`;
+    const cut = `<label title="Hide what is high">cut <input type="range" name="cut" min="0.02" max="1" step="0.02" value="1"></label>`;
     const title = "F: turntable (drag, wheel) or flight (drag to look; keys W A S D Q E)";
-    const html = `${this.names.length ? points : ""}${partsOf(this.frames).map(toggle).join("")}
+    const html = `${this.names.length ? points : ""}${cut}${partsOf(this.frames).map(toggle).join("")}
       <button name="fly" title="${title}">${this.navigation.flies ? "fly" : "turntable"}</button>
-      <button name="reset" title="R: look at all">reset</button>`;
+      <button name="reset" title="R: look at all">reset</button><button name="save" title="Save a PNG file">save</button>`;
     // A list of colours that is open stays open while data change.
     if (html !== this.shownBar) this.bar.innerHTML = html;
     this.shownBar = html;
@@ -263,7 +334,7 @@ class Viewer {
     play.textContent = this.playing ? "pause" : "play";
     [slider.max, slider.value] = [this.nFrames - 1, this.frame];
     const name = this.panes.find(({ frame }) => frame.name)?.frame.name ?? "";
-    text.textContent = `${name}  ${this.frame + 1} of ${this.nFrames}`;
+    text.textContent = `${name} (${this.frame + 1} of ${this.nFrames})`.trim();
   }
 
   #resize() {
@@ -310,26 +381,37 @@ class Viewer {
 
   #placeLabels(width, height) {
     const made = [];
-    const add = (pane, place, className, text, onclick, colour = "") => {
-      const at = new THREE.Vector3(...place).applyMatrix4(this.panes[pane].stage.world.matrixWorld);
-      at.project(this.camera);
+    const project = (pane, place) =>
+      new THREE.Vector3(...place).applyMatrix4(this.panes[pane].stage.world.matrixWorld).project(this.camera);
+    const add = (pane, place, className, text, onclick, colour = "", above = []) => {
+      const at = project(pane, place);
+      // Over the highest corner in the picture.
+      at.y = Math.max(at.y, ...above.map((corner) => project(pane, corner).y).filter((y) => y < 1));
       if (at.z > 1 || Math.abs(at.x) > 1 || Math.abs(at.y) > 1) return;
       const label = Object.assign(document.createElement("span"), { className, textContent: text, onclick });
       const [x, y] = [(pane + (at.x + 1) / 2) * width, ((1 - at.y) / 2) * height];
       label.style = `left:${x.toFixed(1)}px; top:${y.toFixed(1)}px; color:${colour}`;
-      made.push({ label, depth: at.z });
+      made.push({ label, depth: at.z, x, y, half: 4 + 3.6 * text.length });
     };
     this.panes.forEach(({ name, frame }, pane) => {
       for (const box of this.hidden.has("labels") || this.hidden.has("boxes") ? [] : (frame.boxes ?? [])) {
         if (box.truth) continue;
         const { centre, size, yaw, score, track } = box;
-        const words = [box.class, Number.isInteger(track) && `#${track}`, score?.toFixed(2)].filter(Boolean).join(" ");
-        const known = { "centre (m)": centre, "size (m)": size, "yaw (°)": (yaw * 180) / Math.PI, score, track };
+        // The score of an unknown object is that of the class that it resembles.
+        const sure = box.class === "unknown" ? undefined : score?.toFixed(2);
+        const words = [box.class, Number.isInteger(track) && `#${track}`, sure].filter(Boolean).join(" ");
+        const known = {
+          "centre (m)": centre,
+          "size (m)": size,
+          "yaw (°)": (yaw * 180) / Math.PI,
+          score: sure && score,
+          track,
+        };
         const facts = () => this.#showFacts(box.class ?? "box", Object.entries(known));
-        add(pane, centre.with(2, centre[2] + size[2] / 2), "box", words, facts, css(boxColour(box)));
+        add(pane, centre, "box", words, facts, css(boxColour(box)), corners(box));
       }
       for (const { name, pose } of this.hidden.has("sensors") ? [] : (frame.sensors ?? [])) {
-        add(pane, [pose[3], pose[7], pose[11]], "sensor", name);
+        add(pane, placeOf({ pose }), "sensor", name);
       }
       const count = frame.points ? `, ${countOf(frame).toLocaleString("en")} points` : "";
       const className = this.panes.length > 1 ? "title" : "title only";
@@ -338,7 +420,11 @@ class Viewer {
       made.push({ label, depth: -1 });
     });
     made.sort((a, b) => a.depth - b.depth);
-    this.labels.replaceChildren(...made.slice(0, MOST_LABELS).map(({ label }) => label));
+    // Of labels at one place, the nearest is shown.
+    const hides = (one, other) => Math.abs(one.x - other.x) < one.half + other.half && Math.abs(one.y - other.y) < 16;
+    const kept = [];
+    for (const one of made) if (!kept.some((other) => hides(one, other))) kept.push(one);
+    this.labels.replaceChildren(...kept.slice(0, MOST_LABELS).map(({ label }) => label));
   }
 
   /** Picks the point that is drawn at this place, pixels of the element, and returns its number, or -1. */
@@ -347,32 +433,43 @@ class Viewer {
     const { frame, stage } = this.panes[Math.min(this.panes.length - 1, Math.floor(x / width))];
     const wished = [(2 * (x % width)) / width - 1, 1 - (2 * y) / this.size[1]];
     const half = [width / 2, this.size[1] / 2];
+    const before = this.picked >= 0 && this.pickedAt;
     this.unpick();
     const { matrixWorld } = stage.world;
     this.picked = pick(this.camera, matrixWorld, frame.points?.position ?? [], wished, half, Math.max(8, this.pixels));
-    if (this.picked >= 0) this.#showPoint(frame.points, stage);
+    if (this.picked >= 0) this.#showPoint(frame.points, stage, before);
     this.invalidate();
     return this.picked;
   }
 
   unpick() {
     this.marker.removeFromParent();
+    this.span?.removeFromParent();
     this.facts.hidden = true;
     this.picked = -1;
   }
 
-  #showPoint({ position, origin = [0, 0, 0] }, stage) {
+  /** Shows what is known of the picked point, and how far it is from the point that was picked before it. */
+  #showPoint({ position, origin = [0, 0, 0], step = 0 }, stage, before) {
     const number = this.picked;
     const at = position.slice(3 * number, 3 * number + 3);
     this.marker.geometry.setAttribute("position", new THREE.BufferAttribute(at, 3));
     this.marker.geometry.setAttribute("tint", new THREE.BufferAttribute(new Float32Array([1, 1, 1]), 3));
     stage.world.add(this.marker);
-    const place = ["x (m)", "y (m)", "z (m)"].map((name, i) => [name, (at[i] + origin[i]).toFixed(4)]);
+    this.pickedAt = { at, stage };
+    const away = [];
+    if (before && before.stage === stage) {
+      away.push(["from the point before (m)", Math.hypot(...at.map((x, i) => x - before.at[i])).toFixed(3)]);
+      this.span = drawSpan(at, before.at);
+      stage.world.add(this.span);
+    }
+    const digits = step > 1e-3 ? 2 : 4;
+    const place = ["x (m)", "y (m)", "z (m)"].map((name, i) => [name, (at[i] + origin[i]).toFixed(digits)]);
     const columns = stage.columns.map((column) => {
       const value = column.values[number];
       return [titleOf(column), column.names?.[value] ?? value];
     });
-    this.#showFacts(`point ${number}`, [...place, ...columns]);
+    this.#showFacts(`point ${number}`, [...away, ...place, ...columns]);
   }
 
   #showFacts(title, facts) {

@@ -15,6 +15,8 @@ const FARTHEST_M: f64 = 1e7;
 #[derive(Deserialize)]
 struct OfSweep {
     objects: Vec<Object>,
+    /// Of `detect`: the name of the file of the points.
+    sweep: Option<String>,
     /// Of `gen-scenes`, whose objects stand in the street's frame.
     sensor_pose: Option<Pose>,
 }
@@ -65,7 +67,7 @@ pub fn read(file: &Path) -> Result<Vec<Placed>, FormatError> {
         });
         return placed.collect();
     }
-    let OfSweep { objects, sensor_pose } =
+    let OfSweep { objects, sweep, sensor_pose } =
         serde_json::from_str(&text).map_err(|error| flaw("objects", &error))?;
     let is_seen = |object: &Object| sensor_pose.is_none() || object.points != Some(0);
     let objects = (0..).zip(objects).filter(|(_, object)| is_seen(object));
@@ -74,7 +76,7 @@ pub fn read(file: &Path) -> Result<Vec<Placed>, FormatError> {
         let placed = placed.map_err(|cause| flaw(&format!("objects[{i}]"), &cause))?;
         Ok(match sensor_pose {
             Some(pose) => truth_seen_from(pose, placed),
-            None => placed,
+            None => Placed { sweep: sweep.clone(), ..placed },
         })
     });
     placed.collect()
@@ -102,6 +104,7 @@ impl Object {
             track: self.track.or(self.object),
             truth: false,
             turn: self.turn,
+            sweep: None,
             in_world,
             time_s: self.time_s,
         })

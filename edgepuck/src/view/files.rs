@@ -3,6 +3,7 @@
 use super::MOST_POINTS;
 use super::boxes;
 use super::frame::{Frame, Labels, Placed};
+use super::recording;
 use super::scene;
 use crate::points::{PointsArgs, warn_of_packets};
 use crate::{Usage, colours};
@@ -12,7 +13,7 @@ use edgepuck_mesh::import::Format;
 use formats::cloud_file::{CloudFormat, must_be_scan};
 use formats::labelled::{is_labelled, read_labelled};
 use formats::turns::read_turns;
-use formats::{FormatError, Scan, Senders, ouster};
+use formats::{FormatError, Scan, Senders, ouster, pcap};
 use std::collections::HashMap;
 use std::fs;
 use std::io::Read;
@@ -35,33 +36,46 @@ pub fn read(file: &Path, points: &PointsArgs) -> anyhow::Result<Content> {
         _ if file.is_dir() => folder(file, points)?,
         "json" | "jsonl" => return Ok(Content::Boxes(boxes::read(file)?)),
         _ if points.is_capture(file) => turns(file, points)?,
-        "toml" | "urdf" => vec![scene::read(file)?],
-        "tar" => bail!(Usage(format!(
-            "{}: expected points, meshes or boxes, found a tar: unpack it with `tar -xf`, and show a \
-             file of it",
-            file.display()
-        ))),
+        "mcap" => recording::read(file)?,
         "ply" if !has_faces(file) => vec![cloud(file, points)?],
+        "toml" | "urdf" => vec![scene::read(file)?],
         _ if Format::from_path(file).is_some() => vec![scene::read(file)?],
         _ if MeshFormat::from_path(file).is_some() => vec![scene::of_mesh(file)?],
         "npz" if points.input_format.is_none() && !must_be_scan(file) => set(file, points)?,
-        _ => vec![cloud(file, points)?],
+        _ if points.input_format.is_some() || is_cloud(file) => vec![cloud(file, points)?],
+        _ => bail!(Usage(unknown(file, &extension))),
     }))
 }
 
-/// The first frame with points of a file or a folder of any kind, or else the first: of a capture, the first
-/// whole turn. It has no boxes of a file beside it.
-pub fn first_frame(file: &Path, points: &PointsArgs) -> anyhow::Result<Content> {
-    let frames = match points.is_capture(file) {
-        true => vec![cloud(file, points)?],
-        false => match read(file, points)? {
-            Content::Frames(frames) => frames,
-            boxes @ Content::Boxes(_) => return Ok(boxes),
-        },
+fn is_cloud(file: &Path) -> bool {
+    // The reader tells about the others.
+    let is_other = file.is_file() && file.extension().is_some_and(|found| found != "laz");
+    CloudFormat::of_path(file).is_ok() || !is_other
+}
+
+/// Why a file is none that can be shown, and what to do.
+fn unknown(file: &Path, extension: &str) -> String {
+    let found = match extension {
+        "tar" => "a tar: unpack it with `tar -xf`, and show a file of it",
+        "xml" | "mjcf" => "a model of MuJoCo: show a scan of it, by Python's `ep.view(scan)`",
+        "xacro" | "sdf" => "a robot of another format: convert it to a URDF",
+        "safetensors" | "pt" | "pth" | "onnx" => "a network: `eval` and `classify` use it",
+        _ => {
+            "another file: export it as one of these, or name the format of points by --input-format"
+        }
     };
-    let first = frames.iter().position(|frame| frame.n_points() > 0).unwrap_or(0);
-    let undescribed = |frame| Frame { boxes: Vec::new(), ..frame };
-    Ok(Content::Frames(frames.into_iter().skip(first).take(1).map(undescribed).collect()))
+    let kinds = "points (.npz, .ply, .npy, .pcd, .csv, .las, .bin), a capture (.pcap), a recording \
+                 (.mcap), a mesh (.stl, .obj, .off, .glb, .gltf), a robot (.urdf), a scene (.toml), \
+                 boxes (.json, .jsonl) or a folder of these";
+    format!("{}: expected {kinds}, found {found}", file.display())
+}
+
+/// What a picture may show of a file or a folder of any kind: all frames, or of a capture the first whole turn.
+pub fn read_first(file: &Path, points: &PointsArgs) -> anyhow::Result<Content> {
+    match points.is_capture(file) {
+        true => Ok(Content::Frames(vec![cloud(file, points)?])),
+        false => read(file, points),
+    }
 }
 
 /// The points in `file`; with the classes that labels beside it have, or with the objects that
@@ -182,7 +196,7 @@ fn set(file: &Path, points: &PointsArgs) -> anyhow::Result<Vec<Frame>> {
     Ok((0..shown).map(frame).collect())
 }
 
-/// The sweeps of a sequence or of a folder; or the clusters that `detect --segment-only` wrote, as one frame.
+/// The sweeps of a sequence or of a folder, the scans of a data set or the meshes in it; or the clusters that `detect --segment-only` wrote, as one frame.
 fn folder(folder: &Path, points: &PointsArgs) -> anyhow::Result<Vec<Frame>> {
     for inside in ["sweeps", "velodyne"] {
         if folder.join(inside).is_dir() {
@@ -203,22 +217,65 @@ fn folder(folder: &Path, points: &PointsArgs) -> anyhow::Result<Vec<Frame>> {
         let clusters: Vec<&PathBuf> = files.iter().filter(is_cluster).collect();
         return Ok(vec![of_clusters(&clusters, points)?]);
     }
-    files.retain(|file| CloudFormat::of_path(file).is_ok() || points.is_capture(file));
-    keep_commonest_extension(&mut files);
-    let cause = "expected a folder of sweeps or clusters, found no file of points in it";
-    ensure!(!files.is_empty(), Usage(format!("{}: {cause}", folder.display())));
-    let n_points = files.len() * cloud(&files[0], points)?.n_points();
-    // So many that memory holds them.
-    let every = n_points.div_ceil(MOST_POINTS).max(1);
-    if every > 1 {
-        let (folder, shown) = (folder.display(), files.len().div_ceil(every));
-        program::say!("{folder}: {shown} of {} sweeps are shown", files.len());
+    if !files.iter().any(|file| is_shown(file)) {
+        files = below(folder)?;
     }
-    let frame = |(file, number): (&PathBuf, u64)| {
-        let frame = cloud(file, points)?;
-        Ok(Frame { turn: Some(number), ..frame })
-    };
-    files.iter().zip(0..).step_by(every).map(frame).collect()
+    files.retain(|file| is_shown(file));
+    keep_commonest_extension(&mut files);
+    let cause = "expected a folder of sweeps, scans, meshes or clusters, found none in it";
+    ensure!(!files.is_empty(), Usage(format!("{}: {cause}", folder.display())));
+    let (n_files, mut n_points, mut frames) = (files.len(), 0, Vec::new());
+    for (file, number) in files.into_iter().zip(0..) {
+        let name = file.strip_prefix(folder).unwrap_or(&file).to_string_lossy().into_owned();
+        // A set beside scans is shown as them.
+        let is_cloud = CloudFormat::of_path(&file).is_ok() && !has_faces(&file);
+        match if is_cloud { cloud(&file, points) } else { first(&file, points) } {
+            Ok(frame) => {
+                n_points += frame.n_points();
+                frames.push(Frame { name, turn: Some(number), ..frame });
+            }
+            Err(error) if number + 1 == n_files as u64 && frames.is_empty() => return Err(error),
+            Err(error) => program::say!("warning: {name} is left out: {error:#}"),
+        }
+        // So many that memory holds them.
+        if n_points > 3 * MOST_POINTS || frames.len() >= MOST_FRAMES {
+            program::say!(
+                "{}: the first {} of {n_files} are shown",
+                folder.display(),
+                frames.len()
+            );
+            break;
+        }
+    }
+    Ok(frames)
+}
+
+/// The first frame of a file that has some.
+fn first(file: &Path, points: &PointsArgs) -> anyhow::Result<Frame> {
+    match read(file, points)? {
+        Content::Frames(frames) => Ok(frames.into_iter().next().unwrap_or_default()),
+        Content::Boxes(_) => Ok(Frame::default()),
+    }
+}
+
+fn is_shown(file: &Path) -> bool {
+    let is_cloud = CloudFormat::of_path(file).is_ok() || pcap::is_capture(file);
+    is_cloud || MeshFormat::from_path(file).is_some() || Format::from_path(file).is_some()
+}
+
+/// The files in the folders in `folder` and below these, in the order of their names.
+fn below(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    let entries = fs::read_dir(folder).map_err(|source| FormatError::io(folder, source))?;
+    let mut entries: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+    entries.sort();
+    let mut files = Vec::new();
+    for entry in entries {
+        match entry.is_dir() && !entry.is_symlink() {
+            true => files.extend(below(&entry)?),
+            false => files.push(entry),
+        }
+    }
+    Ok(files)
 }
 
 /// Notes and lists may lie beside sweeps.

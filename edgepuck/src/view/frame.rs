@@ -2,15 +2,22 @@
 //! assets/view/src/viewer.js).
 
 use anyhow::{Context, ensure};
+use base64::Engine;
 use base64::display::Base64Display;
 use base64::engine::general_purpose::STANDARD;
 use bytemuck::cast_slice;
+use flate2::Compression;
+use flate2::write::ZlibEncoder;
 use formats::geometry::{OrientedBox, Trajectory};
+use formats::plausible::{bounds, unit_of_scanned};
 use formats::scan::{Attribute, Column};
 use formats::trajectory::check_cover;
+use formats::unit::Unit;
 use formats::{FormatError, Scan};
+use glam::DVec3;
 use serde::ser::{SerializeMap, SerializeStruct};
 use serde::{Serialize, Serializer};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use crate::Usage;
@@ -20,6 +27,9 @@ use crate::Usage;
 pub struct Pane {
     name: String,
     pub frames: Vec<Frame>,
+    /// Its place among the files.
+    #[serde(skip)]
+    pub number: usize,
     /// Where the sensor's poses would be, if it moves: `gen-scenes --drive` writes them beside a capture.
     #[serde(skip)]
     poses: PathBuf,
@@ -32,6 +42,9 @@ pub struct Frame {
     /// The number of the turn, which boxes name; that of the frame if it is not known.
     #[serde(skip)]
     pub turn: Option<u64>,
+    /// The origin of the meshes of a frame without points, metres.
+    #[serde(skip)]
+    pub origin: [f64; 3],
     pub points: Option<Points>,
     pub meshes: Vec<Mesh>,
     pub boxes: Vec<Placed>,
@@ -85,6 +98,9 @@ pub struct Placed {
     pub truth: bool,
     #[serde(skip)]
     pub turn: Option<u64>,
+    /// The name of the file of its points.
+    #[serde(skip)]
+    pub sweep: Option<String>,
     /// Whether its frame is the world's, and not the sensor's.
     #[serde(skip)]
     pub in_world: bool,
@@ -106,16 +122,63 @@ struct Keys {
 }
 
 impl Pane {
-    pub fn new(file: &Path, frames: Vec<Frame>) -> Self {
+    pub fn new(number: usize, file: &Path, frames: Vec<Frame>) -> Self {
         let name = file.file_name().unwrap_or(file.as_os_str());
         let poses = file.with_extension("tum");
-        Self { name: name.to_string_lossy().into_owned(), frames, poses }
+        Self { name: name.to_string_lossy().into_owned(), frames, number, poses }
+    }
+
+    /// Whether it has meshes, as of a file of meshes or a scene.
+    pub fn has_meshes(&self) -> bool {
+        self.frames.len() == 1 && !self.frames[0].meshes.is_empty()
+    }
+
+    /// Lays the meshes of `under` under the points of each frame that is a scan of them, in the unit in which
+    /// it is one. Returns whether there is such a frame.
+    pub fn lay_over(&mut self, under: &Self) -> bool {
+        let Some(Frame { meshes, origin, .. }) = under.frames.first() else { return false };
+        let mut found = None;
+        let from =
+            |at: &[f32; 3], origin: [f64; 3]| [0, 1, 2].map(|i| f64::from(at[i]) + origin[i]);
+        let vertices = meshes.iter().flat_map(|mesh| &mesh.position);
+        let mesh_bounds = bounds(vertices.map(|at| from(at, *origin)));
+        for frame in &mut self.frames {
+            let Some(Points { scan, .. }) = &frame.points else { continue };
+            let shift = scan.origin;
+            let points = scan.positions.iter().map(|at| from(at, shift));
+            let Some(unit) = unit_of_scanned(mesh_bounds, points) else { continue };
+            let moved = |at: &[f32; 3]| {
+                let place = from(at, *origin).map(|x| unit.metres() * x);
+                [0, 1, 2].map(|axis| (place[axis] - shift[axis]) as f32)
+            };
+            let moved = |mesh: &Mesh| Mesh {
+                position: mesh.position.iter().map(moved).collect(),
+                ..mesh.clone()
+            };
+            frame.meshes.extend(meshes.iter().map(moved));
+            found = Some(unit);
+        }
+        if let Some(unit) = found.filter(|unit| *unit != Unit::Metre) {
+            let (mesh, scan) = (&under.name, &self.name);
+            program::say!("{mesh} is drawn in {}: so it fits {scan}, its scan", unit.plural());
+        }
+        found.is_some()
     }
 
     pub fn is_empty(&self) -> bool {
         self.frames
             .iter()
             .all(|frame| frame.n_points() + frame.meshes.len() + frame.boxes.len() == 0)
+    }
+
+    /// Keeps the first frame that has boxes and a half of the most points, or else points.
+    pub fn keep_one(&mut self) {
+        let most = self.frames.iter().map(Frame::n_points).max().unwrap_or(0);
+        let is_full = |frame: &Frame| frame.n_points() > 0 && 2 * frame.n_points() >= most;
+        let with_boxes = |frame: &Frame| is_full(frame) && !frame.boxes.is_empty();
+        let found = self.frames.iter().position(with_boxes);
+        let first = found.or_else(|| self.frames.iter().position(is_full)).unwrap_or(0);
+        self.frames = std::mem::take(&mut self.frames).into_iter().skip(first).take(1).collect();
     }
 
     /// The numbers of points, meshes, boxes and frames.
@@ -152,7 +215,17 @@ impl Pane {
             true => self.seen_from_sensor(boxes, file)?,
             false => boxes,
         };
+        let of_sweep = boxes.iter().find_map(|placed| placed.sweep.clone()).unwrap_or_default();
+        let is_named = |frame: &Frame| Path::new(&frame.name).ends_with(&of_sweep);
+        let one_is_named = !of_sweep.is_empty() && self.frames.iter().any(is_named);
+        if !one_is_named && !of_sweep.is_empty() && of_sweep != self.name && has_points {
+            let (file, name) = (file.display(), &self.name);
+            program::say!("warning: {file}: expected boxes of {name}, found boxes of {of_sweep}");
+        }
         for (number, frame) in (0..).zip(&mut self.frames) {
+            if one_is_named && !is_named(frame) {
+                continue;
+            }
             let is_of = |placed: &&Placed| {
                 placed.turn.is_none_or(|turn| turn == frame.turn.unwrap_or(number))
             };
@@ -253,30 +326,64 @@ pub fn from_origin(mut pose: [f64; 16], origin: [f64; 3]) -> [f64; 16] {
     pose
 }
 
-/// Numbers as the viewer takes them: little-endian, in base64, by their type.
-struct Block<'a>(Column<'a>);
-
-impl Serialize for Block<'_> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let (kind, bytes): (_, &[u8]) = match self.0 {
-            Column::F32(values) => ("f32", cast_slice(values)),
-            Column::U8(values) => ("u8", values),
-            Column::U16(values) => ("u16", cast_slice(values)),
-            Column::U32(values) => ("u32", cast_slice(values)),
-            Column::Vector(values) => ("f32", cast_slice(values)),
-        };
-        let mut map = serializer.serialize_map(Some(1))?;
-        map.serialize_entry(kind, &format_args!("{}", Base64Display::new(bytes, &STANDARD)))?;
-        map.end()
-    }
-}
-
 fn block_f32<S: Serializer>(values: &[[f32; 3]], serializer: S) -> Result<S::Ok, S::Error> {
-    Block(Column::Vector(values)).serialize(serializer)
+    block("f32", cast_slice(values), serializer)
 }
 
 fn block_u32<S: Serializer>(values: &[[u32; 3]], serializer: S) -> Result<S::Ok, S::Error> {
-    Block(Column::U32(values.as_flattened())).serialize(serializer)
+    block("u32", cast_slice(values), serializer)
+}
+
+/// Numbers as the viewer takes them: little-endian, in base64, by their type.
+fn block<S: Serializer>(kind: &str, bytes: &[u8], serializer: S) -> Result<S::Ok, S::Error> {
+    let mut map = serializer.serialize_map(Some(1))?;
+    map.serialize_entry(kind, &format_args!("{}", Base64Display::new(bytes, &STANDARD)))?;
+    map.end()
+}
+
+/// Numbers as `unpacked` in assets/view/src/main.js takes them: `low + step * z`, in turn for each `low`. Of the
+/// whole numbers `z`, the differences are compressed, the lowest bytes of all first.
+#[derive(Serialize)]
+struct Packed {
+    low: Vec<f64>,
+    step: f64,
+    z: String,
+}
+
+impl Packed {
+    fn of_whole(values: &[u32]) -> Self {
+        let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
+        for byte in 0..4 {
+            let before = std::iter::once(&0).chain(values);
+            let bytes = values.iter().zip(before).map(|(value, before)| {
+                let difference = value.wrapping_sub(*before) as i32;
+                // Those of either sign are small.
+                ((difference << 1) ^ (difference >> 31)).to_le_bytes()[byte]
+            });
+            let bytes: Vec<u8> = bytes.collect();
+            encoder.write_all(&bytes).expect("invariant: memory takes all bytes");
+        }
+        let z = STANDARD.encode(encoder.finish().expect("invariant: memory takes all bytes"));
+        Self { low: vec![0.0], step: 1.0, z }
+    }
+
+    /// The values of each axis, to half of a step: a 65,535th of the largest span, and at most `most`.
+    fn of_real(axes: &[Vec<f64>], most: f64) -> Self {
+        let bounds = axes.iter().map(|values| {
+            values.iter().fold([f64::MAX, f64::MIN], |[low, high], x| [low.min(*x), high.max(*x)])
+        });
+        let bounds: Vec<[f64; 2]> = bounds.collect();
+        let span = bounds.iter().fold(0.0, |span: f64, [low, high]| span.max(high - low));
+        let step = (span / 65_535.0).min(most).max(span / 4e9).max(f64::MIN_POSITIVE);
+        let whole = axes.iter().zip(&bounds).flat_map(|(values, [low, _])| {
+            values.iter().map(move |value| ((value - low) / step).round() as u32)
+        });
+        Self {
+            low: bounds.iter().map(|[low, _]| *low).collect(),
+            step,
+            ..Self::of_whole(&whole.collect::<Vec<_>>())
+        }
+    }
 }
 
 #[derive(Serialize)]
@@ -284,35 +391,76 @@ struct Values<'a> {
     name: &'a str,
     unit: &'a str,
     kind: &'a str,
-    values: Block<'a>,
+    values: Packed,
     names: Option<&'a [String]>,
 }
 
 impl Serialize for Points {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        /// Points are where they are to half of this, metres.
+        const STEP_M: f64 = 1.0 / 128.0;
+        let scan = &self.scan;
+        // Points of one ring are near to each other.
+        let mut order: Vec<usize> = (0..scan.len()).collect();
+        if let Some(ring) = &scan.ring {
+            order.sort_by_key(|i| ring[*i]);
+        }
+        let at = scan.sensor_position_m();
+        let far_m = |i: usize| {
+            let off = |axis| f64::from(scan.positions[i][axis]) + scan.origin[axis] - at[axis];
+            DVec3::from([0, 1, 2].map(off)).length()
+        };
+        // The viewer computes such ranges.
+        let is_range = |range_m: &[f32]| {
+            (0..scan.len()).all(|i| (f64::from(range_m[i]) - far_m(i)).abs() < 1e-3)
+        };
         let media = ["surface", "rain", "snow", "fog", "dust"].map(str::to_owned);
-        let of_scan = self.scan.columns().filter_map(|(attribute, column)| {
+        let of_scan = scan.columns().filter_map(|(attribute, column)| {
             let (unit, kind) = match attribute {
                 Attribute::Range => ("m", "number"),
                 Attribute::Time => ("s", "number"),
                 Attribute::Object | Attribute::Triangle | Attribute::Return => ("", "id"),
                 Attribute::Medium => ("", "class"),
-                Attribute::Sensor | Attribute::Attitude | Attribute::Normal => return None,
                 _ => ("", "number"),
             };
             let names = (attribute == Attribute::Medium).then_some(&media[..]);
-            Some(Values { name: attribute.name(), unit, kind, values: Block(column), names })
+            let in_order =
+                |of: &dyn Fn(usize) -> u32| order.iter().map(|i| of(*i)).collect::<Vec<_>>();
+            let values = match column {
+                Column::F32(values) if attribute == Attribute::Range && is_range(values) => {
+                    return None;
+                }
+                Column::F32(values) if values.iter().all(|value| value.is_finite()) => {
+                    Packed::of_real(&[order.iter().map(|i| values[*i].into()).collect()], f64::MAX)
+                }
+                // Bits of numbers.
+                Column::F32(values) => {
+                    Packed { step: 0.0, ..Packed::of_whole(&in_order(&|i| values[i].to_bits())) }
+                }
+                Column::U8(values) => Packed::of_whole(&in_order(&|i| values[i].into())),
+                Column::U32(values) => Packed::of_whole(&in_order(&|i| values[i])),
+                // Rings give the others their order.
+                Column::U16(values) => {
+                    Packed::of_whole(&values.iter().map(|ring| (*ring).into()).collect::<Vec<_>>())
+                }
+                Column::Vector(_) => return None,
+            };
+            Some(Values { name: attribute.name(), unit, kind, values, names })
         });
         let labels = self.labels.iter().map(|Labels { name, values, names }| Values {
             name,
             unit: "",
             kind: if names.is_some() { "class" } else { "id" },
-            values: Block(Column::U32(values)),
+            values: Packed::of_whole(&order.iter().map(|i| values[*i]).collect::<Vec<_>>()),
             names: names.as_deref(),
         });
-        let mut fields = serializer.serialize_struct("Points", 3)?;
-        fields.serialize_field("position", &Block(Column::Vector(&self.scan.positions)))?;
-        fields.serialize_field("origin", &self.scan.origin)?;
+        let axes = [0, 1, 2].map(|axis| {
+            order.iter().map(|i| f64::from(scan.positions[*i][axis])).collect::<Vec<_>>()
+        });
+        let mut fields = serializer.serialize_struct("Points", 4)?;
+        fields.serialize_field("count", &scan.len())?;
+        fields.serialize_field("position", &Packed::of_real(&axes, STEP_M))?;
+        fields.serialize_field("origin", &scan.origin)?;
         fields.serialize_field("columns", &labels.chain(of_scan).collect::<Vec<_>>())?;
         fields.end()
     }

@@ -6,6 +6,7 @@ pub mod frame;
 mod page;
 mod picture;
 pub mod preview;
+mod recording;
 mod scene;
 
 use crate::points::PointsArgs;
@@ -23,10 +24,11 @@ const MOST_POINTS: usize = 3_000_000;
 
 #[derive(clap::Args)]
 pub struct Args {
-    /// What to show: scans, sweeps and clouds of any format; captures; meshes and scenes (.toml),
-    /// with what their sensors see; packed sets; folders of sweeps, of clusters or of a sequence of
-    /// SemanticKITTI. Two are shown side by side. Boxes, as of detect (.json) and live (.jsonl), are
-    /// drawn in what is named before them
+    /// What to show: scans, sweeps and clouds of any format; captures and recordings (.mcap); meshes,
+    /// robots and scenes (.toml), with what their sensors see; packed sets; folders of sweeps, scans,
+    /// meshes or clusters, of a data set or of a sequence of SemanticKITTI. A mesh lies under its scan,
+    /// and two others stand side by side. Boxes, as of detect (.json) and live (.jsonl), are drawn in
+    /// what is named before them
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
 
@@ -38,7 +40,7 @@ pub struct Args {
     points: PointsArgs,
 
     /// Page (.html) or picture (.png) to write [default: a page in the folder for temporary files, which is
-    /// opened]. A picture shows the first frame, and a mesh under its scan
+    /// opened]. A picture shows the first frame, or the first with boxes
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 
@@ -80,20 +82,24 @@ pub fn panes(
 ) -> anyhow::Result<Vec<Pane>> {
     let (mut panes, mut boxes) = (Vec::<Pane>::new(), Vec::new());
     for file in files {
+        let n = panes.len();
         match read(file)? {
-            Content::Frames(frames) => panes.push(Pane::new(file, frames)),
+            Content::Frames(frames) => panes.push(Pane::new(n, file, frames)),
             // Before the first pane, they belong to it.
-            Content::Boxes(found) => boxes.push((panes.len().max(1) - 1, file, found)),
+            Content::Boxes(found) => boxes.push((n.max(1) - 1, file, found)),
         }
     }
+    lay_meshes_under_scans(&mut panes);
     ensure!(
         panes.len() <= 2,
         Usage(format!("expected at most two files side by side, found {}", panes.len()))
     );
     if panes.is_empty() {
-        panes.push(Pane::new(&files[0], Vec::new()));
+        panes.push(Pane::new(0, &files[0], Vec::new()));
     }
-    for (pane, file, found) in boxes {
+    for (number, file, found) in boxes {
+        // Those of a mesh that lies under its scan belong to the scan.
+        let pane = panes.iter().position(|pane| pane.number >= number).unwrap_or(panes.len() - 1);
         panes[pane].add(found, file)?;
     }
     if let Some(file) = truth {
@@ -104,6 +110,18 @@ pub fn panes(
         }
     }
     Ok(panes)
+}
+
+/// Lays each mesh or scene under the points of other files that are its scan, and leaves it out as a pane.
+fn lay_meshes_under_scans(panes: &mut Vec<Pane>) {
+    let (meshes, mut others): (Vec<_>, Vec<_>) =
+        std::mem::take(panes).into_iter().partition(Pane::has_meshes);
+    for mesh in meshes {
+        let lies = others.iter_mut().map(|scan| scan.lay_over(&mesh)).fold(false, |a, b| a || b);
+        panes.extend(Some(mesh).filter(|_| !lies));
+    }
+    panes.extend(others);
+    panes.sort_by_key(|pane| pane.number);
 }
 
 /// A page in the folder for temporary files. The same file of the same user has the same page, so that

@@ -6,17 +6,30 @@ use crate::{Outcome, Usage};
 use anyhow::ensure;
 use std::path::Path;
 
-/// Draws the first frame of the files as a PNG file, a mesh and its scan together.
+/// Draws a frame of the files as a PNG file, the first or the first with boxes.
 pub fn draw(args: &Args, out: &Path) -> anyhow::Result<Outcome> {
     let file = &args.files[0];
-    let read = |file: &Path| files::first_frame(file, &args.points);
-    let mut panes = panes(&args.files, args.truth.as_deref(), read)?;
-    panes.iter_mut().for_each(|pane| pane.frames.truncate(1));
-    if panes.len() == 2 {
-        let other = panes.pop().and_then(|mut pane| pane.frames.pop());
-        panes[0].frames =
-            panes[0].frames.pop().zip(other).map(joined).transpose()?.into_iter().collect();
+    let is_of_boxes = |file: &std::path::PathBuf| {
+        file.extension()
+            .is_some_and(|found| found.to_string_lossy().to_lowercase().starts_with("json"))
+    };
+    let asks = args.truth.is_some() || args.files.iter().any(is_of_boxes);
+    let read = if asks { files::read } else { files::read_first };
+    let mut panes = panes(&args.files, args.truth.as_deref(), |file| read(file, &args.points))?;
+    ensure!(
+        panes.len() == 1,
+        Usage(
+            "expected one file, or a mesh and its scan, and perhaps boxes, found two others: draw each, \
+             or see both in a page"
+                .into()
+        )
+    );
+    for Frame { boxes, .. } in &mut panes[0].frames {
+        // What a file beside a sweep describes is not asked for.
+        let has_found = boxes.iter().any(|placed| !placed.truth);
+        boxes.retain(|placed| !placed.truth || args.truth.is_some() || asks && !has_found);
     }
+    panes[0].keep_one();
     let (summary, is_empty) = (panes[0].summary(), panes[0].is_empty());
     let Some(shown) = panes[0].frames.pop().filter(|_| !is_empty) else {
         program::say!("{}: expected points, meshes or boxes to draw, found none", file.display());
@@ -25,19 +38,4 @@ pub fn draw(args: &Args, out: &Path) -> anyhow::Result<Outcome> {
     preview::draw(&shown, out)?;
     program::say!("{summary}: {}", out.display());
     Ok(Outcome::Success)
-}
-
-/// A mesh and its scan as one frame.
-fn joined((one, other): (Frame, Frame)) -> anyhow::Result<Frame> {
-    let (mesh, scan) = if one.n_points() == 0 { (one, other) } else { (other, one) };
-    ensure!(
-        mesh.n_points() == 0 && scan.n_points() > 0,
-        Usage(
-            "expected one file, or a mesh and its scan, and perhaps boxes, found two others: draw each, \
-             or see both in a page"
-                .into()
-        )
-    );
-    let meshes = [mesh.meshes, scan.meshes].concat();
-    Ok(Frame { meshes, boxes: [mesh.boxes, scan.boxes].concat(), ..scan })
 }

@@ -49,7 +49,7 @@ fn of_scene(scene: &Scene) -> anyhow::Result<Frame> {
     });
     let sensors = sensors.collect();
     let points = (!scans.is_empty()).then(|| joined(&scene, &scans, origin));
-    Ok(Frame { points, meshes, sensors, ..Frame::default() })
+    Ok(Frame { origin, points, meshes, sensors, ..Frame::default() })
 }
 
 /// A point near the meshes if they are so far from the origin that f32 would lose their shape.
@@ -65,6 +65,9 @@ fn origin_of(scene: &Scene) -> [f64; 3] {
 fn joined(scene: &Scene, scans: &[Scan], origin: [f64; 3]) -> Points {
     let names = scene.sensors.iter().map(|mounted| mounted.name.clone()).collect();
     let mut sensor = Labels { name: "sensor", values: Vec::new(), names: Some(names) };
+    let name = |(i, of): (usize, &Instance)| of.name.clone().unwrap_or_else(|| i.to_string());
+    let names = scene.instances().iter().enumerate().map(name).collect();
+    let mut object = Labels { name: "object", values: Vec::new(), names: Some(names) };
     let pose = scans.first().and_then(|scan| scan.pose);
     let mut all = formats::Scan { origin, pose, ..formats::Scan::default() };
     for (scan, number) in scans.iter().zip(0..) {
@@ -73,11 +76,11 @@ fn joined(scene: &Scene, scans: &[Scan], origin: [f64; 3]) -> Points {
         all.positions.extend(scan.positions.iter().map(place));
         append(&mut all.range_m, &scan.range_m);
         append(&mut all.ring, &scan.ring);
-        append(&mut all.object, &scan.object);
+        object.values.extend(scan.object.iter().flatten());
         append(&mut all.intensity, &scan.intensity);
         sensor.values.resize(all.positions.len(), number);
     }
-    let labels = if scans.len() > 1 { vec![sensor] } else { Vec::new() };
+    let labels = if scans.len() > 1 { vec![object, sensor] } else { vec![object] };
     Points { scan: all, labels }
 }
 

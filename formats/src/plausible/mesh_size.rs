@@ -34,6 +34,34 @@ pub fn scene_mesh_size(size_m: [f64; 3], unit: Unit, remedy: &'static str) -> Op
     mesh_size(size_m, unit, remedy).filter(|_| is_odd)
 }
 
+/// The unit of a mesh with these bounds whose scan `points`, metres, are: a fifth of them or more are in its
+/// bounding box, with a tenth of its size around it, and span 0.4 of the size. `None` of something else's.
+#[must_use]
+pub fn unit_of_scanned(
+    mesh: [[f64; 3]; 2],
+    points: impl Iterator<Item = [f64; 3]> + Clone,
+) -> Option<Unit> {
+    let size = |[low, high]: [[f64; 3]; 2]| largest([0, 1, 2].map(|axis| high[axis] - low[axis]));
+    Unit::ALL.into_iter().find(|unit| {
+        let [low, high] = mesh.map(|at| at.map(|x| x * unit.metres()));
+        let room = 0.1 * size([low, high]);
+        let is_in =
+            |at: &[f64; 3], axis| (low[axis] - room..=high[axis] + room).contains(&at[axis]);
+        let on = points.clone().filter(|at| (0..3).all(|axis| is_in(at, axis)));
+        let spans = size(bounds(on.clone())) >= 0.4 * size([low, high]);
+        spans && 5 * on.count() >= points.clone().count()
+    })
+}
+
+/// The least and the largest coordinates of places.
+pub fn bounds(places: impl Iterator<Item = [f64; 3]>) -> [[f64; 3]; 2] {
+    let least = |a: [f64; 3], b: [f64; 3]| [0, 1, 2].map(|axis| a[axis].min(b[axis]));
+    let minus = |at: [f64; 3]| at.map(|x| -x);
+    let both = places
+        .fold([[f64::INFINITY; 3]; 2], |[low, high], at| [least(low, at), least(high, minus(at))]);
+    [both[0], minus(both[1])]
+}
+
 /// Why the form of a mesh of this size, metres, is not to be seen in scans: noise of a standard deviation
 /// or a quantum of ranges that are as large.
 #[must_use]

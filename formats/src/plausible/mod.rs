@@ -16,7 +16,7 @@ pub(crate) use foreign::or_foreign;
 #[cfg(any(feature = "files", feature = "pcap", feature = "poses"))]
 pub(crate) use foreign::or_foreign_file;
 pub use foreign::{foreign, read_text};
-pub use mesh_size::{effect_on_mesh, mesh_size, scene_mesh_size};
+pub use mesh_size::{bounds, effect_on_mesh, mesh_size, scene_mesh_size, unit_of_scanned};
 #[cfg(feature = "poses")]
 pub use motion::{motion_of, sensor_motion};
 pub use object::{Unlike, judge_object};

@@ -149,23 +149,4 @@ mod tests {
         canvas.triangle(half(5.0), BLUE);
         assert_eq!([[2, 2], [8, 2]].map(|at| pixel(&canvas, at)), [BLUE, RED]);
     }
-
-    #[test]
-    fn shapes_fill_the_pixels_inside_them() {
-        let mut canvas = Canvas::new(DVec2::splat(20.0));
-        canvas.triangle(half(0.0), [0; 3]);
-        assert_eq!(pixel(&canvas, [9, 9]), [0; 3]);
-        assert_eq!(pixel(&canvas, [10, 10]), [255; 3]);
-        // Samples at 0.25 and 0.75 of pixel (10, 9): three have x + y <= 20.
-        assert_eq!(pixel(&canvas, [10, 9]), [63; 3]);
-        let mut canvas = Canvas::new(DVec2::splat(20.0));
-        canvas.disc(DVec3::new(10.0, 10.0, 0.0), 4.0, RED);
-        assert_eq!(
-            [[13, 10], [14, 10], [10, 14]].map(|at| pixel(&canvas, at)),
-            [RED, [255; 3], [255; 3]]
-        );
-        // What lies outside the picture, or nowhere, is not drawn.
-        canvas.disc(DVec3::new(-50.0, 1e300, 0.0), 4.0, RED);
-        canvas.triangle([DVec3::NAN, DVec3::X, DVec3::Y], RED);
-    }
 }

