@@ -267,6 +267,8 @@ fn is_shown(file: &Path) -> bool {
 fn below(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
     let entries = fs::read_dir(folder).map_err(|source| FormatError::io(folder, source))?;
     let mut entries: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+    // Its clouds are those of the scans of a data set.
+    entries.retain(|entry| !entry.ends_with("packed"));
     entries.sort();
     let mut files = Vec::new();
     for entry in entries {
