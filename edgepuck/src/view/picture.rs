@@ -9,11 +9,8 @@ use std::path::Path;
 /// Draws a frame of the files as a PNG file, the first or the first with boxes.
 pub fn draw(args: &Args, out: &Path) -> anyhow::Result<Outcome> {
     let file = &args.files[0];
-    let is_of_boxes = |file: &std::path::PathBuf| {
-        file.extension()
-            .is_some_and(|found| found.to_string_lossy().to_lowercase().starts_with("json"))
-    };
-    let asks = args.truth.is_some() || args.files.iter().any(is_of_boxes);
+    // The others may be boxes, of any turn.
+    let asks = args.truth.is_some() || args.files.len() > 1;
     let read = if asks { files::read } else { files::read_first };
     let mut panes = panes(&args.files, args.truth.as_deref(), |file| read(file, &args.points))?;
     ensure!(
@@ -26,8 +23,8 @@ pub fn draw(args: &Args, out: &Path) -> anyhow::Result<Outcome> {
     );
     for Frame { boxes, .. } in &mut panes[0].frames {
         // What a file beside a sweep describes is not asked for.
-        let has_found = boxes.iter().any(|placed| !placed.truth);
-        boxes.retain(|placed| !placed.truth || args.truth.is_some() || asks && !has_found);
+        let is_asked = args.truth.is_some() || asks && boxes.iter().all(|placed| placed.truth);
+        boxes.retain(|placed| !placed.truth || is_asked);
     }
     panes[0].keep_one();
     let (summary, is_empty) = (panes[0].summary(), panes[0].is_empty());

@@ -28,7 +28,7 @@ pub fn read(file: &Path) -> anyhow::Result<Vec<Frame>> {
             "vision_msgs/msg/Detection3DArray" => cdr.boxes(&base).map(|boxes| {
                 frames.last_mut().into_iter().for_each(|frame| frame.boxes.extend(boxes.clone()));
             }),
-            "tf2_msgs/msg/TFMessage" => cdr.transform("base_link", &mut base),
+            "tf2_msgs/msg/TFMessage" => cdr.transform(&mut base),
             _ => Some(()),
         };
         is_read.with_context(|| format!("{}: expected a little-endian {kind}", file.display()))?;
@@ -83,15 +83,14 @@ impl<'a> Cdr<'a> {
         (self.header()?, self.u32()?, self.u32()?);
         let mut fields = Vec::new();
         for _ in 0..self.u32()? {
-            fields.push((self.text()?, self.u32()? as usize, self.take::<1>()?[0]));
-            self.u32()?;
+            fields.push((self.text()?, self.u32()? as usize, self.take::<1>()?[0], self.u32()?));
         }
         let is_little = self.take::<1>()? == [0];
         let (step, _) = (self.u32()?.max(1) as usize, self.u32()?);
         let points = self.blob()?.chunks_exact(step);
         // Fields of f32 and u16 are those of types 7 and 4.
         let at = |name: &str, is: u8| {
-            let found = fields.iter().find(|(of, _, kind)| of == name && *kind == is)?;
+            let found = fields.iter().find(|(of, _, kind, _)| of == name && *kind == is)?;
             (is_little && found.1.checked_add(if is == 7 { 4 } else { 2 })? <= step)
                 .then_some(found.1)
         };
@@ -101,18 +100,11 @@ impl<'a> Cdr<'a> {
             points.clone().map(value).collect::<Option<Vec<f32>>>()
         };
         let [x, y, z] = [real("x")?, real("y")?, real("z")?];
-        let ring = at("ring", 4).map(|at| {
-            points.clone().map(move |point| u16::from_le_bytes([point[at], point[at + 1]]))
-        });
         let positions = (0..x.len()).map(|i| [x[i], y[i], z[i]]).collect();
-        let (intensity, time_s) = (real("intensity"), real("time"));
-        let scan = Scan {
-            positions,
-            ring: ring.map(Iterator::collect),
-            intensity,
-            time_s,
-            ..Scan::default()
-        };
+        let mut scan = Scan { positions, ..Scan::default() };
+        (scan.intensity, scan.time_s) = (real("intensity"), real("time"));
+        let u16_of = |point: &[u8], at: usize| u16::from_le_bytes([point[at], point[at + 1]]);
+        scan.ring = at("ring", 4).map(|at| points.map(|point| u16_of(point, at)).collect());
         let is_finite = |i: &usize| scan.positions[*i].iter().all(|x| x.is_finite());
         Some(scan.select(&(0..scan.len()).filter(is_finite).collect::<Vec<_>>()))
     }
@@ -138,11 +130,11 @@ impl<'a> Cdr<'a> {
         Some(boxes)
     }
 
-    /// Sets the pose of the frame `of` in the world, if it is among the transforms.
-    fn transform(&mut self, of: &str, base: &mut Pose) -> Option<()> {
+    /// Sets the pose of the vehicle in the world, if it is among the transforms.
+    fn transform(&mut self, base: &mut Pose) -> Option<()> {
         for _ in 0..self.u32()? {
             let (parent, child, pose) = (self.header()?, self.text()?, self.pose()?);
-            if parent == "world" && child == of {
+            if [&*parent, &*child] == ["world", "base_link"] {
                 *base = pose;
             }
         }

@@ -96,6 +96,9 @@ pub(crate) fn read_pose<R: Read + Seek>(
 fn only_array_of_points<R: Read + Seek>(npz: &mut NpzReader<R>) -> Result<String, FormatError> {
     let mut found = Vec::new();
     let keys = npz.keys();
+    if let Some(key) = keys.iter().find(|key| key.ends_with(".weight")) {
+        return Err(npz.error(key, "expected points, found the weights of a network"));
+    }
     for key in &keys {
         let holds_points = npz.entry(key, |header, _, elements| {
             io::copy(elements, &mut io::sink())?;
