@@ -39,7 +39,7 @@ pub fn run(
     write_clusters(out, &scan, segmentation)?;
     let tints: Vec<_> = segmentation.labels().iter().map(|label| tint(*label)).collect();
     write_ply(&out.join("sweep.ply"), &scan.positions, &tints)?;
-    preview::draw_sweep(&scan, &tints, &[], &out.join("preview.png"))?;
+    preview::picture(&scan, &tints, &[], &[], &out.join("preview.png"))?;
     begun.into_iter().for_each(UnfinishedFolder::finish);
     let ground = segmentation.labels().iter().filter(|label| **label == Label::Ground).count();
     program::say!(

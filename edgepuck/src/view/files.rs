@@ -42,15 +42,13 @@ pub fn read(file: &Path, points: &PointsArgs) -> anyhow::Result<Content> {
         _ if Format::from_path(file).is_some() => vec![scene::read(file)?],
         _ if MeshFormat::from_path(file).is_some() => vec![scene::of_mesh(file)?],
         "npz" if points.input_format.is_none() && !must_be_scan(file) => set(file, points)?,
-        _ if points.input_format.is_some() || is_cloud(file) => vec![cloud(file, points)?],
-        _ => bail!(Usage(unknown(file, &extension))),
+        // The reader of points tells what is wrong with these.
+        "" | "laz" => vec![cloud(file, points)?],
+        _ if points.input_format.is_none() && file.is_file() && !is_shown(file) => {
+            bail!(Usage(unknown(file, &extension)))
+        }
+        _ => vec![cloud(file, points)?],
     }))
-}
-
-fn is_cloud(file: &Path) -> bool {
-    // The reader tells about the others.
-    let is_other = file.is_file() && file.extension().is_some_and(|found| found != "laz");
-    CloudFormat::of_path(file).is_ok() || !is_other
 }
 
 /// Why a file is none that can be shown, and what to do.

@@ -9,7 +9,7 @@ use bytemuck::cast_slice;
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use formats::geometry::{OrientedBox, Trajectory};
-use formats::plausible::{bounds, unit_of_scanned};
+use formats::plausible::{bounds, mesh_size, unit_of_scanned};
 use formats::scan::{Attribute, Column};
 use formats::trajectory::check_cover;
 use formats::unit::Unit;
@@ -163,6 +163,18 @@ impl Pane {
             program::say!("{mesh} is drawn in {}: so it fits {scan}, its scan", unit.plural());
         }
         found.is_some()
+    }
+
+    /// Prints a warning if a mesh, taken to be in metres, has a size that is not likely.
+    pub fn warn_of_size(&self) {
+        let meshes = self.frames.iter().filter(|frame| frame.points.is_none());
+        let vertices = meshes.flat_map(|frame| &frame.meshes).flat_map(|mesh| &mesh.position);
+        let [low, high] = bounds(vertices.map(|at| at.map(f64::from)));
+        let size_m = [0, 1, 2].map(|axis| high[axis] - low[axis]);
+        let remedy = "over its scan, it is drawn in the unit in which it fits";
+        if let Some(warning) = mesh_size(size_m, Unit::Metre, remedy) {
+            program::say!("warning: {}: {warning}", self.name);
+        }
     }
 
     pub fn is_empty(&self) -> bool {

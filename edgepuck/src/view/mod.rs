@@ -118,7 +118,10 @@ fn lay_meshes_under_scans(panes: &mut Vec<Pane>) {
         std::mem::take(panes).into_iter().partition(Pane::has_meshes);
     for mesh in meshes {
         let lies = others.iter_mut().map(|scan| scan.lay_over(&mesh)).fold(false, |a, b| a || b);
-        panes.extend(Some(mesh).filter(|_| !lies));
+        if !lies {
+            mesh.warn_of_size();
+            panes.push(mesh);
+        }
     }
     panes.extend(others);
     panes.sort_by_key(|pane| pane.number);

@@ -13,14 +13,9 @@ pub fn draw(args: &Args, out: &Path) -> anyhow::Result<Outcome> {
     let asks = args.truth.is_some() || args.files.len() > 1;
     let read = if asks { files::read } else { files::read_first };
     let mut panes = panes(&args.files, args.truth.as_deref(), |file| read(file, &args.points))?;
-    ensure!(
-        panes.len() == 1,
-        Usage(
-            "expected one file, or a mesh and its scan, and perhaps boxes, found two others: draw each, \
-             or see both in a page"
-                .into()
-        )
-    );
+    let cause = "expected one file, or a mesh and its scan, and perhaps boxes, found two others: draw \
+                 each, or see both in a page";
+    ensure!(panes.len() == 1, Usage(cause.into()));
     for Frame { boxes, .. } in &mut panes[0].frames {
         // What a file beside a sweep describes is not asked for.
         let is_asked = args.truth.is_some() || asks && boxes.iter().all(|placed| placed.truth);

@@ -30,13 +30,8 @@ pub fn draw(shown: &Frame, out: &Path) -> Result<()> {
     picture(scan, &tints, &shown.meshes, &shown.boxes, out)
 }
 
-/// Draws a sweep, each point in its tint, and boxes to the PNG file `out`, atomically.
-#[cfg(feature = "models")]
-pub fn draw_sweep(scan: &Scan, tints: &[Rgb], boxes: &[Placed], out: &Path) -> Result<()> {
-    picture(scan, tints, &[], boxes, out)
-}
-
-fn picture(
+/// Draws points, each in its tint, meshes and boxes to the PNG file `out`, atomically.
+pub fn picture(
     scan: &Scan,
     tints: &[Rgb],
     meshes: &[Mesh],
