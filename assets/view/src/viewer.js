@@ -319,11 +319,11 @@ class Viewer {
     const option = (name) => `<option ${name === this.colour ? "selected" : ""}>${escaped(name)}</option>`;
     const points = `<label>colour <select name="colour">${this.names.map(option).join("")}</select></label>
       <label>size <input type="range" name="size" min="1" max="10" step="0.5" value="${this.pixels}"></label>`;
-    const cut = `<label title="Hide what is high">cut <input type="range" name="cut" min="0.02" max="1" step="0.02" value="1"></label>`;
+    const cut = `<label class="wide" title="Hide what is high">cut <input type="range" name="cut" min="0.02" max="1" step="0.02" value="1"></label>`;
     const title = "F: turntable (drag, wheel) or flight (drag to look; keys W A S D Q E)";
     const html = `${this.names.length ? points : ""}${cut}${partsOf(this.frames).map(toggle).join("")}
       <button name="fly" title="${title}">${this.navigation.flies ? "fly" : "turntable"}</button>
-      <button name="reset" title="R: look at all">reset</button><button name="save" title="Save a PNG file">save</button>`;
+      <button name="reset" title="R: look at all">reset</button><button class="wide" name="save" title="Save a PNG file">save</button>`;
     // A list of colours that is open stays open while data change.
     if (html !== this.shownBar) this.bar.innerHTML = html;
     this.shownBar = html;

@@ -1,6 +1,5 @@
 //! A picture of the first of what a page shows.
 
-use super::frame::Frame;
 use super::{Args, files, panes, preview};
 use crate::{Outcome, Usage};
 use anyhow::ensure;
@@ -16,8 +15,9 @@ pub fn draw(args: &Args, out: &Path) -> anyhow::Result<Outcome> {
     let cause = "expected one file, or a mesh and its scan, and perhaps boxes, found two others: draw \
                  each, or see both in a page";
     ensure!(panes.len() == 1, Usage(cause.into()));
-    for Frame { boxes, .. } in &mut panes[0].frames {
+    for frame in &mut panes[0].frames {
         // What a file beside a sweep describes is not asked for.
+        let boxes = &mut frame.boxes;
         let is_asked = args.truth.is_some() || asks && boxes.iter().all(|placed| placed.truth);
         boxes.retain(|placed| !placed.truth || is_asked);
     }

@@ -54,12 +54,12 @@ pub fn unit_of_scanned(
 }
 
 /// The least and the largest coordinates of places.
+#[must_use]
 pub fn bounds(places: impl Iterator<Item = [f64; 3]>) -> [[f64; 3]; 2] {
-    let least = |a: [f64; 3], b: [f64; 3]| [0, 1, 2].map(|axis| a[axis].min(b[axis]));
-    let minus = |at: [f64; 3]| at.map(|x| -x);
-    let both = places
-        .fold([[f64::INFINITY; 3]; 2], |[low, high], at| [least(low, at), least(high, minus(at))]);
-    [both[0], minus(both[1])]
+    let none = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+    places.fold(none, |[low, high], at| {
+        [[0, 1, 2].map(|i| low[i].min(at[i])), [0, 1, 2].map(|i| high[i].max(at[i]))]
+    })
 }
 
 /// Why the form of a mesh of this size, metres, is not to be seen in scans: noise of a standard deviation
