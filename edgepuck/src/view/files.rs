@@ -58,9 +58,7 @@ fn unknown(file: &Path, extension: &str) -> String {
         "xml" | "mjcf" => "a model of MuJoCo: show a scan of it, by Python's `ep.view(scan)`",
         "xacro" | "sdf" => "a robot of another format: convert it to a URDF",
         "safetensors" | "pt" | "pth" | "onnx" => "a network: `eval` and `classify` use it",
-        _ => {
-            "another file: export it as one of these, or name the format of points by --input-format"
-        }
+        _ => "another file: export it as one of these, or give --input-format",
     };
     let kinds = "points (.npz, .ply, .npy, .pcd, .csv, .las, .bin), a capture (.pcap), a recording \
                  (.mcap), a mesh (.stl, .obj, .off, .glb, .gltf), a robot (.urdf), a scene (.toml), \
@@ -225,7 +223,6 @@ fn folder(folder: &Path, points: &PointsArgs) -> anyhow::Result<Vec<Frame>> {
     let (n_files, mut n_points, mut frames) = (files.len(), 0, Vec::new());
     for (file, number) in files.into_iter().zip(0..) {
         let name = file.strip_prefix(folder).unwrap_or(&file).to_string_lossy().into_owned();
-        // A set beside scans is shown as them.
         let is_cloud = CloudFormat::of_path(&file).is_ok() && !has_faces(&file);
         match if is_cloud { cloud(&file, points) } else { first(&file, points) } {
             Ok(frame) => {
