@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import os
 import tempfile
@@ -143,7 +144,6 @@ def _save_scene(scene: Scene, place: Path) -> str:
         raise _edgepuck.Error(
             "expected something to show, found a scene without instances"
         )
-    lines = []
     first = len(scene) - len(scene._added)
     if first:
         assert scene._file is not None
@@ -151,19 +151,54 @@ def _save_scene(scene: Scene, place: Path) -> str:
             f"{scene._file[0]}: only what was added to the file's scene is shown",
             stacklevel=4,
         )
+    nodes: list[Any] = []
+    meshes: list[Any] = []
+    views: list[Any] = []
+    accessors: list[Any] = []
+    data = b""
     for number, (mesh, (scale, name, label, *_)) in enumerate(scene._added, first):
         rotation, position = _rigid(scene._poses[number])
-        vertices = (mesh.vertices * scale) @ rotation.T + position
-        file = _save_mesh(place / f"{number}.off", vertices, mesh.faces)
-        lines += [
-            "[[object]]",
-            f"mesh = {json.dumps(file.name)}",
-            f"name = {json.dumps(name or f'object {number}')}",
+        x, y, z = ((mesh.vertices * scale) @ rotation.T + position).astype(np.float32).T
+        # The y axis of glTF points up.
+        corners = np.column_stack([x, z, -y])
+        bounds = {
+            "min": corners.min(axis=0).tolist(),
+            "max": corners.max(axis=0).tolist(),
+        }
+        count = len(accessors)
+        arrays = [
+            (corners, 5126, "VEC3", bounds),
+            (mesh.faces.astype(np.uint32).ravel(), 5125, "SCALAR", {}),
         ]
-        lines += [f"label = {json.dumps(label)}"] if label else []
-    place = place / "scene.toml"
-    place.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return os.fspath(place)
+        for array, component, kind, extra in arrays:
+            views.append(
+                {"buffer": 0, "byteOffset": len(data), "byteLength": array.nbytes}
+            )
+            of = {
+                "bufferView": len(views) - 1,
+                "componentType": component,
+                "count": len(array),
+                "type": kind,
+            }
+            accessors.append(of | extra)
+            data += np.ascontiguousarray(array).tobytes()
+        parts = [{"attributes": {"POSITION": count}, "indices": count + 1}]
+        meshes.append({"primitives": parts} | ({"name": label} if label else {}))
+        nodes.append({"mesh": len(meshes) - 1, "name": name or f"object {number}"})
+    uri = "data:application/octet-stream;base64," + base64.b64encode(data).decode()
+    gltf = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": list(range(len(nodes)))}],
+        "nodes": nodes,
+        "meshes": meshes,
+        "bufferViews": views,
+        "accessors": accessors,
+        "buffers": [{"byteLength": len(data), "uri": uri}],
+    }
+    file = place / "scene.gltf"
+    file.write_text(json.dumps(gltf), encoding="utf-8")
+    return os.fspath(file)
 
 
 def _rigid(rows: Sequence[float]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
