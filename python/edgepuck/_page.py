@@ -81,9 +81,13 @@ def page_of(words: Sequence[str], folder: str) -> View:
 @contextlib.contextmanager
 def _without_path(page: Path, folder: str) -> Iterator[None]:
     """Leave out of what is written to the standard error the line that names the temporary page."""
-    with tempfile.TemporaryFile() as said:
-        sys.stderr.flush()
+    try:
         before = os.dup(2)
+    except OSError:
+        # There is none.
+        yield
+        return
+    with tempfile.TemporaryFile() as said:
         try:
             os.dup2(said.fileno(), 2)
             yield
@@ -93,4 +97,5 @@ def _without_path(page: Path, folder: str) -> Iterator[None]:
             said.seek(0)
             lines = said.read().decode("utf-8", "replace").splitlines(keepends=True)
             rest = "".join(line for line in lines if os.fspath(page) not in line)
-            sys.stderr.write(rest.replace(os.path.join(folder, ""), ""))
+            if rest and sys.stderr:
+                sys.stderr.write(rest.replace(os.path.join(folder, ""), ""))

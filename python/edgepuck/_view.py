@@ -23,9 +23,7 @@ from ._scene import Batch, Scene
 from ._scenes import DrawnScene
 
 
-def view(
-    *shown: Any, truth: str | os.PathLike[str] | Sequence[Detection] | None = None
-) -> View:
+def view(*shown: Any, truth: str | os.PathLike[str] | Sequence[Detection] | None = None) -> View:
     """Show points, meshes and boxes, like `edgepuck view`: in a notebook below the cell, or by
     `view(...).open()` in the browser. A mesh lies under the points that are its scan; two others stand side
     by side.
@@ -48,10 +46,7 @@ def view(
     if not shown:
         raise _edgepuck.Error("expected something to show, found nothing")
     with tempfile.TemporaryDirectory(prefix="edgepuck-") as folder:
-        words = [
-            _file(one, Path(folder, f"argument-{number}"))
-            for number, one in enumerate(shown)
-        ]
+        words = [_file(one, Path(folder, f"argument-{number}")) for number, one in enumerate(shown)]
         if truth is not None:
             words += ["--truth", _file(truth, Path(folder, "truth"))]
         return page_of(words, folder)
@@ -76,23 +71,15 @@ def _file(shown: Any, place: Path) -> str:
     elif isinstance(shown, Batch):
         _save_batch(shown, place)
         file = place
-    elif (
-        isinstance(shown, (list, tuple))
-        and shown
-        and all(isinstance(one, Detection) for one in shown)
-    ):
+    elif isinstance(shown, (list, tuple)) and shown and all(isinstance(one, Detection) for one in shown):
         file = place / "detections.json"
-        file.write_text(
-            json.dumps({"objects": [_box(one) for one in shown]}), encoding="utf-8"
-        )
+        file.write_text(json.dumps({"objects": [_box(one) for one in shown]}), encoding="utf-8")
     elif (mesh := _triangles(shown)) is not None:
         file = _save_mesh(place / "mesh.off", *mesh)
     else:
         points = _points(shown)
         if points.ndim != 2 or points.shape[1] < 3:
-            raise _edgepuck.Error(
-                f"points: expected an array of shape [n, 3], found {list(points.shape)}"
-            )
+            raise _edgepuck.Error(f"points: expected an array of shape [n, 3], found {list(points.shape)}")
         file = place / "points.npy"
         np.save(file, points[:, :3])
     return os.fspath(file)
@@ -133,17 +120,18 @@ def _points(shown: Any) -> NDArray[Any]:
 
 def _save_scene(scene: Scene, place: Path) -> str:
     """The file of a scene: its own, or one in the folder `place` of what was added to it."""
+    # The poses of all that was added or moved: 16 or 7 numbers, of which the quaternion is x, y, z, w in scenes
+    # that have `_moved`.
+    moved: Any = vars(scene).get("_moved", vars(scene).get("_poses"))
     if scene._file is not None and not scene._added:
-        if scene._poses:
+        if moved:
             warnings.warn(
                 f"{scene._file[0]}: shown as the file has it, without what moved",
                 stacklevel=4,
             )
         return scene._file[0]
     if len(scene) == 0:
-        raise _edgepuck.Error(
-            "expected something to show, found a scene without instances"
-        )
+        raise _edgepuck.Error("expected something to show, found a scene without instances")
     first = len(scene) - len(scene._added)
     if first:
         assert scene._file is not None
@@ -157,7 +145,7 @@ def _save_scene(scene: Scene, place: Path) -> str:
     accessors: list[Any] = []
     data = b""
     for number, (mesh, (scale, name, label, *_)) in enumerate(scene._added, first):
-        rotation, position = _rigid(scene._poses[number])
+        rotation, position = _rigid(moved[number], "_moved" in vars(scene))
         x, y, z = ((mesh.vertices * scale) @ rotation.T + position).astype(np.float32).T
         # The y axis of glTF points up.
         corners = np.column_stack([x, z, -y])
@@ -171,9 +159,7 @@ def _save_scene(scene: Scene, place: Path) -> str:
             (mesh.faces.astype(np.uint32).ravel(), 5125, "SCALAR", {}),
         ]
         for array, component, kind, extra in arrays:
-            views.append(
-                {"buffer": 0, "byteOffset": len(data), "byteLength": array.nbytes}
-            )
+            views.append({"buffer": 0, "byteOffset": len(data), "byteLength": array.nbytes})
             of = {
                 "bufferView": len(views) - 1,
                 "componentType": component,
@@ -201,13 +187,13 @@ def _save_scene(scene: Scene, place: Path) -> str:
     return os.fspath(file)
 
 
-def _rigid(rows: Sequence[float]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _rigid(rows: Sequence[float], w_is_last: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The rotation and the position of a pose of a scene: 16 or 7 numbers."""
     if len(rows) == 16:
         matrix = np.array(rows).reshape(4, 4)
         return matrix[:3, :3], matrix[:3, 3]
     x, y, z, *quaternion = rows
-    w, a, b, c = np.array(quaternion) / np.linalg.norm(quaternion)
+    w, a, b, c = np.roll(quaternion, int(w_is_last)) / np.linalg.norm(quaternion)
     skew = np.array([[0, -c, b], [c, 0, -a], [-b, a, 0]])
     return np.eye(3) + 2 * w * skew + 2 * skew @ skew, np.array([x, y, z])
 
@@ -221,9 +207,7 @@ def _save_batch(batch: Batch, folder: Path) -> None:
             for name in ("intensity", "power")
         }
         scan = Scan(
-            positions=(batch.sensor.directions[hit] * ranges[hit, None]).astype(
-                np.float32
-            ),
+            positions=(batch.sensor.directions[hit] * ranges[hit, None]).astype(np.float32),
             origin=np.zeros(3),
             range=ranges[hit],
             ring=batch.sensor.rings[hit],
@@ -249,9 +233,7 @@ def _box(of: Detection) -> dict[str, Any]:
 
 def _save_mesh(file: Path, vertices: NDArray[Any], faces: NDArray[Any]) -> Path:
     lines = ["OFF", f"{len(vertices)} {len(faces)} 0"]
-    lines += [
-        " ".join(map(repr, row)) for row in np.asarray(vertices, dtype=float).tolist()
-    ]
+    lines += [" ".join(map(repr, row)) for row in np.asarray(vertices, dtype=float).tolist()]
     lines += ["3 " + " ".join(map(str, row)) for row in np.asarray(faces).tolist()]
     file.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return file

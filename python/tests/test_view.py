@@ -20,9 +20,7 @@ def test_scans_arrays_meshes_and_detections_become_a_page(tmp_path: Path) -> Non
     for _ in range(2):
         page.save(tmp_path / "new" / "page.html")
     assert (tmp_path / "new" / "page.html").read_text(encoding="utf-8") == page.page
-    with pytest.raises(
-        ep.Error, match=r"path: expected a name with \.html, found page\.png"
-    ):
+    with pytest.raises(ep.Error, match=r"path: expected a name with \.html, found page\.png"):
         page.save("page.png")
     with pytest.raises(ep.Error, match="page.html/page.html: "):
         page.save(tmp_path / "new" / "page.html" / "page.html")
@@ -56,9 +54,7 @@ def test_cells_print_no_path(capfd: pytest.CaptureFixture[str]) -> None:
 
 def data(page: str) -> list[dict[str, Any]]:
     """The panes of a page."""
-    found: list[dict[str, Any]] = json.loads(
-        page.split('id="data">')[1].split("</script>")[0]
-    )["panes"]
+    found: list[dict[str, Any]] = json.loads(page.split('id="data">')[1].split("</script>")[0])["panes"]
     return found
 
 
@@ -76,9 +72,7 @@ def test_scenes_and_batches_become_a_page() -> None:
     [pane] = data(ep.view(scene).page)
     near, second = pane["frames"][0]["meshes"]
     assert (near["name"], near["class"]) == ("near", "box")
-    corners = np.frombuffer(
-        base64.b64decode(second["position"]["f32"]), np.float32
-    ).reshape(-1, 3)
+    corners = np.frombuffer(base64.b64decode(second["position"]["f32"]), np.float32).reshape(-1, 3)
     assert corners.min(axis=0).tolist() == [5, 0, -1]
     assert corners.max(axis=0).tolist() == [7, 2, 1]
     # Points on the objects that they are of are one picture.
@@ -105,9 +99,7 @@ def test_clouds_and_meshes_of_other_libraries_become_a_page() -> None:
 def test_clouds_and_meshes_of_open3d_become_a_page() -> None:
     vertices, faces = ep.box((1.0, 2.0, 3.0))
     o3d = pytest.importorskip("open3d")
-    mesh = o3d.geometry.TriangleMesh(
-        o3d.utility.Vector3dVector(vertices), o3d.utility.Vector3iVector(faces)
-    )
+    mesh = o3d.geometry.TriangleMesh(o3d.utility.Vector3dVector(vertices), o3d.utility.Vector3iVector(faces))
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(vertices))
     for one in (mesh, o3d.t.geometry.TriangleMesh.from_legacy(mesh)):
         assert len(data(ep.view(one).page)[0]["frames"][0]["meshes"]) == 1
@@ -116,9 +108,7 @@ def test_clouds_and_meshes_of_open3d_become_a_page() -> None:
 
 
 def test_wrong_arguments_are_named() -> None:
-    with pytest.raises(
-        ep.Error, match=r"expected an array of shape \[n, 3\], found \[4\]"
-    ):
+    with pytest.raises(ep.Error, match=r"expected an array of shape \[n, 3\], found \[4\]"):
         ep.view(np.zeros(4))
     with pytest.raises(ep.Error, match="nowhere.npz"):
         ep.view("nowhere.npz")
