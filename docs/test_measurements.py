@@ -21,7 +21,7 @@ def rows(monkeypatch, capsys, script, *words):
 
 
 def test_the_noise_and_the_dropout_of_a_capture_are_found(tmp_path, monkeypatch, capsys):
-    room, pose = ep.Mesh(*ep.box((16, 12, 5)), normalize="none"), np.eye(4)
+    room, pose = ep.Mesh(*ep.box((16, 12, 5))), np.eye(4)
     pose[:3, 3] = [1, 2, 0]
     scan = ep.Sensor("hdl32e").scan(room, pose=pose, noise=0.012, dropout=0.05, seed=1, attributes=["ring"])
     points = scan.positions - pose[:3, 3].astype("f4")

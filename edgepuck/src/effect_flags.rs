@@ -8,9 +8,10 @@ use std::path::PathBuf;
 
 #[derive(clap::Args)]
 pub struct EffectFlags {
-    /// Standard deviation of the ranges, metres [default: 0.01; 0 of scan]
-    #[arg(long, value_name = "M")]
-    noise: Option<f64>,
+    /// Standard deviation of the noise of the ranges, metres; gen-dataset then writes noisy scans beside
+    /// the clean ones
+    #[arg(long, default_value_t = 0.0, value_name = "M")]
+    noise: f64,
 
     /// Probability that a return is missing
     #[arg(long, default_value_t = 0.0, value_name = "P")]
@@ -31,12 +32,12 @@ pub struct EffectFlags {
 }
 
 impl EffectFlags {
-    /// The effects of the flags. `noise_m` is the noise if no flag sets it.
-    pub fn effects(&self, noise_m: f64) -> anyhow::Result<Effects> {
+    /// The effects of the flags.
+    pub fn effects(&self) -> anyhow::Result<Effects> {
         if let Some(file) = &self.effects {
             return Ok(read_effects(file)?);
         }
-        let effects = noisy(self.noise.unwrap_or(noise_m), self.dropout).map_err(of_flag)?;
+        let effects = noisy(self.noise, self.dropout).map_err(of_flag)?;
         let effects = Effects { quantum: self.quantum()?, ..effects };
         effects.validate().map_err(of_flag)?;
         Ok(effects)
@@ -45,7 +46,7 @@ impl EffectFlags {
     /// A flag that was given.
     pub fn given(&self) -> Option<&'static str> {
         first_given(&[
-            (self.noise.is_some(), "--noise"),
+            (self.noise != 0.0, "--noise"),
             (self.dropout != 0.0, "--dropout"),
             (self.quantise.is_some(), "--quantise"),
             (self.effects.is_some(), "--effects"),

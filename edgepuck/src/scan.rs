@@ -133,7 +133,10 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let files: Vec<PathBuf> = scene.sensors.iter().map(file).collect();
     args.overwrite.check(files.iter().map(PathBuf::as_path))?;
     let caster = args.caster.caster()?;
-    let scans = scene.scan_all(&caster).with_context(|| what.clone())?;
+    let mut scans = scene.scan_all(&caster).with_context(|| what.clone())?;
+    for scan in scans.iter_mut().filter(|scan| scan.points.object.is_some()) {
+        scan.points.object_texts = scene.object_texts();
+    }
     tell_objects(&scene);
     for ((scan, mounted), file) in scans.iter().zip(&scene.sensors).zip(&files) {
         let sensor = &mounted.name;
@@ -217,7 +220,7 @@ fn scene_of_meshes(args: &Args) -> anyhow::Result<Scene> {
     if !args.meshes.attributes.is_empty() {
         scene.attributes = args.meshes.attributes.iter().copied().collect();
     }
-    scene.effects = args.effects.effects(0.0)?;
+    scene.effects = args.effects.effects()?;
     if scene.attributes.contains(&Attribute::Intensity) {
         scene.effects.intensity.get_or_insert(Intensity);
     }

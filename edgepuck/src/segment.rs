@@ -86,6 +86,6 @@ fn write_ply(file: &Path, points: &[[f32; 3]], tints: &[Rgb]) -> Result<(), Form
         (vec!["green"], Column::U8(&green)),
         (vec!["blue"], Column::U8(&blue)),
     ];
-    let header = rows::ply_header([0.0; 3], None, &columns);
+    let header = rows::ply_header([0.0; 3], None, &Default::default(), &columns);
     rows::write(file, Hashing::None, &header, &columns).map(|_| ())
 }

@@ -7,7 +7,7 @@ use crate::atomic;
 use crate::error::FormatError;
 use crate::hash::{FileHash, Hashing};
 use crate::npy;
-use crate::scan::Column;
+use crate::scan::{Column, OBJECT_TEXTS};
 
 /// Columns with their names, of which a vector has three.
 pub type Columns<'a> = [(Vec<&'static str>, Column<'a>)];
@@ -55,9 +55,14 @@ pub fn npy_header(n_rows: usize, width: usize) -> Vec<u8> {
     npy::header_bytes("<f4", &[n_rows, width])
 }
 
-/// The header of PLY, with an origin other than 0 and a sensor's pose as comments.
+/// The header of PLY, with an origin other than 0, a sensor's pose and the objects' names as comments.
 #[must_use]
-pub fn ply_header(origin: [f64; 3], pose: Option<[f64; 16]>, columns: &Columns<'_>) -> String {
+pub fn ply_header(
+    origin: [f64; 3],
+    pose: Option<[f64; 16]>,
+    object_texts: &[Vec<String>; 2],
+    columns: &Columns<'_>,
+) -> String {
     let mut header = "ply\nformat binary_little_endian 1.0\n".to_owned();
     if origin != [0.0; 3] {
         let [x, y, z] = origin;
@@ -65,6 +70,10 @@ pub fn ply_header(origin: [f64; 3], pose: Option<[f64; 16]>, columns: &Columns<'
     }
     if let Some(pose) = pose {
         header += &format!("comment pose {}\n", pose.map(|x| x.to_string()).join(" "));
+    }
+    for (key, texts) in OBJECT_TEXTS.iter().zip(object_texts) {
+        let comment = |(i, text)| header += &format!("comment {key} {i} {text}\n");
+        texts.iter().enumerate().for_each(comment);
     }
     header += &format!("element vertex {}\n", n_points(columns));
     for (names, column) in columns {

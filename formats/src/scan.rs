@@ -6,6 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::FormatError;
 
+/// The keys of [`Scan::object_texts`] in files.
+pub const OBJECT_TEXTS: [&str; 2] = ["object_names", "object_labels"];
+
 /// The points of one scan, perhaps none. Every attribute that is present has one value for each
 /// position.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -31,6 +34,9 @@ pub struct Scan {
     pub triangle: Option<Vec<u32>>,
     /// Index of the object that was hit, in the scene's order.
     pub object: Option<Vec<u32>>,
+    /// The names of the objects by their indices, and the labels of their classes, each empty if none is
+    /// known.
+    pub object_texts: [Vec<String>; 2],
     /// Returned intensity, 0 to 1.
     pub intensity: Option<Vec<f32>>,
     /// Received power, relative to that of a white surface that faces the sensor 1 m away:
@@ -232,6 +238,7 @@ impl Scan {
         let positions = picked(&self.positions, numbers);
         let mut selected =
             Self { origin: self.origin, pose: self.pose, positions, ..Self::default() };
+        selected.object_texts.clone_from(&self.object_texts);
         for (attribute, column) in self.columns() {
             match (selected.slot(attribute), column) {
                 (ColumnSlot::F32(slot), Column::F32(all)) => *slot = Some(picked(all, numbers)),

@@ -11,10 +11,11 @@
 //! | `sensor`, `attitude`, `normal` | f32 | `[n, 3]` |
 //! | `origin`, only if it is not 0 | f64 | `[3]` |
 //! | `pose` of the sensor, only if it is not the identity | f64 | `[4, 4]` |
+//! | `object_names`, `object_labels`, only if known: UTF-8, a line for each object | u8 | `[k]` |
 //!
 //! Attributes are columns, not vectors: Open3D 0.20 loads either, but voxel
-//! down-sampling and PLY writing fail on a vector. It keeps `origin` and `pose`
-//! as attributes too; delete them there before joining or thinning clouds.
+//! down-sampling and PLY writing fail on a vector. It keeps `origin`, `pose` and the objects'
+//! names as attributes too, and it reads no letters; delete them there before joining or thinning clouds.
 
 use std::io::{self, Seek, Write};
 use std::path::Path;
@@ -28,7 +29,7 @@ use crate::error::FormatError;
 use crate::hash::{FileHash, Hashing};
 use crate::number::Number;
 use crate::number::NumberType::{F16, F32, F64};
-use crate::scan::{Attribute, Column, Scan};
+use crate::scan::{Attribute, Column, OBJECT_TEXTS, Scan};
 use crate::{csv, npy, ply, rows};
 
 crate::named! {
@@ -97,7 +98,7 @@ pub fn write_scan(
             let columns: Vec<_> = std::iter::once(positions).chain(attributes).collect();
             let header = match format {
                 ScanFormat::Pcd => rows::pcd_header(scan.pose, &columns),
-                _ => rows::ply_header(scan.origin, scan.pose, &columns),
+                _ => rows::ply_header(scan.origin, scan.pose, &scan.object_texts, &columns),
             };
             rows::write(path, hashing, &header, &columns)
         }
@@ -144,6 +145,10 @@ pub(crate) fn write_npz<W: Write + Seek>(npz: &mut NpzWriter<W>, scan: &Scan) ->
     if let Some(pose) = scan.pose {
         npz.array("pose", &[4, 4], pose.into_iter())?;
     }
+    for (key, texts) in OBJECT_TEXTS.iter().zip(&scan.object_texts).filter(|of| !of.1.is_empty()) {
+        let lines = texts.join("\n");
+        npz.array(key, &[lines.len()], lines.bytes())?;
+    }
     Ok(())
 }
 
@@ -171,6 +176,13 @@ fn read_npz(path: &Path) -> Result<Scan, FormatError> {
     };
     scan.origin.iter_mut().zip(origin).for_each(|(sum, x)| *sum += x);
     scan.pose = read_npz_pose(&mut npz)?;
+    for (key, texts) in OBJECT_TEXTS.iter().zip(&mut scan.object_texts) {
+        // In other archives, they may be anything.
+        if let Some(Ok(lines)) = npz.has(key).then(|| npz.array::<u8>(key)) {
+            let lines = String::from_utf8_lossy(&lines.elements).into_owned();
+            *texts = lines.split('\n').map(str::to_owned).collect();
+        }
+    }
     for attribute in Attribute::ALL {
         if !npz.has(attribute.name()) {
             continue;

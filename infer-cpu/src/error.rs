@@ -11,7 +11,7 @@ pub enum Error {
     #[error(transparent)]
     Format(#[from] FormatError),
     /// The cloud has no points.
-    #[error("the cloud has no points")]
+    #[error("the cloud has no points that are finite and not at 0, 0, 0")]
     NoPoints,
     /// A coordinate is NaN or infinite.
     #[error("point {index}: expected finite coordinates, found ({}, {}, {})", .point[0], .point[1], .point[2])]

@@ -59,7 +59,7 @@ def rate(draw, length: int, epochs: int) -> list[float]:
 def program_rate(meshes: Path) -> float:
     """Views a second of gen-dataset on as many threads, but for writing and packing."""
     with tempfile.TemporaryDirectory() as out:
-        flags = ["--sensor", "vlp32c", "--views", str(VIEWS), "--adapter", "cpu", "--hash", "none"]
+        flags = ["--sensor", "vlp32c", "--views", str(VIEWS), "--adapter", "cpu", "--hash", "none", "--noise", "0.01"]
         command = [sys.executable, "-m", "edgepuck", "gen-dataset", meshes, "--out", f"{out}/d", *flags]
         start = time.perf_counter()
         done = subprocess.run(command, capture_output=True, text=True, check=True)
@@ -142,7 +142,7 @@ def main() -> None:
             subprocess.run(command, check=True, capture_output=True)
         rounds: dict[str, list[float]] = {}
         for _ in range(ROUNDS):
-            dataset = ep.Dataset(meshes, "vlp32c", views=VIEWS, points=POINTS)
+            dataset = ep.Dataset(meshes, "vlp32c", views=VIEWS, points=POINTS, noise=0.01)
             first, *_, later = rate(lambda indices, d=dataset: d.batch(indices)[1], len(dataset), EPOCHS)
             rounds.setdefault("Dataset, first epoch", []).append(first)
             rounds.setdefault("Dataset, later epoch", []).append(later)

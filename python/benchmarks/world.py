@@ -30,8 +30,8 @@ import numpy as np
 import edgepuck as ep
 
 THREADS = 2
-# The pose of a sensor, 1 m high: x, y, z and a quaternion w, x, y, z.
-AT = np.array([0.0, 0, 1, 1, 0, 0, 0])
+# The pose of a sensor, 1 m high: x, y, z and a quaternion x, y, z, w.
+AT = np.array([0.0, 0, 1, 0, 0, 0, 1])
 HAS = {name: importlib.util.find_spec(name) is not None for name in ("mujoco", "mujoco_lidar", "open3d")}
 Cast = Callable[[int], object]
 
@@ -87,14 +87,14 @@ def level(rng: np.random.Generator, n: int, most: float, height: float) -> np.nd
     """Level poses [n, 7] at this height, within a square of twice `most` metres."""
     half, found = rng.uniform(0, np.pi, n), np.zeros((n, 7))
     found[:, :2], found[:, 2] = rng.uniform(-most, most, (n, 2)), height
-    found[:, 3], found[:, 6] = np.cos(half), np.sin(half)
+    found[:, 6], found[:, 5] = np.cos(half), np.sin(half)
     return found
 
 
 def turned(vectors: np.ndarray, pose: np.ndarray) -> np.ndarray:
     """Vectors [n, 3], turned by the quaternion of a pose."""
-    across = 2 * np.cross(pose[4:], vectors)
-    return vectors + pose[3] * across + np.cross(pose[4:], across)
+    across = 2 * np.cross(pose[3:6], vectors)
+    return vectors + pose[6] * across + np.cross(pose[3:6], across)
 
 
 class Muj:
@@ -118,7 +118,7 @@ class Muj:
         self.data = mujoco.MjData(self.model)
 
     def move(self, poses: np.ndarray) -> None:
-        self.data.mocap_pos[:], self.data.mocap_quat[:] = poses[:, :3], poses[:, 3:]
+        self.data.mocap_pos[:], self.data.mocap_quat[:] = poses[:, :3], poses[:, [6, 3, 4, 5]]
         self.mujoco.mj_kinematics(self.model, self.data)
 
     def cast(self, point: np.ndarray, directions: np.ndarray) -> np.ndarray:
@@ -163,8 +163,8 @@ def moved(mesh: tuple[np.ndarray, np.ndarray], pose: np.ndarray) -> tuple[np.nda
 def row_tori(rounds: int, share: float) -> None:
     n, sensor, mesh = 20, ep.Sensor("vlp32c"), torus(100, 50)
     steps = around(np.random.default_rng(2), rounds + 1, n)
-    scene, shape = ep.Scene(), ep.Mesh(*mesh, normalize="none")
-    scene.add(ep.Mesh(*floor(), normalize="none", units="m"))
+    scene, shape = ep.Scene(), ep.Mesh(*mesh)
+    scene.add(ep.Mesh(*floor(), units="m"))
     tori = [scene.add(shape) for _ in range(n)]
 
     def edgepuck(i: int) -> np.ndarray:
@@ -205,7 +205,7 @@ def row_tori(rounds: int, share: float) -> None:
 def row_poses(rounds: int, share: float) -> None:
     n, sensor, mesh = int(4096 * share), uniform(359, 1), room(65)
     sensors, scene = level(np.random.default_rng(3), n, 8.0, 0.0), ep.Scene()
-    scene.add(ep.Mesh(*mesh, normalize="none", units="m"))
+    scene.add(ep.Mesh(*mesh, units="m"))
     casts: dict[str, Cast] = {"edgepuck": lambda i: scene.cast(sensor, sensors).ranges}
     if HAS["open3d"]:
         built, rays = open3d_scene([mesh]), rays_from(sensors, sensor.directions)
@@ -215,8 +215,8 @@ def row_poses(rounds: int, share: float) -> None:
 
 def row_environments(rounds: int, share: float) -> None:
     n, n_moving, sensor, mesh = int(1024 * share), 8, uniform(128, 16), torus(20, 10)
-    rng, scene, shape = np.random.default_rng(4), ep.Scene(), ep.Mesh(*mesh, normalize="none")
-    scene.add(ep.Mesh(*floor(), normalize="none", units="m"))
+    rng, scene, shape = np.random.default_rng(4), ep.Scene(), ep.Mesh(*mesh)
+    scene.add(ep.Mesh(*floor(), units="m"))
     moving = [scene.add(shape) for _ in range(n_moving)]
     sensors, of_each = level(rng, n, 1.0, 1.0), around(rng, n, n_moving)
     n_rays = len(sensor.directions)
@@ -243,10 +243,10 @@ def row_environments(rounds: int, share: float) -> None:
 
 
 def row_move(rounds: int, share: float) -> None:
-    sensor, shape, n = ep.Sensor("vlp32c"), ep.Mesh(*torus(20, 10), normalize="none"), 100
+    sensor, shape, n = ep.Sensor("vlp32c"), ep.Mesh(*torus(20, 10)), 100
     steps, scene, at = around(np.random.default_rng(5), rounds + 1, n, most=40.0), ep.Scene(), np.eye(4)
     at[:3, 3] = AT[:3]
-    scene.add(ep.Mesh(*floor(), normalize="none", units="m"))
+    scene.add(ep.Mesh(*floor(), units="m"))
     objects = [scene.add(shape) for _ in range(n)]
 
     def both(i: int) -> object:
@@ -273,7 +273,7 @@ def build_one(program: str, n: int) -> None:
     before, start = held("VmRSS"), time.process_time()
     if program == "edgepuck":
         scene = ep.Scene()
-        scene.add(ep.Mesh(vertices, faces, normalize="none", units="m"))
+        scene.add(ep.Mesh(vertices, faces, units="m"))
         scene.cast(sensor, AT[None])
     else:
         scene = open3d.t.geometry.RaycastingScene(nthreads=1)

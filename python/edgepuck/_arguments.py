@@ -6,10 +6,13 @@ import functools
 import operator
 import os
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from . import _edgepuck
 from ._edgepuck import Error
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
 
 class Remade:
@@ -20,6 +23,10 @@ class Remade:
     def __reduce__(self) -> tuple[Any, ...]:
         positional, named = self._made_of
         return functools.partial(type(self), *positional, **named), ()
+
+    def __deepcopy__(self, _: dict[int, Any]) -> Self:
+        # Nothing of it changes.
+        return self
 
 
 def whole(name: str, value: Any, least: int, most: int) -> int:
@@ -39,6 +46,12 @@ def real(name: str, value: Any) -> float:
         return float(value)
     except (TypeError, ValueError):
         raise Error(f"{name}: expected a number, found {value!r}") from None
+
+
+def some_of(names: Sequence[str], most: int = 5) -> str:
+    """The first of `names`, and how many more there are."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
 
 
 def seed(value: Any) -> int:

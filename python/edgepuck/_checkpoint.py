@@ -20,8 +20,9 @@ from ._edgepuck import Error
 
 # The keys of the model's tensors in checkpoints that also hold the optimiser's state.
 _STATES = ("model_state_dict.", "state_dict.")
-# The prefix that `torch.nn.DataParallel` adds to all names.
-_PARALLEL = "module."
+# The prefix that `torch.nn.DataParallel` adds to all names, and the part that `torch.compile` adds to those of what it
+# compiles.
+_PARALLEL, _COMPILED = "module.", "_orig_mod"
 # PyTorch's names of the tensors of a layer that a model needs, and that of a count of training steps.
 _PARTS = ("weight", "bias", "running_mean", "running_var")
 _COUNTER = "num_batches_tracked"
@@ -230,8 +231,14 @@ def _of_model(tensors: dict[str, Tensor]) -> dict[str, Tensor]:
     """The tensors of the model among all of a file, without the prefixes of their names."""
     state = next((state for state in _STATES if any(name.startswith(state) for name in tensors)), "")
     tensors = {name[len(state) :]: tensor for name, tensor in tensors.items() if name.startswith(state)}
-    prefix = _PARALLEL if all(name.startswith(_PARALLEL) for name in tensors) else ""
-    return {name[len(prefix) :]: tensor for name, tensor in tensors.items()}
+    return unwrapped(tensors)
+
+
+def unwrapped(tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:
+    """The tensors without the parts of names that `torch.nn.DataParallel` and `torch.compile` add."""
+    names = {".".join(part for part in name.split(".") if part != _COMPILED): name for name in tensors}
+    prefix = _PARALLEL if all(name.startswith(_PARALLEL) for name in names) else ""
+    return {name[len(prefix) :]: tensors[theirs] for name, theirs in names.items()}
 
 
 def _flat(values: Mapping[Any, Any], prefix: str = "") -> Iterator[tuple[str, Tensor]]:

@@ -12,10 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _edgepuck
 from ._arguments import Remade, place, whole
+from ._exchange import foreign_points
 from ._scan import Scan
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, repr=False)
 class Prediction:
     """The answer of a network to a cloud."""
 
@@ -29,6 +30,12 @@ class Prediction:
     """The probability of the class."""
     logits: NDArray[np.float32]
     """The outputs of the network, [n_classes]."""
+
+    def __repr__(self) -> str:
+        share = f"{100 * self.confidence:.1f} %"
+        if self.is_unknown:
+            return f"<Prediction unknown: resembles class {self.index} the most, {share}>"
+        return f"<Prediction {self.label}, {share}>"
 
 
 class Classifier(Remade):
@@ -68,6 +75,10 @@ class Classifier(Remade):
         """The names of the classes."""
         return self._classifier.classes
 
+    def __repr__(self) -> str:
+        model, precision = os.path.basename(self._made_of[0][0]), self._made_of[1]["precision"]
+        return f"<Classifier {model}: {len(self.classes)} classes, {precision}>"
+
     @overload
     def __call__(self, cloud: Scan, *, ground_z: float | None = None) -> Prediction: ...
     @overload
@@ -80,8 +91,10 @@ class Classifier(Remade):
         """Classify a cloud, or each cloud of a batch.
 
         Args:
-            cloud: A scan, or finite points, [n, 3], z up. Further columns, such as the intensity in
-                [n, 4], are ignored. A batch is a list of these, or an array of shape [b, n, 3].
+            cloud: A scan, or points, [n, 3], z up, or a cloud of Open3D or trimesh, or the path of a file
+                that `Scan.read` reads. Further columns, such as the intensity in [n, 4], are ignored, and so
+                are lost returns: points at 0, 0, 0 or without finite coordinates. A batch is a list of these,
+                or an array of shape [b, n, 3].
             ground_z: The height of the ground below the object, metres, for models such as
                 `street-128` that were trained with it.
         """
@@ -98,20 +111,23 @@ class Classifier(Remade):
 
 
 def _is_batch(cloud: Any) -> bool:
-    if isinstance(cloud, Scan):
+    if isinstance(cloud, (Scan, str, os.PathLike)):
         return False
-    if isinstance(cloud, (list, tuple)) and cloud and isinstance(cloud[0], (Scan, np.ndarray)):
-        return isinstance(cloud[0], Scan) or cloud[0].ndim == 2
-    return np.ndim(cloud) == 3
+    if isinstance(cloud, (list, tuple)) and cloud:
+        first = cloud[0]
+        if isinstance(first, (Scan, str, os.PathLike)) or foreign_points(first) is not first:
+            return True
+        if isinstance(first, np.ndarray):
+            return first.ndim == 2
+    return np.ndim(foreign_points(cloud)) == 3
 
 
-def points_of(cloud: ArrayLike) -> NDArray[np.float32]:
-    """The first three columns of `cloud`, which are points of shape [n, 3]."""
+def points_of(cloud: Any) -> NDArray[np.float32]:
+    """The first three columns of `cloud`: points of shape [n, 3], those of a file in the frame of the
+    sensor, or a cloud of another library."""
     if isinstance(cloud, (str, os.PathLike)):
-        raise _edgepuck.Error(
-            f"expected points, found the path {os.fspath(cloud)!r}: `Scan.read` reads files"
-        )
-    points = np.asarray(cloud)
+        cloud = Scan.read(cloud).in_sensor_frame()
+    points = np.asarray(foreign_points(cloud))
     if points.dtype.names is not None:
         missing = [axis for axis in "xyz" if axis not in points.dtype.names]
         if missing:

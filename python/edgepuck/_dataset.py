@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from . import _arguments, _edgepuck
 from ._arguments import number, place, real, whole
+from ._sensor import AnySensor, Sensor, profile_of
 
 Range = float | tuple[float, float]
 
@@ -30,7 +31,7 @@ class Dataset:
         meshes: The folder, with the layout `CLASS/{train,test}/NAME.off`. In any other layout, a hash
             of the seed, the class and the name puts about one mesh in five into the test set, so that
             the training and test sets must have the same seed.
-        sensor: The name or path of a sensor, as in `Sensor`.
+        sensor: The name or path of a sensor, as in `Sensor`, or a `Sensor`, whose adapter casts.
         split: `train`, `test`, or None for both.
         points: The number of points of each cloud.
         views: The number of clouds of each mesh in an epoch, evenly around the mesh.
@@ -38,8 +39,7 @@ class Dataset:
         elevation: The elevation of the sensor, degrees, or the limits of a random elevation.
         azimuth_jitter: The largest random rotation of each view around the mesh, degrees. 180 allows
             all sides.
-        noise: Standard deviation of the noise of the ranges, metres. The default is 0.01 without
-            `effects`.
+        noise: Standard deviation of the noise of the ranges, metres.
         dropout: Probability that a return is missing.
         effects: The path of a TOML file with a table `[effects]`, instead of noise and dropout.
         seed: The seed of all random numbers.
@@ -49,7 +49,7 @@ class Dataset:
         up: The upward axis of meshes, as in `Mesh`.
         min_points: A view with fewer points is replaced by another view.
         cache_mb: The size of the cache of meshes in each process, MiB.
-        adapter: The adapter, as in `Sensor`.
+        adapter: The adapter, as in `Sensor`; by default that of `sensor`.
         attributes: The attributes of each point besides its position, as in `Sensor.scan`. A cloud then
             has the shape [points, 3 + k], with the attributes in this order after x, y and z: one
             column for each, but three for sensor, attitude and normal. Positions are in the unit
@@ -64,7 +64,7 @@ class Dataset:
     def __init__(
         self,
         meshes: str | os.PathLike[str],
-        sensor: str | os.PathLike[str] = "vlp32c",
+        sensor: AnySensor = "vlp32c",
         *,
         split: str | None = None,
         points: int = 1024,
@@ -72,8 +72,8 @@ class Dataset:
         distance: Range = 3.0,
         elevation: Range = 20.0,
         azimuth_jitter: float = 180.0,
-        noise: float | None = None,
-        dropout: float | None = None,
+        noise: float = 0.0,
+        dropout: float = 0.0,
         effects: str | os.PathLike[str] | None = None,
         seed: int = 0,
         normalize: str = "unit-sphere",
@@ -81,16 +81,16 @@ class Dataset:
         up: str | None = None,
         min_points: int = 64,
         cache_mb: int = 1024,
-        adapter: str = "cpu",
+        adapter: str | None = None,
         attributes: Sequence[str] = (),
         transform: Callable[[NDArray[np.float32]], Any] | None = None,
     ) -> None:
         if not (effects is None or isinstance(effects, (str, os.PathLike))):
             raise _edgepuck.Error(f"effects: expected the path of a TOML file, found {type(effects).__name__}")
-        if effects is not None and (noise is not None or dropout is not None):
+        if effects is not None and (noise != 0 or dropout != 0):
             raise _edgepuck.Error("effects: cannot be used with noise or dropout")
         settings = {
-            "sensor": place(sensor),
+            "sensor": profile_of("sensor", sensor),
             "points": whole("points", points, 1, 2**24),
             "views": whole("views", views, 1, 2**32 - 1),
             "distance": _from_to("distance", distance),
@@ -102,14 +102,15 @@ class Dataset:
             "up": up,
             "min_points": whole("min_points", min_points, 1, 2**32 - 1),
             "effects": None if effects is None else place(effects),
-            "noise": None if noise is None else real("noise", noise),
-            "dropout": None if dropout is None else real("dropout", dropout),
+            "noise": real("noise", noise),
+            "dropout": real("dropout", dropout),
         }
         self._seed, self._transform = seed, transform
         cache = whole("cache_mb", cache_mb, 0, 2**30) << 20
         if isinstance(attributes, str):
             raise _edgepuck.Error(f"attributes: expected a list of names, found {attributes!r}")
-        self._arguments = (os.path.abspath(meshes), split, settings, list(attributes), cache, adapter)
+        casts = adapter or (sensor._made_of[1]["adapter"] if isinstance(sensor, Sensor) else "cpu")
+        self._arguments = (os.path.abspath(meshes), split, settings, list(attributes), cache, casts)
         self._clouds = _edgepuck.Clouds(*self._arguments)
         # Shared memory, so that workers that persist over epochs see the current epoch.
         self._epoch = multiprocessing.RawValue("Q", 0)
@@ -146,6 +147,12 @@ class Dataset:
         """The clouds at `indices`, [n, points, 3 + k], and their labels, [n]."""
         seed = _edgepuck.seed_of_epoch(self._seed, self.epoch)
         return self._clouds.draw(seed, [self._number(index) for index in indices])
+
+    def __repr__(self) -> str:
+        settings, split = self._arguments[2], self._arguments[1] or "train and test"
+        points, sensor = settings["points"], os.path.basename(str(settings["sensor"]))
+        of = f"{len(self)} clouds of {points} points, {len(self.classes)} classes ({split}), by {sensor}"
+        return f"<Dataset {os.path.basename(self._arguments[0])}: {of}>"
 
     def __getitem__(self, index: int) -> tuple[Any, int]:
         return self.__getitems__([index])[0]

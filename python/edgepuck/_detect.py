@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,7 +16,7 @@ from ._scan import Scan
 from ._segment import rings_of
 
 
-@dataclass
+@dataclass(repr=False)
 class Detection:
     """An object of a known class in a sweep."""
 
@@ -40,9 +41,14 @@ class Detection:
     whole_yaw_deg: float
     """The rotation of that box, degrees; front and rear are not told apart."""
 
+    def __repr__(self) -> str:
+        at, (length, width, height) = ", ".join(f"{x:.2f}" for x in self.centre), self.size
+        box = f"at ({at}), {length:.1f} x {width:.1f} x {height:.1f} m, {self.points} points"
+        return f"<Detection {self.label}, {100 * self.confidence:.1f} %, {box}>"
+
 
 def detect(
-    sweep: Scan | ArrayLike,
+    sweep: Scan | str | os.PathLike[str] | ArrayLike | Any,
     model: str | os.PathLike[str] = "street-128",
     *,
     rings: ArrayLike | None = None,
@@ -53,8 +59,9 @@ def detect(
     """Find the objects of known classes in a sweep, like `edgepuck detect`.
 
     Args:
-        sweep: A scan, or points of shape [n, 3] in the frame of the sensor, metres, z up; further
-            columns are ignored.
+        sweep: A scan, or the path of a file that `Scan.read` reads, or points of shape [n, 3] in the frame
+            of the sensor, metres, z up, or a cloud of Open3D or trimesh; further columns are ignored, and so
+            are lost returns: points at 0, 0, 0 or without finite coordinates.
         model: `street-128`, or the path of a model of clusters.
         rings: The ring of each point, from below, [n]. A scan has its own.
         precision: The precision of the network: f32 or i8.
@@ -69,6 +76,8 @@ def detect(
     >>> all(0 < one.confidence <= 1 for one in found)
     True
     """
+    if isinstance(sweep, (str, os.PathLike)):
+        sweep = Scan.read(sweep)
     if isinstance(sweep, Scan):
         rings = sweep.ring if rings is None else rings
         sweep = sweep.in_sensor_frame()

@@ -76,19 +76,18 @@ class Scene:
     def add(
         self,
         mesh: Mesh,
-        pose: Sequence[float],
+        pose: NDArray[np.float64],
         scale: Sequence[float],
         name: str | None,
         label: str | None,
         reflectivity: float,
         retroreflection: float,
     ) -> int: ...
-    def move(self, number: int, pose: Sequence[float]) -> None: ...
     def move_all(self, numbers: Sequence[int], poses: NDArray[np.float64]) -> None: ...
     def scan(
         self,
         sensor: Sensor,
-        place: Sequence[float],
+        place: NDArray[np.float64],
         effects: str | None,
         attributes: Sequence[str] | None,
         seed: int | None,

@@ -17,7 +17,7 @@ def heightfield(
     origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
     height: float | None = None,
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """The vertices and faces of terrain, for `Mesh(*heightfield(...), normalize="none")`.
+    """The vertices and faces of terrain, for `Mesh(*heightfield(...))`.
 
     Each cell is two triangles, which share the diagonal from its corner with the lowest x and y.
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import warnings
-from typing import Any, Literal
+from collections.abc import Mapping
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,17 +19,20 @@ Unit = Literal["m", "mm", "cm", "in", "ft"]
 
 
 class Mesh(Remade):
-    """A triangle mesh, z up.
+    """A triangle mesh, z up, in metres.
 
     Args:
-        source: The path of an OBJ, OFF, PLY, STL or glTF file; vertices, of shape [n, 3]; or anything
-            with `vertices` and `faces`, such as a mesh of trimesh.
+        source: The path of an OBJ, OFF, PLY, STL or glTF file; vertices, of shape [n, 3]; or a mesh of
+            trimesh (also all of a `trimesh.Scene` as one mesh) or of Open3D, or anything else with
+            `vertices` and `faces`.
         faces: The indices of each triangle's vertices, of shape [m, 3], if `source` is vertices.
-        normalize: `unit-sphere` moves the mean of the vertices to the origin and scales the
-            farthest of them to 1 m. `bbox` moves the middle of the bounding box there and scales its
-            longest side to 2 m. `none` leaves the mesh in its place.
-        units: The unit of length of `source`: m (the default), mm, cm, in or ft. Unless this says m,
-            a mesh that keeps its size and is larger than 100 m or smaller than 1 cm gives a warning.
+        normalize: `none`, the default, leaves the mesh in its place and size. `unit-sphere` moves the
+            mean of the vertices to the origin and scales the farthest of them to 1 m, as data sets of
+            shapes have it. `bbox` moves the middle of the bounding box there and scales its longest side
+            to 2 m.
+        units: The unit of length of `source`: m, mm, cm, in or ft; by default that which a mesh of trimesh
+            states, or m. Unless this says m, a mesh that keeps its size and is larger than 100 m or smaller
+            than 1 cm gives a warning.
         up: The upward axis of `source`: y or z. By default, y for OBJ and glTF files and z for
             all others.
 
@@ -36,8 +40,8 @@ class Mesh(Remade):
         Error: The file cannot be read, a number is not finite, an index is out of range, or there
             is no triangle.
 
-    >>> len(Mesh(*box((1.0, 1.0, 1.0))))
-    12
+    >>> Mesh(*box((1.0, 2.0, 0.5)))
+    <Mesh of 12 triangles, 1 x 2 x 0.5 m>
     """
 
     _mesh: _edgepuck.Mesh
@@ -47,7 +51,7 @@ class Mesh(Remade):
         source: str | os.PathLike[str] | ArrayLike | Any,
         faces: ArrayLike | None = None,
         *,
-        normalize: Normalize = "unit-sphere",
+        normalize: Normalize = "none",
         units: Unit | None = None,
         up: Axis | None = None,
     ) -> None:
@@ -62,15 +66,14 @@ class Mesh(Remade):
             self._mesh = _edgepuck.Mesh.read(path, up, units or "m", normalize)
             self._warn(path)
             return
-        if faces is None and hasattr(source, "vertices") and hasattr(source, "faces"):
-            source, faces = source.vertices, source.faces
+        factor = 1.0
         if faces is None:
-            raise _edgepuck.Error(
-                "expected a path, a mesh with vertices and faces, or vertices and faces, found "
-                f"{type(source).__name__} alone"
-            )
+            if normalize == "none":
+                units, factor, _ = unit_of(units, source)
+            source, faces = _parts(source)
         # A copy, so that later changes of the arrays do not change the mesh.
         vertices = np.array(source, dtype=np.float64, order="C")
+        vertices *= factor
         indices = _indices(faces)
         for name, array in [("vertices", vertices), ("faces", indices)]:
             if array.ndim != 2:
@@ -90,6 +93,12 @@ class Mesh(Remade):
     def __len__(self) -> int:
         """The number of triangles."""
         return len(self._mesh)
+
+    def __repr__(self) -> str:
+        source = self._made_of[0][0]
+        name = f" {os.path.basename(source)}:" if isinstance(source, str) else " of"
+        x, y, z = np.ptp(self.vertices, axis=0)
+        return f"<Mesh{name} {len(self)} triangles, {x:.4g} x {y:.4g} x {z:.4g} m>"
 
     @property
     def vertices(self) -> NDArray[np.float64]:
@@ -112,11 +121,65 @@ class Mesh(Remade):
         return np.array(self._mesh.centre)
 
 
-def native(mesh: Mesh) -> _edgepuck.Mesh:
-    """The mesh of the module in Rust, if `mesh` is an `edgepuck.Mesh`."""
-    if not isinstance(mesh, Mesh):
-        raise _edgepuck.Error(f"expected an edgepuck.Mesh, found {type(mesh).__name__}")
-    return mesh._mesh
+# What functions take for a mesh.
+AnyMesh: TypeAlias = "Mesh | str | os.PathLike[str] | Any"
+
+
+def taken(mesh: AnyMesh) -> Mesh:
+    """`mesh`, or the mesh of a path or of another library."""
+    return mesh if isinstance(mesh, Mesh) else Mesh(mesh)
+
+
+# The units of `Mesh` in metres, and the names that trimesh has for them.
+_METRES: dict[str | None, float] = {"m": 1.0, "mm": 0.001, "cm": 0.01, "in": 0.0254, "ft": 0.3048}
+_NAMES: dict[str, Unit] = {
+    **dict.fromkeys(("m", "meter", "meters", "metre", "metres"), "m"),
+    **dict.fromkeys(("mm", "millimeter", "millimeters", "millimetre", "millimetres"), "mm"),
+    **dict.fromkeys(("cm", "centimeter", "centimeters", "centimetre", "centimetres"), "cm"),
+    **dict.fromkeys(("in", "inch", "inches"), "in"),
+    **dict.fromkeys(("ft", "foot", "feet"), "ft"),
+}
+# Further units of trimesh and of 3MF in metres.
+_OTHERS = {"micron": 1e-6, "microns": 1e-6, "micrometer": 1e-6, "yard": 0.9144, "yards": 0.9144, "kilometers": 1e3}
+
+
+def unit_of(units: Unit | None, source: Any) -> tuple[Unit | None, float, float]:
+    """The unit of lengths of a mesh or a scene of trimesh, if it states one and `units` does not replace
+    it; the factor from its lengths to those in this unit, and the one to metres."""
+    stated = [getattr(source, "units", None)]
+    if stated == [None]:
+        parts = getattr(source, "geometry", None)
+        stated = list({getattr(of, "units", None): None for of in parts.values()}) if isinstance(parts, Mapping) else []
+    if units is not None:
+        if units not in _METRES:
+            raise _edgepuck.Error(f"units: expected one of m, mm, cm, in, ft, found {units!r}")
+        return units, 1.0, _METRES[units]
+    if len(stated) > 1:
+        raise _edgepuck.Error(f"units: expected one unit of all geometries, found {', '.join(map(str, stated))}: name it")
+    name = str(stated[0]).lower() if stated and stated[0] is not None else None
+    if name is None:
+        return None, 1.0, 1.0
+    if name in _NAMES:
+        return _NAMES[name], 1.0, _METRES[_NAMES[name]]
+    if name in _OTHERS:
+        return "m", _OTHERS[name], _OTHERS[name]
+    raise _edgepuck.Error(f"units: expected one of {', '.join(_NAMES)}, found {name!r}: name the unit")
+
+
+def _parts(source: Any) -> tuple[Any, Any]:
+    """The vertices and faces of a mesh of another library."""
+    if hasattr(source, "graph") and hasattr(source, "to_mesh"):
+        source = source.to_mesh()
+    if hasattr(source, "vertices") and hasattr(source, "faces"):
+        return source.vertices, source.faces
+    if hasattr(source, "vertices") and hasattr(source, "triangles"):
+        return np.asarray(source.vertices), np.asarray(source.triangles)
+    if hasattr(source, "vertex") and hasattr(source, "triangle"):
+        return source.vertex["positions"].cpu().numpy(), source.triangle["indices"].cpu().numpy()
+    raise _edgepuck.Error(
+        "expected a path, a mesh with vertices and faces (of trimesh or Open3D), or vertices and faces, "
+        f"found {type(source).__name__} alone"
+    )
 
 
 def _indices(faces: ArrayLike) -> NDArray[np.int64]:

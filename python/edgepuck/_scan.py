@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _edgepuck
+from . import _edgepuck, _exchange, _poses
 from ._page import page_of
 
 # The columns in files whose names are keywords of Python, or too short there.
@@ -63,13 +63,18 @@ class Scan:
     """Unit normal of the surface, towards the sensor, [n, 3]."""
     pose: NDArray[np.float64] | None = None
     """Transform from the frame of the sensor to that of the positions, [4, 4], when the scan began.
-    It is the identity if the positions are in the frame of the sensor."""
+    It is the identity if the positions are in the frame of the sensor. `Scan(pose=...)` also takes seven
+    numbers: x, y, z and a quaternion x, y, z, w."""
+    object_names: list[str] | None = None
+    """The name of each object of a scene, or else its label or number: `object_names[i]` is that of the
+    points whose `object` is i. None if no object has a name or a label."""
+    object_labels: list[str] | None = None
+    """The label of each object, or an empty text. None if no object has one."""
 
     _is_at_rest = False
 
     def __post_init__(self) -> None:
-        if self.pose is None:
-            self.pose = np.eye(4)
+        self.pose = np.eye(4) if self.pose is None else _poses.matrix("pose", self.pose)
         positions = np.asarray(self.positions, dtype=np.float32)
         if positions.ndim != 2 or positions.shape[1] != 3:
             raise _edgepuck.Error(f"positions: expected shape [n, 3], found {list(positions.shape)}")
@@ -84,9 +89,8 @@ class Scan:
         return len(self.positions)
 
     def __repr__(self) -> str:
-        columns = (field.name for field in fields(self) if field.name not in ("origin", "pose", "sensor_position"))
-        known = ", ".join(name for name in columns if getattr(self, name) is not None)
-        return f"<Scan of {len(self)} points: {known}>"
+        columns = ["positions", *(name for name, of in self._columns().items() if of is not None)]
+        return f"<Scan of {len(self)} points: {', '.join(columns)}>"
 
     def _repr_html_(self) -> str | None:
         if not len(self):
@@ -105,6 +109,53 @@ class Scan:
         assert self.pose is not None
         from_sensor = self.positions + (self.origin - self.pose[:3, 3])
         return np.ascontiguousarray(from_sensor @ self.pose[:3, :3], dtype=np.float32)
+
+    def to_open3d(self) -> Any:
+        """An `open3d.t.geometry.PointCloud` of the positions and all attributes, with these names, each
+        [n, k]; `to_legacy()` of it makes an `open3d.geometry.PointCloud`. Normals are `normals`, and whole
+        numbers of 32 bits have a sign, without which Open3D cannot write them.
+
+        Positions are in f64 if `origin`, which is added, is not zero. Open3D's own readers of our PLY files
+        leave out the columns whose types they have not (`beam`, `ring`, `object`), and those of our NPZ files
+        take `pose`, `origin` and the objects' names for attributes of points: `Scan.read(file).to_open3d()` has
+        all columns, and Open3D can write it.
+
+        Raises:
+            ImportError: Open3D is not installed.
+        """
+        columns = {"normals" if name == "normal" else name: of for name, of in self._columns().items()}
+        return _exchange.open3d_cloud(self._in_world(), columns)
+
+    def to_pointcloud2(self, frame_id: str = "map", *, stamp: float = 0.0) -> Any:
+        """A `sensor_msgs/PointCloud2` of the positions and all attributes: x, y, z, then intensity, ring and
+        time, then the others, without gaps. Vectors are three fields, such as `normal_x`.
+
+        It is a message of ROS 2 if its Python packages are installed, and else an object with the same
+        fields. For points in the frame of the sensor, give `Scan(scan.in_sensor_frame(), ...)`.
+
+        Args:
+            frame_id: The name of the frame of the positions.
+            stamp: When the revolution began, seconds since 1970.
+
+        Raises:
+            Error: `stamp` is below 0 or too large.
+
+        >>> import edgepuck as ep
+        >>> message = ep.Sensor("vlp16").scan(ep.Mesh(*ep.box((1.0, 1.0, 1.0)))).to_pointcloud2("lidar")
+        >>> [(field.name, field.offset, field.datatype) for field in message.fields][:4]
+        [('x', 0, 7), ('y', 4, 7), ('z', 8, 7), ('ring', 12, 4)]
+        """
+        columns = _exchange.named_columns(self._columns())
+        return _exchange.pointcloud2(self._in_world().astype(np.float32), columns, frame_id, stamp)
+
+    def _in_world(self) -> NDArray[Any]:
+        """The positions with the origin, in f64 unless it is zero."""
+        return self.positions + self.origin if np.any(self.origin) else self.positions
+
+    def _columns(self) -> dict[str, NDArray[Any] | None]:
+        """The attributes by their names; without the place of a sensor that stood still."""
+        left_out = {"positions", "origin", "pose", "object_names", "object_labels", *(["sensor_position"] if self._is_at_rest else [])}
+        return {field.name: getattr(self, field.name) for field in fields(self) if field.name not in left_out}
 
     @staticmethod
     def read(
@@ -131,7 +182,8 @@ class Scan:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a file with the extension .npz, .ply, .csv or .pcd, like `edgepuck scan`. An existing
-        file is replaced, as by `numpy.save`. All but .csv keep the pose.
+        file is replaced, as by `numpy.save`. All but .csv keep the pose, and .npz and .ply the names of
+        objects.
 
         Raises:
             Error: The name has another extension, a column has another type or shape, or the file cannot be
@@ -144,8 +196,8 @@ class Scan:
             left_out.add("pose")
         else:
             columns["pose"] = np.ravel(columns["pose"]).astype(float)
-        known = {
-            name: np.ascontiguousarray(of)
+        known: dict[str, Any] = {
+            name: of if name.startswith("object_") else np.ascontiguousarray(of)
             for name, of in columns.items()
             if of is not None and name not in left_out
         }

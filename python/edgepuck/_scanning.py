@@ -9,16 +9,16 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from . import _arguments, _edgepuck
+from . import _arguments, _edgepuck, _poses
 from ._scan import Scan, scan_of
 
 
 def scan(
     scene: _edgepuck.Scene,
     sensor: _edgepuck.Sensor,
-    at: list[float],
+    at: NDArray[np.float64],
     effects: str | None,
     attributes: Iterable[str] | None,
     seed: int | None,
@@ -33,14 +33,21 @@ def scan(
 
 def place(
     pose: ArrayLike | None, distance: float | None, elevation: float | None, azimuth: float | None
-) -> list[float]:
-    """The rows of the pose of a sensor, or the three numbers of a sensor that looks at the origin."""
+) -> NDArray[np.float64]:
+    """The row of the pose of a sensor, or the three numbers of a sensor that looks at the origin, [1, 3]."""
     around = [distance, elevation, azimuth]
     if pose is None:
-        return [usual if one is None else float(one) for one, usual in zip(around, (3.0, 20.0, 0.0), strict=True)]
+        found = [usual if one is None else float(one) for one, usual in zip(around, (3.0, 20.0, 0.0), strict=True)]
+        if not np.isfinite(found).all():
+            raise _edgepuck.Error(f"expected finite numbers as the sensor's place, found {found}")
+        if found[0] <= 0:
+            raise _edgepuck.Error(f"expected a distance above 0, found {found[0]:g}")
+        if abs(found[1]) > 90:
+            raise _edgepuck.Error(f"expected an elevation from -90 to 90 degrees, found {found[1]:g}")
+        return np.array([found])
     if around != [None] * 3:
         raise _edgepuck.Error("expected a pose, or a distance, an elevation and an azimuth, found both")
-    return matrix(pose)
+    return _poses.one("pose", pose)
 
 
 def encoded(noise: float, dropout: float, effects: Mapping[str, Any] | None) -> str | None:
@@ -56,16 +63,6 @@ def encoded(noise: float, dropout: float, effects: Mapping[str, Any] | None) -> 
     if dropout != 0:
         wanted["dropout"] = {"probability": dropout}
     return json.dumps(_plain(wanted, "effects")) if wanted or effects is not None else None
-
-
-def matrix(pose: ArrayLike) -> list[float]:
-    """The rows of a matrix of shape [4, 4]."""
-    matrix = np.asarray(pose, dtype=np.float64)
-    if matrix.shape != (4, 4):
-        raise _edgepuck.Error(
-            f"pose: expected a matrix of shape [4, 4], found {list(matrix.shape)}"
-        )
-    return matrix.ravel().tolist()
 
 
 def _plain(value: Any, key: str) -> Any:

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _edgepuck, _scanning
+from . import _edgepuck, _poses, _scanning
 from ._arguments import seed as seed_of
-from ._arguments import whole
-from ._mesh import Axis, Mesh, native
+from ._arguments import some_of, whole
+from ._mesh import Axis, AnyMesh, Mesh, Unit, unit_of
+from ._mesh import taken as mesh_of
 from ._scan import Scan, scan_of
-from ._sensor import Sensor
-from ._sensor import native as sensor_of
+from ._sensor import AnySensor, Sensor, taken
 
 
 class Scene:
@@ -26,7 +26,7 @@ class Scene:
     The instances of a mesh share its data, and moving an instance rebuilds nothing.
 
     >>> import edgepuck as ep
-    >>> scene, cube = ep.Scene(), ep.Mesh(*ep.box((1.0, 1.0, 1.0)), normalize="none")
+    >>> scene, cube = ep.Scene(), ep.Mesh(*ep.box((1.0, 1.0, 1.0)))
     >>> near = scene.add(cube, position=(3, 0, 0))
     >>> far = scene.add(cube, position=(6, 1, 0), scale=2.0, reflectivity=0.3)
     >>> scan = scene.scan(ep.Sensor("vlp32c"), pose=np.eye(4), noise=0.01, seed=7)
@@ -39,7 +39,7 @@ class Scene:
         self._scene = _edgepuck.Scene()
         self._file: tuple[str, dict[str, float], bool, bool] | None = None
         self._added: list[tuple[Mesh, tuple[Any, ...]]] = []
-        self._poses: dict[int, list[float]] = {}
+        self._moved: dict[int, list[float]] = {}
 
     @classmethod
     def read(
@@ -66,30 +66,38 @@ class Scene:
         Raises:
             Error: The file, or a mesh or sensor that it names, cannot be read.
         """
+        _refuse_others(file)
         scene = cls()
         scene._file = os.path.abspath(file), dict(joints or {}), bool(collision), bool(base_colours)
         scene._scene = _edgepuck.Scene.read(os.fspath(file), *scene._file[1:])
         return scene
 
     @classmethod
-    def of(cls, scene: Any, *, up: Axis = "z") -> Scene:
+    def of(cls, scene: Any, *, up: Axis = "z", units: Unit | None = None) -> Scene:
         """The nodes of a `trimesh.Scene`, which reads glTF, DAE, 3MF and others, as instances.
 
         Each node that has a mesh is an instance: its `name` is that of the node, and its `label` that of
-        the geometry. Nodes with one geometry share its data. Metres are taken for the unit.
+        the geometry. Nodes with one geometry share its data.
 
         Args:
-            scene: The scene, or anything with `graph.nodes_geometry` and `geometry` as trimesh has them.
+            scene: The scene, or anything with `graph.nodes_geometry` and `geometry` as trimesh has them; or
+                one mesh that `Mesh` takes.
             up: The axis of the scene that points up, y or z: y in glTF.
+            units: The unit of length of the scene, as in `Mesh`; by default that of `scene.units`, or m.
 
         Raises:
-            Error: There is no node with a mesh, or it is not a scene.
+            Error: There is no node with a mesh, its geometries have different units, or it is not a scene.
         """
         if up not in ("y", "z"):
             raise _edgepuck.Error(f"up: expected one of y, z, found {up!r}")
+        if isinstance(scene, (str, os.PathLike)):
+            raise _edgepuck.Error(f"expected a trimesh.Scene, found the path {os.fspath(scene)!r}: `Scene.read` reads files")
+        found = cls()
         if not (hasattr(scene, "graph") and hasattr(scene, "geometry")):
-            raise _edgepuck.Error(f"expected a trimesh.Scene, found {type(scene).__name__}")
-        found, meshes = cls(), {}
+            found.add(scene if isinstance(scene, Mesh) else Mesh(scene, up=up, units=units))
+            return found
+        unit, factor, metres = unit_of(units, scene)
+        meshes: dict[str, Mesh] = {}
         for node in scene.graph.nodes_geometry:
             matrix, name = scene.graph[node]
             geometry = scene.geometry[name]
@@ -101,15 +109,17 @@ class Scene:
             scale = np.linalg.norm(matrix[:3, :3], axis=0)
             pose = matrix.copy()
             pose[:3, :3] /= np.where(scale > 0, scale, 1)
+            pose[:3, 3] *= metres
             off = np.abs(pose[:3, :3].T @ pose[:3, :3] - np.eye(3)).max()
             if off < 1e-6 and np.linalg.det(pose[:3, :3]) > 0:
                 if name not in meshes:
-                    meshes[name] = Mesh(geometry, normalize="none")
+                    corners = factor * np.asarray(geometry.vertices)
+                    meshes[name] = Mesh(corners, geometry.faces, units=unit)
                 found.add(meshes[name], _nearest_rotation(pose), scale=scale, name=node, label=name)
             else:
                 # A mirror image or a sheared one is a mesh of its own.
                 corners = np.asarray(geometry.vertices) @ matrix[:3, :3].T + matrix[:3, 3]
-                found.add(Mesh(corners, geometry.faces, normalize="none"), name=node, label=name)
+                found.add(Mesh(factor * corners, geometry.faces, units=unit), name=node, label=name)
         if len(found) == 0:
             raise _edgepuck.Error("expected a scene with meshes, found none")
         return found
@@ -138,7 +148,7 @@ class Scene:
 
     def add(
         self,
-        mesh: Mesh,
+        mesh: AnyMesh,
         pose: ArrayLike | None = None,
         *,
         position: ArrayLike | None = None,
@@ -151,8 +161,9 @@ class Scene:
         """Add an instance of a mesh. Return its number, which is the `object` of its points in scans.
 
         Args:
-            mesh: The mesh.
-            pose: The pose of the mesh in the world: a matrix of shape [4, 4] without scale.
+            mesh: The mesh, or anything that `Mesh` takes alone, such as a path: it keeps its size.
+            pose: The pose of the mesh in the world: a matrix of shape [4, 4] without scale, or seven
+                numbers: x, y, z in metres and a quaternion x, y, z, w of length 1, as in ROS.
             position: The position of the mesh's origin, metres, instead of `pose`. By default, the
                 origin of the world.
             scale: A factor, or a factor for each axis of the mesh.
@@ -167,11 +178,12 @@ class Scene:
         factors = np.asarray(scale, dtype=np.float64)
         if factors.shape not in [(), (3,)]:
             raise _edgepuck.Error(f"scale: expected one number or three, found {scale!r}")
-        rows, factors = _pose(pose, position), np.broadcast_to(factors, (3,))
+        row, factors = _poses.placed(pose, position), np.broadcast_to(factors, (3,))
         settings = (factors.tolist(), name, label, float(reflectivity), float(retroreflection))
-        number = self._scene.add(native(mesh), rows, *settings)
-        self._added.append((mesh, settings))
-        self._poses[number] = rows
+        taken = mesh_of(mesh)
+        number = self._scene.add(taken._mesh, row, *settings)
+        self._added.append((taken, settings))
+        self._moved[number] = row[0].tolist()
         return number
 
     def move(
@@ -185,8 +197,8 @@ class Scene:
 
         Args:
             instance: The number of an instance, or those of k instances. All of them move, or none.
-            pose: The pose of the instance, [4, 4]; or their poses, [k, 4, 4], or [k, 7]: x, y, z and a
-                quaternion w, x, y, z.
+            pose: The pose of the instance, [4, 4] or [7]: x, y, z and a quaternion x, y, z, w; or their
+                poses, [k, 4, 4] or [k, 7].
             position: The position of the one instance, metres, instead of `pose`.
 
         Raises:
@@ -197,20 +209,18 @@ class Scene:
             numbers = _numbers("instance", instance)  # type: ignore[arg-type]
             if pose is None or position is not None:
                 raise _edgepuck.Error("expected the poses of all instances, and no position")
-            _, poses = _rows("pose", pose, (len(numbers),))
-            self._scene.move_all(numbers, poses)
-            self._poses.update(zip(numbers, poses.tolist(), strict=True))
-            return
-        if pose is None and position is None:
-            raise _edgepuck.Error("expected a pose or a position, found neither")
-        rows = _pose(pose, position)
-        number = whole("instance", instance, 0, 2**32 - 1)
-        self._scene.move(number, rows)
-        self._poses[number] = rows
+            _, rows = _poses.many("pose", pose, (len(numbers),))
+        else:
+            if pose is None and position is None:
+                raise _edgepuck.Error("expected a pose or a position, found neither")
+            rows = _poses.placed(pose, position)
+            numbers = [whole("instance", instance, 0, 2**32 - 1)]
+        self._scene.move_all(numbers, rows)
+        self._moved.update(zip(numbers, rows.tolist(), strict=True))
 
     def scan(
         self,
-        sensor: Sensor,
+        sensor: AnySensor,
         *,
         distance: float | None = None,
         elevation: float | None = None,
@@ -225,12 +235,12 @@ class Scene:
         """Scan the scene.
 
         Args:
-            sensor: The sensor.
+            sensor: The sensor, or its name or profile, which is then read at each call.
             distance: The distance of the sensor from the origin, at which it looks, metres; 3 by default.
             elevation: The elevation of the sensor above the horizon, degrees; 20 by default.
             azimuth: The azimuth of the sensor, counterclockwise from x, degrees; 0 by default.
             pose: The pose of the sensor, instead of these three: a matrix of shape [4, 4] from the
-                frame of the sensor (x forward, z up) to the world.
+                frame of the sensor (x forward, z up) to the world, or seven numbers, as in `add`.
             noise: Standard deviation of the noise of the ranges, metres.
             dropout: Probability that a return is missing.
             effects: Further effects, with the keys of the table `[effects]` of a scene:
@@ -246,11 +256,11 @@ class Scene:
         """
         at = _scanning.place(pose, distance, elevation, azimuth)
         wanted = _scanning.encoded(noise, dropout, effects)
-        return _scanning.scan(self._scene, sensor_of(sensor), at, wanted, attributes, seed)
+        return _scanning.scan(self._scene, taken(sensor)._sensor, at, wanted, attributes, seed)
 
     def cast(
         self,
-        sensor: Sensor,
+        sensor: AnySensor,
         poses: ArrayLike,
         *,
         move: tuple[Sequence[int], ArrayLike] | None = None,
@@ -267,8 +277,8 @@ class Scene:
         same effects and its seed of `seeds`. The sensor's adapter casts.
 
         Args:
-            sensor: The sensor.
-            poses: The poses of the sensor, [n, 4, 4], or [n, 7]: x, y, z and a quaternion w, x, y, z.
+            sensor: The sensor, or its name or profile, which is then read at each call.
+            poses: The poses of the sensor, [n, 4, 4], or [n, 7]: x, y, z and a quaternion x, y, z, w.
             move: Numbers of k instances, and their poses for each pose of the sensor, [n, k, 4, 4] or
                 [n, k, 7].
             noise: Standard deviation of the noise of the ranges, metres.
@@ -283,7 +293,7 @@ class Scene:
 
         >>> import edgepuck as ep
         >>> scene = ep.Scene()
-        >>> cube = scene.add(ep.Mesh(*ep.box((1.0, 1.0, 1.0)), normalize="none"), position=(3, 0, 0))
+        >>> cube = scene.add(ep.Mesh(*ep.box((1.0, 1.0, 1.0))), position=(3, 0, 0))
         >>> poses = np.tile(np.eye(4), (2, 1, 1))
         >>> of_each = np.tile(np.eye(4), (2, 1, 1, 1))
         >>> of_each[:, 0, 0, 3] = [3, 6]
@@ -291,29 +301,31 @@ class Scene:
         >>> batch.ranges.shape, batch.ranges.min(axis=1).round(2).tolist()
         ((2, 28935), [2.5, 5.5])
         """
-        n, rows = _rows("poses", poses, ())
+        n, rows = _poses.many("poses", poses)
         numbers: list[int] = []
         moved = np.empty((0, 16))
         if move is not None:
             numbers = _numbers("move", move[0])
-            _, moved = _rows("move", move[1], (n, len(numbers)))
+            _, moved = _poses.many("move", move[1], (n, len(numbers)))
         key = None if seed is None else seed_of(seed)
         if isinstance(attributes, str):
             raise _edgepuck.Error(f"attributes: expected a list of names, found {attributes!r}")
         wanted = (_scanning.encoded(noise, dropout, effects), list(attributes), key)
-        columns = self._scene.cast(sensor_of(sensor), rows, numbers, moved, *wanted)
+        known = taken(sensor)
+        columns = self._scene.cast(known._sensor, rows, numbers, moved, *wanted)
         # The largest number, of beams without a return, is -1.
         columns["object"] = columns["object"].view(np.int32)
-        return Batch(**columns, sensor=sensor)
+        return Batch(**columns, sensor=known)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _remade, (self._file, self._added, self._poses)
+        return _remade, (self._file, self._added, self._moved)
 
     def __repr__(self) -> str:
-        return f"<Scene of {len(self)} instances>"
+        known = [label or name or str(number) for number, (name, label) in enumerate(zip(self.names, self.labels, strict=True))]
+        return f"<Scene of {len(self)} instances: {some_of(known)}>" if known else "<Scene of 0 instances>"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Batch:
     """The ranges of a sensor's beams from many poses, of `Scene.cast`."""
 
@@ -332,6 +344,10 @@ class Batch:
     power: NDArray[np.float32] | None = None
     """The received powers of these returns, if they were asked for, [n, n_beams]."""
 
+    def __repr__(self) -> str:
+        (n, beams), hits = self.ranges.shape, np.isfinite(self.ranges).mean() if self.ranges.size else 0.0
+        return f"<Batch of {n} x {beams} ranges by {self.sensor.name}: {100 * hits:.1f} % returned>"
+
     def range_image(self) -> NDArray[np.float32]:
         """The ranges as images, [n, rings, columns]: rings from below, columns in the order of firing.
 
@@ -347,27 +363,54 @@ class Batch:
         return image
 
 
-def scan_scene(file: str | os.PathLike[str], *, adapter: str = "cpu") -> dict[str, Scan]:
-    """Scan the scene in a TOML file, like `edgepuck scan`. Return the scans by the names of sensors."""
-    scans = Scene.read(file)._scene.scan_all(adapter)
+def scan_scene(
+    file: str | os.PathLike[str],
+    sensor: AnySensor | None = None,
+    *,
+    pose: ArrayLike | None = None,
+    adapter: str = "cpu",
+) -> dict[str, Scan]:
+    """Scan the scene in a file, like `edgepuck scan`. Return the scans by the names of sensors.
+
+    Args:
+        file: The TOML file of a scene, or one without sensors (`Scene.read` says which), if `sensor` is given.
+        sensor: A sensor in place of those of the file.
+        pose: The pose of `sensor`, as in `Scene.scan`; by default, it is 3 m from the origin and looks at it.
+        adapter: The adapter, as in `Sensor`, which casts for the sensors of the file.
+
+    Raises:
+        Error: The file cannot be read, or has no sensor and none is given.
+    """
+    scene = Scene.read(file)
+    if sensor is not None:
+        known = taken(sensor)
+        return {known.name: scene.scan(known, pose=pose)}
+    if pose is not None:
+        raise _edgepuck.Error("pose: expected a sensor beside it, found none")
+    scans = scene._scene.scan_all(adapter)
+    if not scans:
+        raise _edgepuck.Error(
+            f"{os.fspath(file)}: expected sensors, found a file without any: name one, such as "
+            'scan_scene(file, "vlp32c"), or `Scene.read(file).scan(sensor, pose=...)`'
+        )
     return {name: scan_of(columns) for name, columns in scans}
 
 
 def _remade(
     read: tuple[str, dict[str, float], bool, bool] | None,
     added: list[tuple[Mesh, tuple[Any, ...]]],
-    poses: dict[int, list[float]],
+    moved: dict[int, list[float]],
 ) -> Scene:
     """The scene that was pickled."""
     scene = Scene()
     if read is not None:
         file, joints, collision, base_colours = read
         scene = Scene.read(file, joints=joints, collision=collision, base_colours=base_colours)
-    scene._added, scene._poses = added, poses
+    scene._added, scene._moved = added, moved
     for mesh, settings in added:
-        scene._scene.add(native(mesh), np.eye(4).ravel().tolist(), *settings)
-    for number, rows in poses.items():
-        scene._scene.move_all([number], np.array([rows]))
+        scene._scene.add(mesh._mesh, _poses.placed(None, None), *settings)
+    for number, row in moved.items():
+        scene._scene.move_all([number], np.array([row]))
     return scene
 
 
@@ -380,18 +423,39 @@ def _numbers(name: str, instances: Iterable[int]) -> list[int]:
     return numbers
 
 
-def _rows(name: str, poses: ArrayLike, shape: tuple[int, ...]) -> tuple[int, NDArray[np.float64]]:
-    """The number of `poses` and their numbers in rows, [m, 16] or [m, 7]. `shape` is that before the
-    last axes; without it, one axis of any length."""
-    found = np.asarray(poses, dtype=np.float64)
-    n_axes = len(shape) or 1
-    is_matrix, is_quaternion = found.shape[n_axes:] == (4, 4), found.shape[n_axes:] == (7,)
-    if not (is_matrix or is_quaternion) or (shape and found.shape[:n_axes] != shape):
-        before = ", ".join(map(str, shape)) or "n"
-        raise _edgepuck.Error(
-            f"{name}: expected shape [{before}, 4, 4] or [{before}, 7], found {list(found.shape)}"
-        )
-    return len(found), np.ascontiguousarray(found.reshape(-1, 16 if is_matrix else 7))
+# What takes the files that `Scene.read` does not, by their extensions.
+_OTHERS = {
+    **dict.fromkeys((".stl", ".obj", ".off", ".ply"), "is a mesh: `Scene().add(Mesh({file!r}))` makes a scene of it"),
+    **dict.fromkeys((".dae", ".3mf"), "is read by trimesh: `Scene.of(trimesh.load_scene({file!r}))`"),
+    **dict.fromkeys((".fbx", ".blend", ".usd", ".usda", ".usdc", ".usdz", ".step", ".stp"), "is to be exported as glTF first"),
+    **dict.fromkeys((".npz", ".npy", ".pcd", ".las", ".laz", ".pcap", ".csv"), "has points: `Scan.read({file!r})`"),
+    ".xacro": "is to be expanded first: `xacro {file} > robot.urdf`, and then `Scene.read('robot.urdf')`",
+    ".sdf": "is a world of Gazebo: give its models as URDF or glTF",
+}
+_MJCF = "is a model of MuJoCo: `edgepuck.mujoco.Lidar(mujoco.MjModel.from_xml_path({file!r}))` scans it"
+_ROBOT = "is a robot in URDF: name it .urdf"
+_XML = "is XML: expected a robot in URDF, or MuJoCo's model, of which `edgepuck.mujoco.Lidar` scans"
+
+
+def _refuse_others(file: str | os.PathLike[str]) -> None:
+    """Refuse a file of another kind than scenes with the function that takes it."""
+    name = os.fspath(file)
+    _, extension = os.path.splitext(name.lower())
+    if extension in (".glb", ".gltf", ".urdf", ".toml"):
+        return
+    cause = _OTHERS.get(extension)
+    if cause is None:
+        try:
+            with open(name, "rb") as opened:
+                start = opened.read(65536)
+        except OSError:
+            return
+        if not start.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<"):
+            return
+        cause = _MJCF if b"<mujoco" in start else _ROBOT if b"<robot" in start else _XML
+    raise _edgepuck.Error(
+        f"{name}: expected a scene in TOML, glTF or URDF, found a file that {cause.format(file=name)}"
+    )
 
 
 # (x, y, z) to (x, -z, y).
@@ -405,20 +469,3 @@ def _nearest_rotation(pose: NDArray[np.float64]) -> NDArray[np.float64]:
     rigid[:3, :3] = u @ vt
     rigid[3] = [0, 0, 0, 1]
     return rigid
-
-
-def _pose(pose: ArrayLike | None, position: ArrayLike | None) -> list[float]:
-    """The rows of the matrix of a pose or a position; without both, of the identity."""
-    if pose is not None and position is not None:
-        raise _edgepuck.Error("expected a pose or a position, found both")
-    if pose is not None:
-        return _scanning.matrix(pose)
-    matrix = np.eye(4)
-    if position is not None:
-        at = np.asarray(position, dtype=np.float64)
-        if at.shape != (3,):
-            raise _edgepuck.Error(f"position: expected shape [3], found {list(at.shape)}")
-        if not np.isfinite(at).all():
-            raise _edgepuck.Error(f"position: expected finite metres, found {at.tolist()}")
-        matrix[:3, 3] = at
-    return matrix.ravel().tolist()

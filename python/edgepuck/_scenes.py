@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from . import _arguments, _edgepuck
 from ._arguments import Remade, number, place, whole
 from ._scan import Scan, scan_of
+from ._sensor import AnySensor, Sensor, profile_of
 
 
 @dataclass(eq=False, repr=False)
@@ -50,7 +51,7 @@ class Scenes(Remade):
     Args:
         recipe: `street`, `yard`, `room`, or the path of a recipe in TOML.
         length: The number of scenes.
-        sensors: Sensors that replace those of the recipe.
+        sensors: Sensors that replace those of the recipe, each a `Sensor`, its name or its profile.
         meshes: The folder of your own meshes, if the recipe has objects of kind "mesh".
         seed: The seed of all random numbers.
 
@@ -67,14 +68,14 @@ class Scenes(Remade):
         recipe: str | os.PathLike[str] = "street",
         *,
         length: int = 1000,
-        sensors: Sequence[str] = (),
+        sensors: Sequence[AnySensor] = (),
         meshes: str | os.PathLike[str] | None = None,
         seed: int = 0,
     ) -> None:
-        if isinstance(sensors, str):
+        if isinstance(sensors, (str, os.PathLike, Sensor)):
             raise _edgepuck.Error(f"sensors: expected a list of names, found {sensors!r}")
         folder = None if meshes is None else os.path.abspath(meshes)
-        names = [place(sensor) for sensor in sensors]
+        names = [profile_of("sensors", sensor) for sensor in sensors]
         file, key = place(recipe), _arguments.seed(seed)
         self._length = whole("length", length, 0, 2**32)
         named = {"length": self._length, "sensors": names, "meshes": folder, "seed": key}
@@ -89,6 +90,10 @@ class Scenes(Remade):
     def classes(self) -> list[str]:
         """The names of the classes, including `other`."""
         return self._scenes.classes
+
+    def __repr__(self) -> str:
+        recipe, seed = os.path.basename(self._made_of[0][0]), self._made_of[1]["seed"]
+        return f"<Scenes {recipe}: {self._length} scenes, seed {seed}>"
 
     def __getitem__(self, index: int) -> DrawnScene:
         drawn = self._scenes.draw(number("scenes", index, self._length))

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -12,7 +15,7 @@ from ._scan import Scan
 
 
 def segment(
-    sweep: Scan | ArrayLike,
+    sweep: Scan | str | os.PathLike[str] | ArrayLike | Any,
     *,
     rings: ArrayLike | None = None,
     radius: float | None = None,
@@ -22,8 +25,9 @@ def segment(
     and -3 is a point that is not finite.
 
     Args:
-        sweep: A scan, or points of shape [n, 3] in the frame of the sensor, metres, z up; further
-            columns are ignored.
+        sweep: A scan, or the path of a file that `Scan.read` reads, or points of shape [n, 3] in the frame
+            of the sensor, metres, z up, or a cloud of Open3D or trimesh; further columns are ignored, and so
+            are lost returns: points at 0, 0, 0 or without finite coordinates.
         rings: The ring of each point, from below, [n]. A scan has its own.
         radius: If given, clusters are the connected components of points within this distance,
             metres, and there is no ground. This suits clouds that are not sweeps of a sensor.
@@ -33,6 +37,8 @@ def segment(
     >>> int(segment(post)[20])
     0
     """
+    if isinstance(sweep, (str, os.PathLike)):
+        sweep = Scan.read(sweep)
     if isinstance(sweep, Scan):
         rings = sweep.ring if rings is None else rings
         sweep = sweep.in_sensor_frame()

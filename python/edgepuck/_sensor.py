@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _edgepuck, _scanning
+from . import _edgepuck, _poses, _scanning
 from ._arguments import Remade, place
-from ._mesh import Mesh
-from ._mesh import native as mesh_of
+from ._mesh import AnyMesh
+from ._mesh import taken as mesh_of
 from ._scan import Scan
 
 
@@ -59,7 +59,7 @@ class Sensor(Remade):
 
     def scan(
         self,
-        mesh: Mesh,
+        mesh: AnyMesh,
         *,
         distance: float | None = None,
         elevation: float | None = None,
@@ -73,23 +73,41 @@ class Sensor(Remade):
     ) -> Scan:
         """Scan one mesh from a position around the origin, like `Scene.scan` of a scene with only it.
 
-        The arguments besides `mesh` are those of `Scene.scan`.
+        `mesh` is a `Mesh`, or anything that `Mesh` takes alone, such as a path: it keeps its size. The other
+        arguments are those of `Scene.scan`.
 
         Raises:
             Error: A value is out of its limits, or an attribute or effect is unknown.
         """
         scene = _edgepuck.Scene()
-        scene.add(mesh_of(mesh), np.eye(4).ravel().tolist(), [1.0] * 3, None, None, 1.0, 0.0)
+        scene.add(mesh_of(mesh)._mesh, _poses.placed(None, None), [1.0] * 3, None, None, 1.0, 0.0)
         at = _scanning.place(pose, distance, elevation, azimuth)
         wanted = _scanning.encoded(noise, dropout, effects)
         return _scanning.scan(scene, self._sensor, at, wanted, attributes, seed)
 
     def __repr__(self) -> str:
-        return f"Sensor({self.name!r})"
+        n_rings, n_beams = len(np.unique(self.rings)), len(self.rings)
+        return f"<Sensor {self.name}: {n_rings} rings, {n_beams} beams>"
 
 
-def native(sensor: Sensor) -> _edgepuck.Sensor:
-    """The sensor of the module in Rust, if `sensor` is an `edgepuck.Sensor`."""
+# What functions take for a sensor.
+AnySensor: TypeAlias = "Sensor | str | os.PathLike[str]"
+
+
+def taken(sensor: AnySensor) -> Sensor:
+    """`sensor`, or the sensor of a name or a profile."""
+    if isinstance(sensor, (str, os.PathLike)):
+        return Sensor(sensor)
     if not isinstance(sensor, Sensor):
-        raise _edgepuck.Error(f"expected an edgepuck.Sensor, found {type(sensor).__name__}")
-    return sensor._sensor
+        raise _edgepuck.Error(f"expected an edgepuck.Sensor, or its name or profile, found {type(sensor).__name__}")
+    return sensor
+
+
+def profile_of(name: str, sensor: AnySensor) -> str:
+    """The name or the path of the profile of `sensor`, for an argument of this name."""
+    if isinstance(sensor, Sensor):
+        return str(sensor._made_of[0][0])
+    if not isinstance(sensor, (str, os.PathLike)):
+        found = type(sensor).__name__
+        raise _edgepuck.Error(f"{name}: expected the name or profile of a sensor, or an edgepuck.Sensor, found {found}")
+    return place(sensor)

@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
+import importlib.util
+import warnings
 from typing import Any
 
 import numpy as np
 
 from . import _edgepuck
 from ._arguments import seed as seed_of
-from .mujoco import Lidar
 
 try:
     import gymnasium
+
+    from .mujoco import Lidar
 except ImportError as cause:
     raise ImportError(
-        "edgepuck.gymnasium needs Gymnasium: pip install 'edgepuck[gymnasium]'"
+        "edgepuck.gymnasium needs Gymnasium and MuJoCo: pip install 'edgepuck[gymnasium]'"
     ) from cause
 
+if importlib.util.find_spec("imageio") is None:
+    needed = "Gymnasium's own environments of MuJoCo need imageio"
+    warnings.warn(f"{needed}: pip install 'edgepuck[gymnasium]'", stacklevel=2)
 
-class LidarObservation(gymnasium.ObservationWrapper[Any, Any, Any]):
+
+class LidarObservation(gymnasium.ObservationWrapper[Any, Any, Any], gymnasium.utils.RecordConstructorArgs):
     """Adds the ranges of a LiDAR to the observations, as `Box(0, max_range, [n_beams], float32)`.
 
     An observation that is a dict gets one more key; any other becomes its key `state`. A beam without a
@@ -34,7 +41,8 @@ class LidarObservation(gymnasium.ObservationWrapper[Any, Any, Any]):
         key: The key of the ranges.
 
     Raises:
-        Error: The environment has no data of MuJoCo; the key is taken; `max_range` is not above 0.
+        Error: The environment has no data of MuJoCo, or another model than the LiDAR; the key is taken;
+            `max_range` is not above 0.
     """
 
     def __init__(
@@ -45,7 +53,10 @@ class LidarObservation(gymnasium.ObservationWrapper[Any, Any, Any]):
         max_range: float,
         key: str = "lidar",
     ) -> None:
-        super().__init__(env)
+        gymnasium.utils.RecordConstructorArgs.__init__(
+            self, lidar=lidar, max_range=max_range, key=key, _disable_deepcopy=True
+        )
+        gymnasium.ObservationWrapper.__init__(self, env)
         if not hasattr(env.unwrapped, "data"):
             raise _edgepuck.Error(
                 f"env: expected an environment with MuJoCo's `data`, found {env.unwrapped}"
@@ -56,6 +67,8 @@ class LidarObservation(gymnasium.ObservationWrapper[Any, Any, Any]):
             )
         if not 0 < max_range < np.inf:
             raise _edgepuck.Error(f"max_range: expected metres above 0, found {max_range}")
+        data: Any = env.unwrapped.data
+        lidar.check_model(getattr(data, "model", None), "env: expected an environment")
         space = env.observation_space
         self._is_dict = isinstance(space, gymnasium.spaces.Dict)
         spaces = (

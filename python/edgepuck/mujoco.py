@@ -15,7 +15,7 @@ from ._heightfield import heightfield
 from ._mesh import Mesh, box
 from ._scan import Scan
 from ._scene import Batch, Scene
-from ._sensor import Sensor
+from ._sensor import AnySensor, Sensor, taken
 
 try:
     import mujoco  # type: ignore[import-untyped]
@@ -40,7 +40,7 @@ class Lidar:
     Args:
         model: The model.
         site: The name or the number of the site.
-        sensor: The sensor, or its name.
+        sensor: The sensor, or its name or profile.
         seed: The seed of all noise. Each call draws its own.
         noise: As `dropout` and `effects`, those of `Scene.scan`.
         groups: The groups of geoms that the sensor sees, 0 to 5; all by default.
@@ -76,7 +76,7 @@ class Lidar:
         self,
         model: mujoco.MjModel,
         site: str | int = "lidar",
-        sensor: str | Sensor = "vlp16",
+        sensor: AnySensor = "vlp16",
         *,
         seed: int = 0,
         noise: float = 0.0,
@@ -90,11 +90,13 @@ class Lidar:
             raise _edgepuck.Error(f"expected a mujoco.MjModel, found {type(model).__name__}")
         if not 0 < tolerance < np.inf:
             raise _edgepuck.Error(f"tolerance: expected metres above 0, found {tolerance}")
-        self.sensor = sensor if isinstance(sensor, Sensor) else Sensor(sensor)
+        self.sensor = taken(sensor)
         self.scene, self.seed = Scene(), seed_of(seed)
         self._model, self._site = model, _site(model, site)
         self._effects: dict[str, Any] = {"noise": noise, "dropout": dropout, "effects": effects}
         self._n_calls = 0
+        # The model, and others that were found to be equal.
+        self._known = [model]
         shapes, left_out, geoms = _Shapes(model, tolerance), _soft(model), []
         for geom in _seen(model, self._site, groups, see_self):
             mesh = shapes.mesh(geom)
@@ -114,6 +116,10 @@ class Lidar:
         self._own = mujoco.MjData(model)
         mujoco.mj_kinematics(model, self._own)
         self._place(self._own)
+
+    def __repr__(self) -> str:
+        site = self._model.site(self._site).name or self._site
+        return f"<Lidar {self.sensor.name} at site {site!r}: {len(self.sensor.directions)} beams, {len(self.geoms)} geoms>"
 
     def scan(
         self,
@@ -170,11 +176,30 @@ class Lidar:
         """A state of the LiDAR's own, with the poses of the positions `qpos` of `data`.
 
         `mj_step` leaves the poses of the step before. The next call changes this state.
+
+        Raises:
+            Error: `data` is a state of another model.
         """
+        self.check_model(data.model, "data: expected a state")
         self._own.qpos[:] = data.qpos
         self._own.mocap_pos[:], self._own.mocap_quat[:] = data.mocap_pos, data.mocap_quat
         mujoco.mj_kinematics(self._model, self._own)
         return self._own
+
+    def check_model(self, model: mujoco.MjModel, expected: str = "expected a model") -> None:
+        """Check that `model` is that of this LiDAR, or an equal one.
+
+        Raises:
+            Error: It is another one.
+        """
+        if any(model is known for known in self._known):
+            return
+        if not isinstance(model, mujoco.MjModel):
+            raise _edgepuck.Error(f"{expected} of MuJoCo, found {type(model).__name__}")
+        found = _difference(self._model, model)
+        if found:
+            raise _edgepuck.Error(f"{expected} of this LiDAR's model, found another, {found}: make a Lidar of that model")
+        self._known.append(model)
 
     def _place(self, data: mujoco.MjData) -> NDArray[np.float64]:
         """Move the instances to where `data` has them. Return the pose of the sensor."""
@@ -210,11 +235,7 @@ class Lidar:
 
     def _rows(self, data: mujoco.MjData) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Copies of the positions and rotations of the site and of the geoms."""
-        if len(data.geom_xpos) != self._model.ngeom or len(data.site_xpos) != self._model.nsite:
-            raise _edgepuck.Error(
-                f"data: expected that of a model with {self._model.ngeom} geoms and "
-                f"{self._model.nsite} sites, found {len(data.geom_xpos)} and {len(data.site_xpos)}"
-            )
+        self.check_model(data.model, "data: expected a state")
         if not data.site_xmat[self._site].any():
             raise _edgepuck.Error(
                 "data: expected the poses of its geoms, found none: call `mujoco.mj_forward(model, data)` first"
@@ -246,7 +267,7 @@ class _Shapes:
             shape = self.shape(kind, size)
             if shape is None:
                 return None
-            self.meshes[kind, *size] = Mesh(*shape, normalize="none", units="m")
+            self.meshes[kind, *size] = Mesh(*shape, units="m")
         return self.meshes[kind, *size]
 
     def shape(self, kind: mujoco.mjtGeom, size: tuple[Any, ...]) -> _Arrays | None:
@@ -374,3 +395,25 @@ def _named(model: mujoco.MjModel, kind: str, number: int) -> str:
     return (
         f"{what} ({mujoco.mjtGeom(model.geom_type[number]).name.removeprefix('mjGEOM_').lower()})"
     )
+
+
+# What a LiDAR sees of a model: shapes, and what holds them.
+_SEEN = (
+    *("geom_type", "geom_size", "geom_dataid", "geom_bodyid", "geom_pos", "geom_quat", "geom_rgba", "geom_matid", "mat_rgba"),
+    *("body_parentid", "body_pos", "body_quat", "jnt_type", "jnt_bodyid", "jnt_axis", "jnt_pos", "site_bodyid", "site_pos"),
+    *("site_quat", "mesh_vert", "mesh_face", "hfield_size", "hfield_data"),
+)
+
+
+def _difference(expected: mujoco.MjModel, found: mujoco.MjModel) -> str | None:
+    """What tells a model from the one that is expected, if a LiDAR sees it."""
+    for what, name in [("geoms", "ngeom"), ("sites", "nsite"), ("bodies", "nbody"), ("joints", "njnt")]:
+        numbers = getattr(expected, name), getattr(found, name)
+        if numbers[0] != numbers[1]:
+            return f"which has {numbers[1]} {what} in place of {numbers[0]}"
+    for name in _SEEN:
+        # Of colours, a LiDAR sees whether there is one.
+        of = (..., 3) if name.endswith("_rgba") else ...
+        if not np.array_equal(getattr(expected, name)[of], getattr(found, name)[of]):
+            return f"whose `{name}` differs"
+    return None

@@ -212,7 +212,7 @@ def export(
     """Write a model file for `edgepuck.Classifier` and `infer-cpu`. An existing file is replaced.
 
     Args:
-        model: The network.
+        model: The network, also one that `torch.compile` or `DataParallel` wraps.
         path: The file, `.safetensors`.
         classes: The names of the classes in the order of the logits, all different.
         sampler: The sampler of points: all, random, fps or cpl. The default is fps, or random for a
@@ -227,18 +227,20 @@ def export(
             differ, or a value is out of its limits.
     """
     _arguments.check_extension(path, ".safetensors")
-    state = _folded(model) if half else {name: value.float() for name, value in model.state_dict().items()}
+    network = _unwrapped(model)
+    state = _folded(network) if half else {name: value.float() for name, value in network.state_dict().items()}
+    state = _checkpoint.unwrapped(state)
     tensors = {name: value.cpu().numpy() for name, value in state.items() if not name.endswith("num_batches_tracked")}
     _model_file.check_classes(classes, tensors)
-    is_sets = isinstance(model, SetNetwork)
+    is_sets = isinstance(network, SetNetwork)
     points = (1024 if is_sets else 64) if points is None else _arguments.whole("points", points, 1, 2**32)
     sampler = ("random" if is_sets else "fps") if sampler is None else sampler
     card = {"classes": json.dumps(list(classes)), "sampler": sampler, "points": str(points)}
     card["provenance"] = "edgepuck.torch.export"
     if training_set is not None:
         card["training_set"] = training_set
-    if isinstance(model, SetNetwork):
-        card["abstractions"] = json.dumps([(n, radius) for n, radius, _ in model.levels])
+    if isinstance(network, SetNetwork):
+        card["abstractions"] = json.dumps([(n, radius) for n, radius, _ in network.levels])
     _model_file.write(path, tensors, card, calibrate=calibrate, source="model")
 
 
@@ -257,7 +259,7 @@ def import_weights(
 
     The layers have the names of the repositories yanx27 (`pointnet_cls`), fxia22 or 3dcertify, or those that `layers`
     states. The weights may be in `state_dict` or `model_state_dict` beside an optimiser's, of a network in
-    `DataParallel`, and in f16, bf16, f32 or f64. If all are in f16, so are the model's. No code of the checkpoint is
+    `DataParallel` or of `torch.compile`, and in f16, bf16, f32 or f64. If all are in f16, so are the model's. No code of the checkpoint is
     executed.
 
     Args:
@@ -305,9 +307,18 @@ def import_weights(
     _model_file.write(path, tensors, stated, calibrate=calibrate, source=read.path, their_names=theirs)
 
 
+def _unwrapped(model: nn.Module) -> nn.Module:
+    """The network that `torch.compile` or `torch.nn.DataParallel` wraps."""
+    while True:
+        inner = getattr(model, "_orig_mod", None) or (isinstance(model, nn.DataParallel) and model.module)
+        if not isinstance(inner, nn.Module):
+            return model
+        model = inner
+
+
 def _folded(model: nn.Module) -> dict[str, Tensor]:
     """The weights in f16, with batch norms folded into the layers of the same number before them."""
-    layers, folded = dict(model.named_modules()), {}
+    layers, folded = {name.replace("_orig_mod.", ""): layer for name, layer in model.named_modules()}, {}
     for name, layer in layers.items():
         if not isinstance(layer, nn.Linear | nn.Conv1d):
             continue

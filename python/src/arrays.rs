@@ -6,7 +6,7 @@ use formats::Scan;
 use formats::hash::Hashing;
 use formats::plausible::judge_sweep;
 use formats::points_file::PointsReader;
-use formats::scan::{Attribute, ColumnSlot};
+use formats::scan::{Attribute, ColumnSlot, OBJECT_TEXTS};
 use formats::scan_file::{ScanFormat, write_scan};
 use numpy::ndarray::Array2;
 use numpy::{Element, IntoPyArray, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
@@ -52,6 +52,9 @@ fn columns(py: Python<'_>, mut scan: Scan) -> PyResult<Bound<'_, PyDict>> {
     let columns = PyDict::new(py);
     columns.set_item("origin", scan.origin)?;
     columns.set_item("pose", scan.pose.as_ref())?;
+    for (key, texts) in OBJECT_TEXTS.iter().zip(&scan.object_texts) {
+        columns.set_item(key, Some(texts).filter(|texts| !texts.is_empty()))?;
+    }
     columns.set_item("positions", vectors(py, std::mem::take(&mut scan.positions))?)?;
     for attribute in Attribute::ALL {
         let column = match scan.slot(attribute) {
@@ -98,6 +101,8 @@ pub fn scan_of(columns: &Bound<'_, PyDict>) -> PyResult<Scan> {
         match name.as_str() {
             "origin" => scan.origin = column.extract()?,
             "pose" => scan.pose = Some(column.extract()?),
+            "object_names" => scan.object_texts[0] = column.extract()?,
+            "object_labels" => scan.object_texts[1] = column.extract()?,
             "positions" => scan.positions = points(&column.extract()?)?,
             name => match scan.slot(name.parse().map_err(raised)?) {
                 ColumnSlot::F32(slot) => *slot = Some(list(name, &column)?),

@@ -68,6 +68,10 @@ impl Classifier {
             classifier.classify_on_ground(&cloud, ground_z).cloned()
         });
         let found = found.map_err(raised)?;
+        let dropped = (found.n_dropped > 0).then(|| {
+            format!("dropped {} lost returns: points at 0, 0, 0 or not finite", found.n_dropped)
+        });
+        warn(py, dropped.as_slice())?;
         let answer = PyDict::new(py);
         answer.set_item("label", found.answer())?;
         answer.set_item("index", found.class)?;

@@ -1,6 +1,6 @@
 use crate::error::{raised, raised_with_causes, warn};
 use crate::process::{self, LazyCaster};
-use edgepuck_dataset::{self as dataset, Around, DatasetConfig, NOISE_M, SetConfig};
+use edgepuck_dataset::{self as dataset, Around, DatasetConfig, SetConfig};
 use formats::Split;
 use formats::plausible::Warning;
 use formats::scan::Attribute;
@@ -40,8 +40,8 @@ struct Settings {
     up: Option<String>,
     min_points: u32,
     effects: Option<PathBuf>,
-    noise: Option<f64>,
-    dropout: Option<f64>,
+    noise: f64,
+    dropout: f64,
 }
 
 impl Settings {
@@ -62,10 +62,7 @@ impl Settings {
             attributes: attributes.iter().copied().collect(),
             effects: match self.effects {
                 Some(file) => dataset::read_effects(&file)?,
-                None => {
-                    let noise_m = self.noise.unwrap_or(NOISE_M);
-                    dataset::noisy(noise_m, self.dropout.unwrap_or_default())?
-                }
+                None => dataset::noisy(self.noise, self.dropout)?,
             },
             packed_points: self.points,
             min_points: self.min_points,

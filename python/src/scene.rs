@@ -5,10 +5,11 @@ use crate::error::{raised, warn};
 use crate::mesh::Mesh;
 use crate::process::{self, LazyCaster, lock};
 use crate::sensor::Sensor;
+use formats::plausible::upside_down;
 use formats::scan::Attribute;
 use glam::{DMat3, DQuat, DVec3};
-use numpy::ndarray::{Array2, ArrayView1};
-use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2};
+use numpy::ndarray::Array2;
+use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use sim_gpu::scene_files::check_object;
@@ -88,8 +89,9 @@ impl Scene {
     #[expect(clippy::too_many_arguments, reason = "Python's side has names for them")]
     fn add(
         &self,
+        py: Python<'_>,
         mesh: &Mesh,
-        pose: [f64; 16],
+        pose: PyReadonlyArray2<'_, f64>,
         scale: [f64; 3],
         name: Option<String>,
         label: Option<String>,
@@ -97,26 +99,22 @@ impl Scene {
         retroreflection: f64,
     ) -> PyResult<u32> {
         check_object(str::to_owned, scale, reflectivity, retroreflection).map_err(raised)?;
-        let (pose, mut scene) = (pose_of(&pose)?, lock(&self.scene));
-        let id = scene.add(&mesh.mesh, pose);
+        let (poses, mut scene) = (poses_of(py, "the instance", &pose)?, lock(&self.scene));
+        let id = scene.add(&mesh.mesh, poses[0]);
         let instance = &mut scene[id];
         (instance.scale, instance.name, instance.label) = (scale.into(), name, label);
         (instance.reflectivity, instance.retroreflection) = (reflectivity, retroreflection);
         Ok(id.number())
     }
 
-    /// Move the instance of this number.
-    #[pyo3(name = "move")]
-    fn move_to(&self, number: usize, pose: [f64; 16]) -> PyResult<()> {
-        let (pose, mut scene) = (pose_of(&pose)?, lock(&self.scene));
-        let id = ids_of(&scene, &[number])?[0];
-        scene[id].pose = pose;
-        Ok(())
-    }
-
     /// Move the instances of these numbers, all or none.
-    fn move_all(&self, numbers: Vec<usize>, poses: PyReadonlyArray2<'_, f64>) -> PyResult<()> {
-        let (poses, mut scene) = (poses_of("pose", &poses)?, lock(&self.scene));
+    fn move_all(
+        &self,
+        py: Python<'_>,
+        numbers: Vec<usize>,
+        poses: PyReadonlyArray2<'_, f64>,
+    ) -> PyResult<()> {
+        let (poses, mut scene) = (poses_of(py, "the instance", &poses)?, lock(&self.scene));
         for (id, pose) in ids_of(&scene, &numbers)?.into_iter().zip(poses) {
             scene[id].pose = pose;
         }
@@ -128,12 +126,12 @@ impl Scene {
         &self,
         py: Python<'py>,
         sensor: &Sensor,
-        place: Place,
+        place: PyReadonlyArray2<'py, f64>,
         effects: Option<&str>,
         attributes: Option<Vec<String>>,
         seed: Option<u64>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let pose = place.pose()?;
+        let pose = pose_at(py, &place)?;
         let (caster, mut scene) = (sensor.caster.open()?, lock(&self.scene).clone());
         read_effects(effects, &mut scene.effects)?;
         if let Some(names) = attributes {
@@ -142,7 +140,7 @@ impl Scene {
         scene.seed = seed.unwrap_or(scene.seed);
         sensor.sensor.rays(&scene.effects).map_err(raised)?;
         let scan = process::run(py, || scene.scan(&sensor.sensor, pose).with(&caster).run())?;
-        arrays::cast(py, scan.map_err(raised)?.points)
+        arrays::cast(py, named(scan.map_err(raised)?.points, &scene))
     }
 
     /// The columns of a batch, `[n, n_beams]`, and the seed of each row; `moved` has the poses of the
@@ -163,7 +161,8 @@ impl Scene {
         scene.seed = seed.unwrap_or(scene.seed);
         read_effects(effects, &mut scene.effects)?;
         let instances = ids_of(&scene, &numbers)?;
-        let (poses, moved) = (poses_of("poses", &poses)?, poses_of("move", &moved)?);
+        let poses = poses_of(py, "the sensor", &poses)?;
+        let moved = poses_of(py, "the instance", &moved)?;
         sensor.sensor.rays(&scene.effects).map_err(raised)?;
         let moves = Moves { instances: &instances, poses: &moved };
         let attributes = read_attributes(&attributes)?;
@@ -179,12 +178,17 @@ impl Scene {
     fn scan_all<'py>(&self, py: Python<'py>, adapter: &str) -> PyResult<Vec<NamedScan<'py>>> {
         let (caster, scene) = (LazyCaster::new(adapter).open()?, lock(&self.scene).clone());
         let scans = process::run(py, || scene.scan_all(&caster))?.map_err(raised)?;
-        let columns = scans
-            .into_iter()
-            .zip(&scene.sensors)
-            .map(|(scan, mounted)| Ok((mounted.name.clone(), arrays::cast(py, scan.points)?)));
+        let columns = scans.into_iter().zip(&scene.sensors).map(|(scan, mounted)| {
+            Ok((mounted.name.clone(), arrays::cast(py, named(scan.points, &scene))?))
+        });
         columns.collect()
     }
+}
+
+/// The points with the names of the objects, if they know theirs.
+fn named(points: formats::Scan, scene: &sim_gpu::Scene) -> formats::Scan {
+    let object_texts = points.object.is_some().then(|| scene.object_texts());
+    formats::Scan { object_texts: object_texts.unwrap_or_default(), ..points }
 }
 
 /// Takes `effects`, in JSON, in place of a scene's.
@@ -237,93 +241,32 @@ fn ids_of(scene: &sim_gpu::Scene, numbers: &[usize]) -> PyResult<Vec<sim_gpu::In
     numbers.iter().map(id).collect()
 }
 
-/// Where a sensor stands.
-#[derive(FromPyObject)]
-enum Place {
-    /// Around the origin: distance in metres, elevation and azimuth in degrees.
-    Around([f64; 3]),
-    /// From the sensor's frame to the world's, row by row.
-    Matrix([f64; 16]),
-}
-
-impl Place {
-    fn pose(&self) -> PyResult<Pose> {
-        let numbers = match self {
-            Self::Around(numbers) => &numbers[..],
-            Self::Matrix(numbers) => numbers,
-        };
-        if let Some(number) = numbers.iter().find(|number| !number.is_finite()) {
-            return Err(raised(format!(
-                "expected finite numbers as the sensor's place, found {number}"
-            )));
+/// The pose of a sensor in a row of [`poses_of`], or of its distance in metres from the origin, at which it
+/// looks, its elevation and its azimuth in degrees.
+fn pose_at(py: Python<'_>, place: &PyReadonlyArray2<'_, f64>) -> PyResult<Pose> {
+    match *place.as_slice()? {
+        [distance_m, elevation_deg, azimuth_deg] => {
+            Ok(Pose::looking_at_origin_deg(distance_m, elevation_deg, azimuth_deg))
         }
-        match *self {
-            Self::Around(around) => view(around),
-            Self::Matrix(rows) => pose_of(&rows),
+        _ => Ok(poses_of(py, "the sensor", place)?[0]),
+    }
+}
+
+/// The poses of `what` in rows of matrices, of 16 numbers, or of positions and quaternions x, y, z, w, of
+/// 7, which Python's side has checked. Quaternions that turn it over are warned of.
+fn poses_of(py: Python<'_>, what: &str, rows: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Pose>> {
+    let pose = |row: &[f64]| match *row {
+        [x, y, z, qx, qy, qz, qw] => Pose::rigid([x, y, z], [qx, qy, qz, qw]).map_err(raised),
+        [a, b, c, x, d, e, f, y, g, h, i, z, ..] => {
+            let rotation = DMat3::from_cols_array(&[a, d, g, b, e, h, c, f, i]);
+            let rotation = DQuat::from_mat3(&rotation).normalize();
+            Ok(Pose { position_m: DVec3::new(x, y, z), rotation })
         }
-    }
-}
-
-fn view([distance_m, elevation_deg, azimuth_deg]: [f64; 3]) -> PyResult<Pose> {
-    if distance_m <= 0.0 {
-        return Err(raised(format!("expected a distance above 0, found {distance_m}")));
-    }
-    if !(-90.0..=90.0).contains(&elevation_deg) {
-        let cause = format!("expected an elevation from -90 to 90 degrees, found {elevation_deg}");
-        return Err(raised(cause));
-    }
-    Ok(Pose::looking_at_origin_deg(distance_m, elevation_deg, azimuth_deg))
-}
-
-/// The poses in rows of matrices, of 16 numbers, or of positions and quaternions w, x, y, z, of 7; errors
-/// call the array `name`.
-fn poses_of(name: &str, rows: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Pose>> {
-    let rows = rows.as_array();
-    let pose = |(i, row): (usize, ArrayView1<'_, f64>)| {
-        let found = match row.len() {
-            7 => posed(std::array::from_fn(|at| row[at])),
-            _ => rigid(&std::array::from_fn(|at| row[at])),
-        };
-        found.map_err(|cause| raised(format!("{name}[{i}]: {cause}")))
+        _ => Err(raised(format!("expected rows of 7 or 16 numbers, found {}", row.len()))),
     };
-    rows.rows().into_iter().enumerate().map(pose).collect()
-}
-
-/// The pose of a matrix, row by row.
-fn pose_of(rows: &[f64; 16]) -> PyResult<Pose> {
-    rigid(rows).map_err(|cause| raised(format!("pose: {cause}")))
-}
-
-/// The pose of a position and a quaternion w, x, y, z; or what it lacks.
-fn posed([x, y, z, qw, qx, qy, qz]: [f64; 7]) -> Result<Pose, String> {
-    Pose::rigid([x, y, z], [qx, qy, qz, qw]).map_err(|invalid| invalid.cause)
-}
-
-fn position(x: f64, y: f64, z: f64) -> Result<DVec3, String> {
-    match [x, y, z].into_iter().find(|number| !number.is_finite()) {
-        Some(number) => Err(format!("expected a position of finite metres, found {number}")),
-        None => Ok(DVec3::new(x, y, z)),
-    }
-}
-
-/// The pose of a matrix, row by row; or what it lacks.
-fn rigid(rows: &[f64; 16]) -> Result<Pose, String> {
-    let [a, b, c, x, d, e, f, y, g, h, i, z, 0.0, 0.0, 0.0, 1.0] = *rows else {
-        let last = &rows[12..];
-        return Err(format!("expected a matrix whose last row is 0, 0, 0, 1, found {last:?}"));
-    };
-    let position_m = position(x, y, z)?;
-    let rotation = DMat3::from_cols_array(&[a, d, g, b, e, h, c, f, i]);
-    let off = rotation * rotation.transpose() - DMat3::IDENTITY;
-    let off = off.to_cols_array().into_iter().map(f64::abs).fold(0.0, f64::max);
-    let is_rotation = off <= 1e-6 && rotation.determinant() > 0.0;
-    if !is_rotation {
-        return Err(format!(
-            "expected a rotation in the first three rows and columns, found one that is off by {off:.2e}, \
-             with determinant {:.4}",
-            rotation.determinant()
-        ));
-    }
-    let rotation = DQuat::from_mat3(&rotation).normalize();
-    Ok(Pose { position_m, rotation })
+    let width = rows.shape()[1];
+    let poses: Vec<Pose> = rows.as_slice()?.chunks(width).map(pose).collect::<PyResult<_>>()?;
+    let warning = (width == 7).then(|| upside_down(what, &poses)).flatten();
+    warn(py, warning.as_slice())?;
+    Ok(poses)
 }

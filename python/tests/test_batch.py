@@ -49,7 +49,7 @@ def test_quaternions_are_poses_too() -> None:
     scene, _ = world()
     half = np.sqrt(0.5)
     turned = np.array([[0.0, -1, 0, 1], [1, 0, 0, 0.5], [0, 0, 1, 0], [0, 0, 0, 1]])
-    both = [scene.cast(SENSOR, [turned]), scene.cast(SENSOR, [[1, 0.5, 0, half, 0, 0, half]])]
+    both = [scene.cast(SENSOR, [turned]), scene.cast(SENSOR, [[1, 0.5, 0, 0, 0, half, half]])]
     np.testing.assert_allclose(both[0].ranges, both[1].ranges, rtol=1e-6)
 
 
@@ -102,7 +102,7 @@ def test_many_instances_move_at_once_and_stay_so_when_pickled() -> None:
     many, alone = ep.Scene(), ep.Scene()
     numbers = [many.add(box) for _ in range(3)]
     # Quarter turns about z, as quaternions and as matrices.
-    quaternions = np.array([[3.0, i, 0.2, half, 0, 0, half] for i in range(3)])
+    quaternions = np.array([[3.0, i, 0.2, 0, 0, half, half] for i in range(3)])
     for x, y, z, *_ in quaternions:
         alone.add(box, [[0, -1, 0, x], [1, 0, 0, y], [0, 0, 1, z], [0, 0, 0, 1]])
     many.move(numbers, quaternions)
@@ -117,7 +117,7 @@ def test_many_instances_move_at_once_and_stay_so_when_pickled() -> None:
 @pytest.mark.parametrize(
     ("numbers", "poses", "message"),
     [
-        ([0, 1], np.eye(4), "pose: expected shape [2, 4, 4] or [2, 7], found [4, 4]"),
+        ([0, 1], np.eye(4), "pose: expected shape [2, 4, 4] or [2, 7], found [4, 4]; seven are x, y, z and a quaternion x, y, z, w"),
         ([0, 1], np.stack([np.eye(4), np.diag([1, 1, 1.01, 1])]), "pose[1]: expected a rotation in the first three rows"),
         ([0, 1], np.stack([np.eye(4), np.diag([1, 1, 1.01, 1])]), "off by 2.01e-2, with determinant 1.0100"),
         ([0, 2], np.stack([np.eye(4)] * 2), "expected the number of one of 2 instances, found 2"),

@@ -52,16 +52,16 @@ FLOOR = np.stack([*np.meshgrid(*[np.linspace(-9.0, 9.0, 90)] * 2), np.full((90, 
         (lambda: ep.detect(np.zeros((3, 200))), "found [3, 200]: transpose it"),
         (lambda: ep.Classifier("edge-64")(np.zeros((2, 3, 200))), "found [3, 200]: transpose it"),
         (lambda: ep.segment(np.zeros(5, [("x", "f4"), ("y", "f4")])), "expected fields x, y and z"),
-        (lambda: ep.segment("sweep.npz"), "found the path 'sweep.npz': `Scan.read` reads files"),
+        (lambda: ep.segment("sweep.npz"), "sweep.npz"),
         (lambda: ep.detect(FLOOR, min_confidence=2), "min_confidence: expected a number from 0 to 1"),
         (lambda: ep.detect(FLOOR, min_confidence=np.nan), "min_confidence: expected a number from 0"),
-        (lambda: ep.Mesh(SQUARE, [[0, 1, 2]], units="mm"), "units: expected normalize=\"none\" beside it"),
         (lambda: ep.Scene().add(CUBE, position=(np.nan, 0, 0)), "position: expected finite metres"),
         (lambda: ep.Sensor("vlp16").scan(CUBE, effects="fog"), "effects: expected a dict, found 'fog'"),
         (lambda: ep.Scenes("moon"), "moon"),
         (lambda: ep.scan_scene("missing.toml"), "missing.toml"),
         (lambda: ep.Dataset("missing"), "missing: cannot be read"),
-        (lambda: ep.Scene().add("chair.off"), "expected an edgepuck.Mesh"),
+        (lambda: ep.Scene().add("chair.off"), "chair.off: cannot be read"),
+        (lambda: ep.Scene().add(7), "expected a path, a mesh with vertices and faces (of trimesh or Open3D)"),
         (lambda: ep.Scene().add(ep.Mesh(*ep.box((1, 1, 1))), scale=[1, 2]), "expected one number or three"),
         (lambda: ep.Scene().add(CUBE, scale=0), "scale: expected a number above 0, found 0"),
         (lambda: ep.Scene().add(CUBE, scale=[1, -1, 1]), "scale: expected a number above 0, found -1"),
@@ -71,7 +71,7 @@ FLOOR = np.stack([*np.meshgrid(*[np.linspace(-9.0, 9.0, 90)] * 2), np.full((90, 
         (lambda: ep.Scene().move(-1, np.eye(4)), "instance: expected a whole number"),
         (lambda: ep.Scene().move(0), "expected a pose or a position, found neither"),
         (lambda: ep.Scene().scan(ep.Sensor("vlp16"), pose=np.eye(4), azimuth=0), "a distance, an elevation and an azimuth, found both"),
-        (lambda: ep.Scene.of("robot.glb"), "expected a trimesh.Scene, found str"),
+        (lambda: ep.Scene.of("robot.glb"), "expected a trimesh.Scene, found the path 'robot.glb': `Scene.read` reads files"),
         (lambda: ep.Scan(np.zeros((5, 2)), np.zeros(3)), "positions: expected shape [n, 3], found [5, 2]"),
         (lambda: ep.Scan(BALL, [0.0] * 3, range=[1, 2]).save("x.npz"), "range: expected type float32 and shape [n], found int64 and"),
         (lambda: ep.Scan(BALL, [0.0] * 3, range=BALL[:9, 0].astype("f4")).save("x.npz"), "range"),
@@ -79,7 +79,11 @@ FLOOR = np.stack([*np.meshgrid(*[np.linspace(-9.0, 9.0, 90)] * 2), np.full((90, 
         (lambda: ep.set_num_threads(-1), "threads: expected a whole number from 0, found -1"),
         (lambda: ep.Dataset("meshes", effects={}), "effects: expected the path of a TOML file, found dict"),
         (lambda: ep.Classifier("edge-64")([BALL, BALL[:0]]), "cloud 1: the cloud has no points"),
-        (lambda: ep.Scene().scan("vlp32c"), "expected an edgepuck.Sensor, found str"),
+        (lambda: ep.Scene().scan(7), "expected an edgepuck.Sensor, or its name or profile, found int"),
+        (lambda: ep.Dataset("meshes", 7), "sensor: expected the name or profile of a sensor, or an edgepuck.Sensor, found int"),
+        (lambda: ep.Scan(BALL, [0.0] * 3, pose=np.diag([1, 1, 1, 2])), "pose: expected a matrix whose last row is 0, 0, 0, 1"),
+        (lambda: ep.Scan(BALL, [0.0] * 3, pose=[0] * 7), "pose: expected a quaternion of length 1, found [0.0, 0.0, 0.0, 0.0] (x, y, z, w) of length 0"),
+        (lambda: ep.Mesh(SQUARE, [[0, 1, 2]], normalize="unit-sphere", units="mm"), "units: expected normalize=\"none\" beside it"),
     ],
 )
 def test_wrong_arguments_are_named(make, message: str) -> None:
@@ -150,7 +154,10 @@ def test_the_fields_x_y_and_z_are_points() -> None:
         ({"effects": {"mist": 1}}, "mist"),
         ({"effects": {"footprint": {"samples": 5}}}, "samples"),
         ({"pose": np.eye(3)}, "shape"),
-        ({"pose": [3, 0, 0]}, "shape [4, 4], found [3]"),
+        ({"pose": [3, 0, 0]}, "pose: expected shape [4, 4] or [7], found [3]; seven are x, y, z and a quaternion x, y, z, w"),
+        ({"pose": [3, 0, 0, 0, 0, 0, 2]}, "pose: expected a quaternion of length 1, found [0.0, 0.0, 0.0, 2.0] (x, y, z, w) of length 2.0"),
+        ({"pose": [[1], [2, 3]]}, "pose: expected shape [4, 4] or [7], found [[1], [2, 3]]"),
+        ({"pose": np.diag([1, 1, 1, 2])}, "pose: expected a matrix whose last row is 0, 0, 0, 1"),
         ({"seed": -1}, "seed: expected a whole number"),
         ({"seed": 2**64}, "seed"),
         ({"attributes": "range"}, "list of names"),
@@ -210,7 +217,7 @@ def test_wrong_indices_are_refused(shapes: Path) -> None:
     np.testing.assert_array_equal(dataset[np.int64(1)][0], dataset[1 - len(dataset)][0])
     with pytest.raises(ep.Error, match="length"):
         ep.Scenes(length=-1)
-    with pytest.raises(ep.Error, match="expected an edgepuck.Mesh"):
+    with pytest.raises(ep.Error, match="chair.off: cannot be read"):
         ep.Sensor("vlp32c").scan("chair.off")
 
 
@@ -226,6 +233,6 @@ def test_paths_stay_right_in_another_folder(
 def test_huge_and_tiny_meshes_are_ordinary(cube: tuple) -> None:
     vertices, faces = cube
     for size in [1e-200, 1e200]:
-        scan = ep.Sensor("vlp32c").scan(ep.Mesh(vertices * size, faces))
+        scan = ep.Sensor("vlp32c").scan(ep.Mesh(vertices * size, faces, normalize="unit-sphere"))
         assert len(scan) > 1000
         assert np.isfinite(scan.positions).all()

@@ -32,7 +32,7 @@ def computed(shapes: Path) -> dict[str, dict]:
     arrays = {
         "scan": scan.positions,
         "effects": lidar.scan(mesh, effects=effects).positions,
-        "dataset": ep.Dataset(shapes, "vlp32c", views=2, points=128, seed=1).batch(range(8))[0],
+        "dataset": ep.Dataset(shapes, "vlp32c", views=2, points=128, noise=0.01, seed=1).batch(range(8))[0],
         "scene": scene.scan.positions,
         "clusters": scene.cluster,
         "segment": ep.segment(scene.scan),

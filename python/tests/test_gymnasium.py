@@ -130,3 +130,24 @@ def test_wrong_arguments_are_named(make, message: str) -> None:
     with pytest.raises(ep.Error) as caught:
         make(Lidar(MODEL, "lidar", SENSOR))
     assert message in str(caught.value)
+
+
+gymnasium.register("edgepuck-cart", Cart, max_episode_steps=20)
+
+
+@pytest.mark.parametrize("wrap", [lambda env: env, gymnasium.wrappers.TransformReward])
+def test_an_environment_of_the_registry_is_made_again_with_its_lidar(wrap) -> None:
+    env = LidarObservation(gymnasium.make("edgepuck-cart"), Lidar(MODEL, "lidar", SENSOR), max_range=8.0)
+    env = wrap(env) if wrap is not gymnasium.wrappers.TransformReward else wrap(env, lambda reward: reward)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("error")
+        warnings.filterwarnings("ignore", "(?s).*(different from the unwrapped|infinity)")
+        check_env(env, skip_render_check=True)
+
+
+def test_a_lidar_of_another_model_is_refused_at_once() -> None:
+    another = mujoco.MjModel.from_xml_string(CART.replace('".1 5 1"', '".1 4 1"'))
+    with pytest.raises(ep.Error, match="env: expected an environment of this LiDAR's model, found another, whose `geom_size`"):
+        LidarObservation(Cart(), Lidar(another, "lidar", SENSOR), max_range=8.0)
+    alike = mujoco.MjModel.from_xml_string(CART)
+    LidarObservation(Cart(), Lidar(alike, "lidar", SENSOR), max_range=8.0).reset(seed=1)

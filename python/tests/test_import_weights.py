@@ -209,9 +209,13 @@ def test_a_damaged_checkpoint_is_an_error_or_a_checkpoint(original: Path, tmp_pa
         (["module.a", "b"], ["b", "module.a"]),
         (["model_state_dict.module.a", "optimizer_state_dict.state.0.exp_avg"], ["a"]),
         (["optimizer.x", "state_dict.a"], ["a"]),
+        (["_orig_mod.a", "_orig_mod.b"], ["a", "b"]),
+        (["_orig_mod.module.a", "_orig_mod.module.b"], ["a", "b"]),
+        (["module._orig_mod.a", "module._orig_mod.b"], ["a", "b"]),
+        (["state_dict.feat._orig_mod.a", "state_dict.fc1.b"], ["fc1.b", "feat.a"]),
     ],
 )
-def test_the_model_is_found_beside_the_optimiser_and_below_data_parallel(
+def test_the_model_is_found_beside_the_optimiser_and_below_its_wrappers(
     names: list[str], found: list[str]
 ) -> None:
     assert sorted(_checkpoint._of_model(dict.fromkeys(names))) == found

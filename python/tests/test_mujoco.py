@@ -200,7 +200,7 @@ def test_unseen_geoms_are_named_once() -> None:
             lambda model, _: Lidar(model).ranges(mujoco.MjData(model)),
             "found none: call `mujoco.mj_forward(model, data)`",
         ),
-        (lambda model, _: Lidar(model).scan(model_of("")[1]), "data: expected that of a model with 6 geoms"),
+        (lambda model, _: Lidar(model).scan(model_of("")[1]), "data: expected a state of this LiDAR's model, found another, which has 1 geoms in place of 6"),
     ],
 )
 def test_wrong_arguments_are_named(make, message: str) -> None:
@@ -215,3 +215,22 @@ def test_it_is_imported_only_when_asked_for() -> None:
     subprocess.run([sys.executable, "-c", script], check=True)
     done = subprocess.run([sys.executable, "-c", missing], capture_output=True, text=True)
     assert "needs MuJoCo: pip install 'edgepuck[mujoco]'" in done.stderr
+
+
+OTHER = """<mujoco><worldbody><site name="lidar" pos="0 0 1"/><body pos="3 0 1"><freejoint/>
+  <geom type="{kind}" size="{size} {size} {size}" rgba="{red} 0 0 1"/></body><geom type="plane" size="0 0 1"/></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("other", [{"size": 1.5}, {"kind": "ellipsoid"}])
+def test_states_of_another_model_with_as_many_geoms_are_refused(other: dict) -> None:
+    usual = {"kind": "box", "size": 0.5, "red": 1}
+    own, another, alike = (mujoco.MjModel.from_xml_string(OTHER.format(**usual | of)) for of in ({}, other, {"red": 0}))
+    lidar, data, equal = Lidar(own, sensor=SENSOR), mujoco.MjData(another), mujoco.MjData(alike)
+    mujoco.mj_forward(another, data)
+    mujoco.mj_forward(alike, equal)
+    for use in (lidar.ranges, lidar.scan, lidar.cast, lidar.settled, lambda state: lidar.cast([state])):
+        with pytest.raises(ep.Error, match="data: expected a state of this LiDAR's model, found another, whose `geom_"):
+            use(data)
+    # An equal model, which is only of another colour, is the same to a LiDAR.
+    np.testing.assert_array_equal(lidar.ranges(equal), Lidar(alike, sensor=SENSOR).ranges(equal))
+    assert repr(lidar) == f"<Lidar all-around at site 'lidar': {len(SENSOR.directions)} beams, 2 geoms>"

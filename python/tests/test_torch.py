@@ -63,3 +63,13 @@ def test_unsupported_networks_are_named(path: str, settings: dict, message: str,
     assert (tmp_path / "m.safetensors").read_bytes() == before
     export(PointNet(2), tmp_path / "m.safetensors", classes=["b", "a"])
     assert (tmp_path / "m.safetensors").read_bytes() != before
+
+
+def test_a_compiled_network_is_exported_as_itself(tmp_path: Path) -> None:
+    model = PointNet(3, widths=(16, 32, 64), head=(32, 16)).eval()
+    wrapped = [torch.compile(model), torch.nn.DataParallel(torch.compile(model))]
+    for half in (False, True):
+        export(model, tmp_path / "own.safetensors", classes=list("abc"), half=half)
+        for network in wrapped:
+            export(network, tmp_path / "m.safetensors", classes=list("abc"), half=half)
+            assert (tmp_path / "m.safetensors").read_bytes() == (tmp_path / "own.safetensors").read_bytes()

@@ -140,7 +140,8 @@ class Study:
                 continue
             words = ["--resume"] if out.exists() else []
             # Code 1: some of the meshes could not be scanned.
-            edgepuck("gen-dataset", meshes, "--sensor", sensor, "--min-points", 16, "--out", out, *words, codes=(0, 1))
+            edgepuck("gen-dataset", meshes, "--sensor", sensor, "--min-points", 16, "--noise", 0.01, "--out", out, *words,
+                     codes=(0, 1))
         for half in HALVES:
             sample_surfaces(meshes, half, self.data / f"{SURFACES}-{half}.npz")
 
@@ -288,7 +289,7 @@ def sample_surfaces(meshes: Path, half: str, out: Path) -> None:
     draws, points, names = np.random.default_rng(HALVES.index(half)), [], []
     for path in sorted(meshes.glob(f"*/{half}/*")):
         try:
-            mesh = ep.Mesh(path)
+            mesh = ep.Mesh(path, normalize="unit-sphere")
         except ep.Error as error:
             print(f"skipped: {error}", file=sys.stderr)
             continue

@@ -2,8 +2,7 @@
 
 use crate::Folder;
 
-const WORDS: &str =
-    "gen-dataset meshes --adapter cpu --sensor vlp32c --views 2 --distance 2,3 --points 64";
+const WORDS: &str = "gen-dataset meshes --adapter cpu --sensor vlp32c --noise 0.01 --views 2 --distance 2,3 --points 64";
 const PUBLICATION: &str =
     "--license CC-BY-4.0 --url https://example.org/d --creator Ada --published 2026-11-25";
 

@@ -6,7 +6,7 @@ use formats::labelled::read_labelled;
 #[test]
 fn the_default_sets_are_written_packed_and_verified() {
     let folder = Folder::with_meshes();
-    let said = folder.succeeds("gen-dataset meshes --out out");
+    let said = folder.succeeds("gen-dataset meshes --noise 0.01 --out out");
     assert!(said.contains("9 meshes, 0 failed; 90 scans"), "{said}");
     for set in ["rotational", "static"] {
         for variant in ["clean", "noisy"] {

@@ -9,7 +9,7 @@ use infer_cpu::{Classifier, Options};
 fn scans_of_new_shapes_are_recognised_by_the_weights_that_ship() {
     let folder = Folder::new();
     folder.succeeds("gen-dataset --save-meshes shapes --seed 9 --train 0 --test 2");
-    folder.succeeds("gen-dataset shapes --adapter cpu --out scans");
+    folder.succeeds("gen-dataset shapes --adapter cpu --noise 0.01 --out scans");
     let model = in_repository("assets/weights/shapes-rotational-64.safetensors");
     let mut classifier = Classifier::load(&model, &Options::default()).unwrap();
     let (mut right, mut all) = (0, 0);

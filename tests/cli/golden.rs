@@ -54,12 +54,12 @@ fn with_shapes() -> Folder {
     folder
 }
 
-const DATASET: &str = "gen-dataset shapes --adapter cpu --sensor vlp32c";
+const DATASET: &str = "gen-dataset shapes --adapter cpu --sensor vlp32c --noise 0.01";
 
 #[test]
 fn datasets_and_tars_keep_their_bytes() {
     let folder = with_shapes();
-    folder.succeeds("gen-dataset shapes --adapter cpu --views 3 --out files");
+    folder.succeeds("gen-dataset shapes --adapter cpu --noise 0.01 --views 3 --out files");
     folder.succeeds(&format!("{DATASET} --views 3 --layout webdataset --tar-clouds 10 --out tars"));
     folder.succeeds(&format!("{DATASET} --views 2 --format pcap --returns dual --out packets"));
     // How a picture is drawn and compressed is not part of a data set.
@@ -172,7 +172,7 @@ fn a_drive_its_objects_and_its_recording_keep_their_bytes() {
 #[test]
 fn logits_of_bundled_models_keep_their_bits() {
     let folder = with_shapes();
-    folder.succeeds("gen-dataset shapes --adapter cpu --views 1 --out scans");
+    folder.succeeds("gen-dataset shapes --adapter cpu --noise 0.01 --views 1 --out scans");
     let clouds = files(&folder.at("scans/rotational/noisy"));
     let clouds: Vec<_> = clouds
         .keys()

@@ -3,8 +3,7 @@
 use crate::{Folder, meshes};
 use formats::velodyne::count_returns;
 
-const DATASET: &str =
-    "gen-dataset meshes --sensor vlp32c --views 2 --format pcap --returns dual --adapter cpu";
+const DATASET: &str = "gen-dataset meshes --sensor vlp32c --noise 0.01 --views 2 --format pcap --returns dual --adapter cpu";
 
 #[test]
 fn a_dataset_has_packets_beside_its_points_and_is_verified() {

@@ -6,7 +6,7 @@ use std::fs;
 use std::process::Stdio;
 use std::time::Duration;
 
-const WORDS: &str = "gen-dataset meshes --adapter cpu --layout webdataset --sensor vlp32c --views 3 \
+const WORDS: &str = "gen-dataset meshes --adapter cpu --layout webdataset --sensor vlp32c --noise 0.01 --views 3 \
                      --points 64 --azimuth-jitter 180 --tar-clouds 4";
 
 #[test]

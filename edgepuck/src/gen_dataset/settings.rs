@@ -2,8 +2,8 @@ use super::usage;
 use crate::effect_flags::EffectFlags;
 use crate::flags::{of_flag, probability};
 use edgepuck_dataset::{
-    Around, DatasetConfig, Hashing, Layout, NOISE_M, Normalize, Returns, ScanFormat, SetConfig,
-    Unit, Up, Viewpoints,
+    Around, DatasetConfig, Hashing, Layout, Normalize, Returns, ScanFormat, SetConfig, Unit, Up,
+    Viewpoints,
 };
 use formats::scan::Attribute;
 use sim_gpu::effects::Effects;
@@ -104,7 +104,7 @@ pub struct Settings {
           value_parser = clap::value_parser!(u32).range(1..))]
     min_points: u32,
 
-    /// webdataset: tars of the noisy clouds of one sensor in place of all other files
+    /// webdataset: tars of the clouds of one sensor (noisy ones, if there is noise) in place of all other files
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     layout: Vec<Layout>,
 
@@ -121,7 +121,7 @@ impl Settings {
     }
 
     pub fn config(&self) -> anyhow::Result<DatasetConfig> {
-        let mut effects = self.effects.effects(NOISE_M)?;
+        let mut effects = self.effects.effects()?;
         let mut sets = self.sets()?;
         let mut returns = Returns::default();
         if self.format.contains(&ScanFormat::Pcap) {

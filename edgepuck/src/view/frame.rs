@@ -435,7 +435,12 @@ impl Serialize for Points {
                 Attribute::Medium => ("", "class"),
                 _ => ("", "number"),
             };
-            let names = (attribute == Attribute::Medium).then_some(&media[..]);
+            let objects = &self.scan.object_texts[0];
+            let (names, kind) = match attribute {
+                Attribute::Medium => (Some(&media[..]), kind),
+                Attribute::Object if !objects.is_empty() => (Some(&objects[..]), "class"),
+                _ => (None, kind),
+            };
             let in_order =
                 |of: &dyn Fn(usize) -> u32| order.iter().map(|i| of(*i)).collect::<Vec<_>>();
             let values = match column {

@@ -103,7 +103,10 @@ fn the_example_says_what_is_wrong() {
     std::fs::write(&cloud, "0 0 0\n1 one 1\n").unwrap();
     assert!(complaint(&[&model, &cloud]).contains("point 1 is not three numbers"));
     std::fs::write(&cloud, "").unwrap();
-    assert_eq!(complaint(&[&model, &cloud]), "the cloud has no points\n");
+    assert_eq!(
+        complaint(&[&model, &cloud]),
+        "the cloud has no points that are finite and not at 0, 0, 0\n"
+    );
     assert_eq!(run(&example, &[]).status.code(), Some(2));
 }
 

@@ -26,7 +26,8 @@ pub fn sensor_motion(motion: &Trajectory) -> Vec<Warning> {
 /// Why `motion` is probably not that of `what`, such as "the sensor", which may have to be upright.
 #[must_use]
 pub fn motion_of(what: &str, is_upright: bool, motion: &Trajectory) -> Vec<Warning> {
-    let rotation = is_upright.then(|| rotations(what, motion)).flatten();
+    let poses = motion.poses().iter().map(|(_, pose)| pose);
+    let rotation = is_upright.then(|| upside_down(what, poses)).flatten();
     speed(what, motion).into_iter().chain(rotation).collect()
 }
 
@@ -40,16 +41,17 @@ fn speed(what: &str, motion: &Trajectory) -> Option<Warning> {
     (speed_m_s > FASTEST_M_S).then_some(Warning::TooFast { what, speed_m_s, at_s })
 }
 
-fn rotations(what: &str, motion: &Trajectory) -> Option<Warning> {
+/// Whether most `poses` of `what`, which stands upright, turn it over.
+pub fn upside_down<'a>(what: &str, poses: impl IntoIterator<Item = &'a Pose>) -> Option<Warning> {
     // 0.5 is a z axis that is level, and 1 one that points down.
     const MOST: f64 = 0.6;
-    let poses = motion.poses();
-    let is_inverted = |(_, pose): &&(f64, Pose)| {
+    let (mut n, mut n_inverted) = (0, 0);
+    for pose in poses {
         let [x, y, ..] = pose.rotation.to_array();
-        x * x + y * y > MOST
-    };
-    let is_most = 2 * poses.iter().filter(is_inverted).count() > poses.len();
-    is_most.then(|| Warning::UpsideDown(what.to_owned()))
+        n += 1;
+        n_inverted += usize::from(x * x + y * y > MOST);
+    }
+    (2 * n_inverted > n).then(|| Warning::UpsideDown(what.to_owned()))
 }
 
 #[cfg(all(test, feature = "files"))]

@@ -1,6 +1,6 @@
 //! Whether points are those of one whole object.
 
-use super::sweep::length;
+use super::sweep::{is_lost, length};
 
 /// The largest distance from a line, as a share of its length, of points that are on it: f32 rounds
 /// to 6e-8.
@@ -33,13 +33,14 @@ pub enum Unlike {
 }
 
 /// Judges whether `points` can be those of one object, seen from `sensor` in any unit, and returns what
-/// they probably are instead. Points that are not finite do not count.
+/// they probably are instead. Lost returns and points that are not finite do not count.
 ///
 /// # Errors
 /// Points that are all in one place or on one line.
 pub fn judge_object(points: &[[f64; 3]], sensor: [f64; 3]) -> Result<Option<Unlike>, String> {
     let points = || {
-        let finite = points.iter().filter(|point| point.iter().all(|x| x.is_finite()));
+        let is_known = |p: &&[f64; 3]| !is_lost(**p) && p.iter().all(|x| x.is_finite());
+        let finite = points.iter().filter(is_known);
         finite.map(|point| [0, 1, 2].map(|i| point[i] - sensor[i]))
     };
     let (mut n, mut low, mut high) = (0, [f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);

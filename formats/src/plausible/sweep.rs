@@ -18,6 +18,13 @@ const NEAREST_M: f64 = 50.0;
 /// The largest step between coordinates, metres: LiDARs measure ranges to millimetres.
 const COARSEST_M: f32 = 0.005;
 
+/// Whether `point` is a lost return, as sensors and drivers write it: it is at 0, 0, 0, or no coordinate is
+/// finite.
+#[must_use]
+pub fn is_lost(point: [f64; 3]) -> bool {
+    point == [0.0; 3] || !point.iter().any(|x| x.is_finite())
+}
+
 /// Judges the points of a sweep in a file, as [`judge_sweep`] does.
 ///
 /// # Errors
@@ -31,7 +38,7 @@ pub fn check_sweep(
 }
 
 /// Judges whether `points` can be those of a sweep, metres from the sensor, and returns what
-/// speaks against it. A lost return has no finite coordinate.
+/// speaks against it. Lost returns do not count.
 ///
 /// # Errors
 /// The first point that has one or two finite coordinates, or one beyond 10 km, with the cause and

@@ -7,7 +7,7 @@ use crate::decoding::excerpt;
 use crate::error::FormatError;
 use crate::lines::{Line, Lines};
 use crate::number::{ByteOrder, NumberType};
-use crate::scan::pose_of;
+use crate::scan::{OBJECT_TEXTS, pose_of};
 
 pub(super) struct Header {
     pub encoding: Encoding,
@@ -17,12 +17,14 @@ pub(super) struct Header {
 }
 
 /// What comments of scans say of the positions.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Default)]
 pub struct Frame {
     /// An offset to add to every position: `origin X Y Z`.
     pub origin: Option<[f64; 3]>,
     /// From the sensor's frame to the world's: `pose`, and 16 numbers row by row.
     pub pose: Option<[f64; 16]>,
+    /// The objects' names and labels: their key, the index and the text.
+    pub object_texts: [Vec<String>; 2],
 }
 
 #[derive(Clone, Copy)]
@@ -125,6 +127,12 @@ pub(super) fn read_header<R: BufRead>(
             ("comment", ["pose", words @ ..]) => {
                 let pose = numbers(words).and_then(|numbers| pose_of(&numbers));
                 frame.pose = frame.pose.or(pose);
+            }
+            ("comment", [key, number, text @ ..]) if OBJECT_TEXTS.contains(key) => {
+                let texts = &mut frame.object_texts[usize::from(*key == OBJECT_TEXTS[1])];
+                if number.parse() == Ok(texts.len()) {
+                    texts.push(text.join(" "));
+                }
             }
             ("comment", _) => {}
             ("format", [word, ..]) => encoding = Some(encoding_named(&line, word)?),

@@ -39,6 +39,7 @@ pub fn read_scan(path: &Path) -> Result<Scan, FormatError> {
     };
     let mut scan = Scan { pose: frame.pose, ..Scan::default() };
     scan.origin = frame.origin.unwrap_or_default();
+    scan.object_texts = frame.object_texts;
     let positions = columns(0..3);
     scan.positions =
         positions.as_chunks().0.iter().map(|at: &[f64; 3]| at.map(|x| x as f32)).collect();

@@ -3,6 +3,7 @@ use std::sync::Arc;
 
 use edgepuck_kernels::{KernelName, Kernels};
 use formats::model_card::ModelCard;
+use formats::plausible::is_lost;
 
 use crate::classify::choose::check_finite;
 use crate::classify::load::{self, Loaded};
@@ -176,8 +177,8 @@ impl Classifier {
     /// unit sphere, only shape counts, and any unit will do.
     ///
     /// # Errors
-    /// A cloud without points; one with a coordinate that is not finite, unless
-    /// [`Options::drop_invalid`] is set; a network whose arithmetic overflows.
+    /// A cloud without points besides lost returns ([`is_lost`]), which are dropped; one with a coordinate
+    /// that is not finite, unless [`Options::drop_invalid`] is set; a network whose arithmetic overflows.
     pub fn classify(&mut self, points: &[[f32; 3]]) -> Result<&Prediction, Error> {
         self.classify_on_ground(points, None)
     }
@@ -214,7 +215,8 @@ impl Classifier {
     /// A cloud without points, or with a coordinate that is not finite.
     pub fn sample(&mut self, points: &[[f64; 3]]) -> Result<&[u32], Error> {
         check_finite(points)?;
-        self.take(points.iter().copied())?;
+        (self.finite, self.ground_z) = (points.to_vec(), None);
+        self.check_number()?;
         self.normalize();
         let Self { selection, normalized, kernels, network, scratch, .. } = self;
         let places = selection.select(normalized, kernels, &**network, scratch)?;
@@ -223,21 +225,26 @@ impl Classifier {
         Ok(&self.sampled)
     }
 
-    /// Stores the finite points of `points`.
+    /// Stores the points of `points` that are no lost returns.
     fn take(&mut self, points: impl Iterator<Item = [f64; 3]>) -> Result<(), Error> {
         self.finite.clear();
         self.ground_z = None;
         self.prediction.n_dropped = 0;
         for (index, point) in points.enumerate() {
-            if point.iter().all(|x| x.is_finite()) {
-                self.finite.push(point);
-            } else if self.options.drop_invalid {
+            let is_finite = point.iter().all(|x| x.is_finite());
+            if is_lost(point) || !is_finite && self.options.drop_invalid {
                 self.prediction.n_dropped += 1;
+            } else if is_finite {
+                self.finite.push(point);
             } else {
                 return Err(Error::NotFinite { index, point });
             }
         }
         self.prediction.n_points = self.finite.len();
+        self.check_number()
+    }
+
+    fn check_number(&self) -> Result<(), Error> {
         match self.finite.len() {
             0 => Err(Error::NoPoints),
             n if u32::try_from(n).is_err() => Err(Error::TooManyPoints(n)),

@@ -21,9 +21,9 @@ pub struct Prediction {
     pub is_unknown: bool,
     /// The outputs of the network, one per class.
     pub logits: Vec<f32>,
-    /// The number of points of the cloud that are finite.
+    /// The number of points of the cloud that were not dropped.
     pub n_points: usize,
-    /// The number of points that were dropped because a coordinate was not finite.
+    /// The number of points that were dropped: lost returns, and those with a coordinate that is not finite.
     pub n_dropped: usize,
     /// The number of points that the network processed: those that the sampler kept, each once.
     pub n_used: usize,

@@ -66,7 +66,8 @@ pub struct ClassifyArgs {
     #[command(flatten)]
     model: ModelArgs,
 
-    /// Drop points with NaN or infinite coordinates instead of rejecting the cloud
+    /// Drop points with NaN or infinite coordinates instead of rejecting the cloud; lost returns (0, 0, 0
+    /// or no finite coordinate) are always dropped
     #[arg(long)]
     drop_invalid: bool,
 

@@ -87,8 +87,7 @@ fn warn(name: &Path, prediction: &Prediction, precision: Precision) {
     let warn = |what: &str| say(format!("warning: {}: {what}", name.display()));
     match prediction.n_dropped {
         0 => {}
-        1 => warn("1 point that is not finite was dropped"),
-        n => warn(&format!("{n} points that are not finite were dropped")),
+        n => warn(&format!("dropped {n} lost returns: points at 0, 0, 0 or not finite")),
     }
     if prediction.n_clipped > 0 {
         let n = prediction.n_clipped;

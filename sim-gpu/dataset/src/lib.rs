@@ -65,7 +65,7 @@ pub use plan::{Begin, Plan};
 pub use progress::{Progress, Stage};
 pub use publish::{Publication, publish};
 pub use record::{Entry, FileRecord, MeshFailure, MeshRecord, ScanRecord, VariantRecord};
-pub use settings::{Around, NOISE_M, noisy, read_effects};
+pub use settings::{Around, noisy, read_effects};
 pub use tars::{Cut, HandOver, PartManifest, PartRecord, Sample, TarRecord, Tars, make_tars};
 pub use verify::{Problem, Report, verify};
 

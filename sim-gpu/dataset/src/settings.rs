@@ -13,18 +13,12 @@ use sim_gpu::sensors::{Layout, SensorProfile};
 use sim_gpu::settings;
 use std::path::Path;
 
-/// The standard deviation of the noise of `gen-dataset` by default, metres: BLAINDER's default.
-pub const NOISE_M: f64 = 0.01;
-
-/// The dataset that `gen-dataset` makes by default: clean and noisy scans of a VLP-32C and of a static
-/// sensor.
+/// The dataset that `gen-dataset` makes by default: clean scans of a VLP-32C and of a static sensor.
 impl Default for DatasetConfig {
     fn default() -> Self {
         let set = |sensor| SetConfig::of(sensor).expect("invariant: the sensor is built in");
         let sets = ["vlp32c", "generic-static"].map(set).into();
-        let effects = noisy(NOISE_M, 0.0).expect("invariant: the noise is within its bounds");
-        let config = Self { effects, ..Self::new(sets) };
-        config.checked().expect("invariant: noise fits any sensor")
+        Self::new(sets).checked().expect("invariant: no effect fits any sensor")
     }
 }
 

@@ -165,6 +165,25 @@ impl Scene {
         &self.instances
     }
 
+    /// The names of the instances for those who read scans, each that of the instance, or its label or
+    /// number; and their labels, or empty texts. Both are empty if no instance has one.
+    #[must_use]
+    pub fn object_texts(&self) -> [Vec<String>; 2] {
+        let all = || self.instances.iter().enumerate();
+        let line = |text: String| text.replace(['\n', '\r'], " ");
+        let label = |(_, of): (_, &Instance)| line(of.label.clone().unwrap_or_default());
+        let name = |(i, of): (usize, &Instance)| {
+            let known = of.name.clone().or_else(|| of.label.clone());
+            line(known.unwrap_or_else(|| i.to_string()))
+        };
+        let has_labels = all().any(|(_, of)| of.label.is_some());
+        let has_names = has_labels || all().any(|(_, of)| of.name.is_some());
+        [
+            all().filter(|_| has_names).map(name).collect(),
+            all().filter(|_| has_labels).map(label).collect(),
+        ]
+    }
+
     /// What is probably wrong with the files of its meshes, each warning once with the file, and with
     /// the trajectories of its file.
     #[must_use]

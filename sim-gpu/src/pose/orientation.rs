@@ -21,7 +21,7 @@ pub(crate) struct PoseKeys {
     pub pitch_deg: Option<f64>,
     /// Angle about x, applied first.
     pub roll_deg: Option<f64>,
-    /// A quaternion of any length but 0, instead of the angles.
+    /// A quaternion of length 1, instead of the angles.
     pub quaternion_xyzw: Option<[f64; 4]>,
 }
 
@@ -88,11 +88,6 @@ fn all_finite<const N: usize>(key: &str, values: [f64; N]) -> Result<[f64; N], I
 }
 
 fn quaternion(key: &str, xyzw: [f64; 4]) -> Result<DQuat, InvalidValue> {
-    let largest =
-        all_finite(key, xyzw)?.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
-    if largest == 0.0 {
-        return Err(InvalidValue::new(key, "expected a rotation, found 0"));
-    }
-    // Scaled first, so that squares neither overflow nor vanish.
-    Ok(DQuat::from_array(xyzw.map(|value| value / largest)).normalize())
+    let pose = Pose::rigid([0.0; 3], all_finite(key, xyzw)?);
+    pose.map(|pose| pose.rotation).map_err(|invalid| InvalidValue::new(key, invalid.cause))
 }

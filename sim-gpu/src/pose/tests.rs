@@ -23,7 +23,7 @@ fn all_three_ways_state_the_same_orientation() {
         "[[pose]]\nposition_m = [0, 0, 3]\nlook_at_m = [3, 0, 0]\n\
          [[pose]]\nposition_m = [0, 0, 3]\nyaw_deg = 0\npitch_deg = 45\n\
          [[pose]]\nposition_m = [0, 0, 3]\n\
-         quaternion_xyzw = [0, 0.7653668647301796, 0, 1.8477590650225735]\n",
+         quaternion_xyzw = [0, 0.3826834323650898, 0, 0.9238795325112867]\n",
     )
     .unwrap();
     let first = axes(&poses[0]);
@@ -50,7 +50,10 @@ fn bad_poses_are_named() {
     for (keys, part) in [
         ("look_at_m = [1, 2, 3]", "pose[0].look_at_m: expected another point"),
         ("look_at_m = [1, 2, nan]", "pose[0].look_at_m"),
-        ("quaternion_xyzw = [0, 0, 0, 0]", "pose[0].quaternion_xyzw: expected a rotation"),
+        (
+            "quaternion_xyzw = [0, 0, 0, 0]",
+            "pose[0].quaternion_xyzw: expected a quaternion of length 1",
+        ),
         ("quaternion_xyzw = [0, 0, inf, 0]", "pose[0].quaternion_xyzw"),
         ("yaw_deg = nan", "pose[0].yaw_deg"),
         (

@@ -4,7 +4,7 @@ use anyhow::{Context, Error, ensure};
 use clap::value_parser;
 use formats::atomic;
 use formats::cloud_file::{Cloud, read_cloud_as};
-use formats::plausible::{Unlike, judge_object};
+use formats::plausible::{Unlike, is_lost, judge_object};
 use infer_cpu::sampler::{SamplerKind, SamplerSpec};
 use infer_cpu::{Classifier, Normalization, Options};
 use program::outcome::say;
@@ -82,7 +82,8 @@ pub fn run(args: &ExplainArgs) -> anyhow::Result<()> {
 }
 
 fn read_finite(path: &Path) -> anyhow::Result<Cloud> {
-    let cloud = read_cloud_as(path, None)?;
+    let mut cloud = read_cloud_as(path, None)?;
+    cloud.points.retain(|point| !is_lost(*point));
     ensure!(!cloud.points.is_empty(), "{}: expected points, found none", path.display());
     let bad = cloud.points.iter().position(|point| !point.iter().all(|x| x.is_finite()));
     if let Some(i) = bad {

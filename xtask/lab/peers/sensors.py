@@ -168,7 +168,7 @@ def simulated(turn, found, sensor, sigma_m, seed):
         vertices.append(corners * range_m[:, None])
     faces = 4 * np.arange(len(vertices))[:, None, None] + [[0, 1, 2], [0, 2, 3]]
     scene = ep.Scene()
-    scene.add(ep.Mesh(np.concatenate(vertices), faces.reshape(-1, 3), normalize="none"))
+    scene.add(ep.Mesh(np.concatenate(vertices), faces.reshape(-1, 3)))
     scan = scene.scan(sensor, pose=np.eye(4), noise=sigma_m, seed=seed, attributes=["ring"])
     return scan.positions.astype(float), scan.ring
 

@@ -1,4 +1,4 @@
-//! The whole way to disk: the default dataset, as `gen-dataset` makes it, in a
+//! The whole way to disk: the default dataset with noise, as `gen-dataset --noise 0.01` makes it, in a
 //! folder that is removed again.
 
 use crate::measure::backends::{Backend, short};
@@ -36,7 +36,8 @@ pub fn measure(
     rounds: usize,
 ) -> Result<Vec<Dataset>> {
     let meshes = some_of(root, limit)?;
-    let config = DatasetConfig::default();
+    let effects = edgepuck_dataset::noisy(0.01, 0.0)?;
+    let config = DatasetConfig { effects, ..DatasetConfig::default() }.checked()?;
     let mut datasets = Vec::new();
     for backend in backends {
         let caster = Caster::named(backend.name())?;
