@@ -50,11 +50,25 @@ def place(
     return _poses.one("pose", pose)
 
 
+# The effects that have keys of their own.
+_KEYS = {
+    "noise": "{'sigma_m': 0.01}, or the argument noise",
+    "dropout": "{'probability': 0.1}, or the argument dropout",
+    "detection": "{'reflectivity': 0.1, 'range_m': 200}",
+    "footprint": "{'samples': 7}",
+    "weather": "{'rain_mm_h': 20}",
+    "motion": "{'velocity_m_s': [10, 0, 0]}",
+}
+
+
 def encoded(noise: float, dropout: float, effects: Mapping[str, Any] | None) -> str | None:
     """The effects that these ask for, in JSON; `None` if nothing is asked for."""
     if effects is not None and not isinstance(effects, Mapping):
         raise _edgepuck.Error(f"effects: expected a dict, found {effects!r}")
     wanted: dict[str, Any] = dict(effects or {})
+    for name, example in _KEYS.items():
+        if name in wanted and not isinstance(wanted[name], Mapping):
+            raise _edgepuck.Error(f"effects.{name}: expected a dict, such as {example}, found {wanted[name]!r}")
     for name, given in [("noise", noise != 0), ("dropout", dropout != 0)]:
         if given and name in wanted:
             raise _edgepuck.Error(f"{name}: expected it once, found it in effects as well")

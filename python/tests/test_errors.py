@@ -152,6 +152,8 @@ def test_the_fields_x_y_and_z_are_points() -> None:
         ({"dropout": 2}, "probability"),
         ({"attributes": ["colour"]}, "colour"),
         ({"effects": {"mist": 1}}, "mist"),
+        ({"effects": {"noise": 0.01}}, "effects.noise: expected a dict, such as {'sigma_m': 0.01}, or the argument noise, found 0.01"),
+        ({"effects": {"footprint": 7}}, "effects.footprint: expected a dict, such as {'samples': 7}, found 7"),
         ({"effects": {"footprint": {"samples": 5}}}, "samples"),
         ({"pose": np.eye(3)}, "shape"),
         ({"pose": [3, 0, 0]}, "pose: expected shape [4, 4] or [7], found [3]; seven are x, y, z and a quaternion x, y, z, w"),

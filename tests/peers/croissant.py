@@ -16,7 +16,7 @@ with skipped_if_missing():
     import datasets
     import mlcroissant
 
-FLAGS = ["--sensor", "vlp32c", "--points", "128", "--adapter", "cpu", "--attributes", "ring,normal"]
+FLAGS = ["--sensor", "vlp32c", "--points", "128", "--adapter", "cpu", "--noise", "0.01", "--attributes", "ring,normal"]
 PUBLICATION = ["--name", "Some shapes", "--license", "MIT", "--url", "https://example.org/shapes",
                "--creator", "Ada", "--published", "2026-11-25"]
 

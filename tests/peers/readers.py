@@ -38,7 +38,7 @@ def write_meshes():
 
 def write_dataset():
     run(EDGEPUCK, "gen-dataset", OUT / "meshes", "--out", OUT / "set", "--sensor", "vlp32c",
-        "--views", 2, "--points", N_POINTS, "--format", "ply,csv", "--attributes",
+        "--views", 2, "--points", N_POINTS, "--noise", 0.01, "--format", "ply,csv", "--attributes",
         ",".join(COLUMNS), "--adapter", "cpu")
 
 

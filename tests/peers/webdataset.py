@@ -18,7 +18,7 @@ with skipped_if_missing():
     import webdataset
 
 FLAGS = ["--layout", "webdataset", "--sensor", "vlp32c", "--views", "8", "--points", "128",
-         "--adapter", "cpu", "--azimuth-jitter", "180"]
+         "--adapter", "cpu", "--azimuth-jitter", "180", "--noise", "0.01"]
 
 
 def arrays(npz):
