@@ -27,7 +27,7 @@ def job_file(name, parts, words):
     page = (ROOT / "docs/src/many-machines.md").read_text()
     (file,) = re.findall(rf"^cat > {re.escape(name)} <<'JOB'\n(.*?)^JOB$", page, re.DOTALL | re.MULTILINE)
     for shown, wanted in (("0-63", f"0-{parts - 1}"), ("auto/64", f"auto/{parts}"),
-                          ("meshes --layout webdataset --sensor vlp32c --out lidar", " ".join(map(str, words)))):
+                          ("meshes --layout webdataset --sensor vlp32c --noise 0.01 --out lidar", " ".join(map(str, words)))):
         file = file.replace(shown, wanted)
     return re.sub(r"(completions|parallelism): 64", rf"\1: {parts}", file)
 
