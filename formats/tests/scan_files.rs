@@ -131,7 +131,9 @@ proptest! {
 fn a_scan_without_points_comes_back_and_a_distant_one_keeps_its_micrometres_and_pose() {
     // A quarter turn about z, then a step.
     let turned = [0., -1., 0., 4., 1., 0., 0., 1e7, 0., 0., 1., 0.1, 0., 0., 0., 1.];
-    let far = Scan { origin: [1e7, -1e7 + 1e-6, 0.0], pose: Some(turned), ..scan(3, 0) };
+    let object_texts = [vec!["near chair".to_owned(), "b".to_owned()], vec![String::new(); 2]];
+    let origin = [1e7, -1e7 + 1e-6, 0.0];
+    let far = Scan { origin, pose: Some(turned), object_texts, ..scan(3, 0) };
     assert_eq!(far.sensor_position_m(), [4.0, 1e7, 0.1]);
     for format in [ScanFormat::Npz, ScanFormat::Ply] {
         assert_eq!(there_and_back(&scan(0, 0xffff), format), scan(0, 0xffff), "{format}");

@@ -67,7 +67,7 @@ def encoded(noise: float, dropout: float, effects: Mapping[str, Any] | None) -> 
         raise _edgepuck.Error(f"effects: expected a dict, found {effects!r}")
     wanted: dict[str, Any] = dict(effects or {})
     for name, example in _KEYS.items():
-        if name in wanted and not isinstance(wanted[name], Mapping):
+        if isinstance(wanted.get(name), (int, float)) and not isinstance(wanted[name], bool):
             raise _edgepuck.Error(f"effects.{name}: expected a dict, such as {example}, found {wanted[name]!r}")
     for name, given in [("noise", noise != 0), ("dropout", dropout != 0)]:
         if given and name in wanted:

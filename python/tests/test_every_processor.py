@@ -25,7 +25,7 @@ TOLERANCES = {"f32": 1e-5, "i8": 1 / 127}
 @pytest.fixture(scope="module")
 def computed(shapes: Path) -> dict[str, dict]:
     """What an x86-64 would write into the golden file."""
-    lidar, mesh = ep.Sensor("vlp32c"), ep.Mesh(*ep.box((1, 2, 0.5)))
+    lidar, mesh = ep.Sensor("vlp32c"), ep.Mesh(*ep.box((1, 2, 0.5)), normalize="unit-sphere")
     effects = {"weather": {"rain_mm_h": 25}, "footprint": {"samples": 7}, "returns": "dual"}
     scan = lidar.scan(mesh, distance=3, elevation=20, noise=0.01, seed=7)
     scene = ep.Scenes("yard", seed=3)[0]

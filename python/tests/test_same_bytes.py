@@ -77,5 +77,7 @@ def assert_same(scan: ep.Scan, file: Path) -> None:
     assert set(columns.files) >= {"positions"}
     for name in columns.files:
         found = getattr(scan, names.get(name, name))
+        if name.startswith("object_"):
+            found = np.frombuffer("\n".join(found).encode(), np.uint8)
         # Files have a column of shape [n, 1].
         np.testing.assert_array_equal(found, columns[name].reshape(found.shape), err_msg=name)
