@@ -133,7 +133,10 @@ def points_of(cloud: Any) -> NDArray[np.float32]:
         if missing:
             raise _edgepuck.Error(f"expected fields x, y and z, found {list(points.dtype.names)}")
         points = np.stack([points[axis] for axis in "xyz"], axis=-1)
-    points = np.asarray(points, dtype=np.float32)
+    try:
+        points = np.asarray(points, dtype=np.float32)
+    except (TypeError, ValueError):
+        raise _edgepuck.Error(f"expected points of shape [n, 3], found {type(cloud).__name__}") from None
     if points.ndim != 2 or points.shape[1] < 3 or (points.shape[0] == 3 and points.shape[1] > 32):
         way_out = ": transpose it" if points.ndim == 2 and points.shape[0] == 3 else ""
         raise _edgepuck.Error(f"expected points of shape [n, 3], found {list(points.shape)}{way_out}")

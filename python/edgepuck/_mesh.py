@@ -155,7 +155,7 @@ def unit_of(units: Unit | None, source: Any) -> tuple[Unit | None, float, float]
             raise _edgepuck.Error(f"units: expected one of m, mm, cm, in, ft, found {units!r}")
         return units, 1.0, _METRES[units]
     if len(stated) > 1:
-        raise _edgepuck.Error(f"units: expected one unit of all geometries, found {', '.join(map(str, stated))}: name it")
+        raise _edgepuck.Error(f"units: expected one unit of all geometries, found {', '.join(map(str, stated))}: name one")
     name = str(stated[0]).lower() if stated and stated[0] is not None else None
     if name is None:
         return None, 1.0, 1.0

@@ -434,7 +434,7 @@ _OTHERS = {
 }
 _MJCF = "is a model of MuJoCo: `edgepuck.mujoco.Lidar(mujoco.MjModel.from_xml_path({file!r}))` scans it"
 _ROBOT = "is a robot in URDF: name it .urdf"
-_XML = "is XML: expected a robot in URDF, or MuJoCo's model, of which `edgepuck.mujoco.Lidar` scans"
+_XML = "is XML of another kind"
 
 
 def _refuse_others(file: str | os.PathLike[str]) -> None:

@@ -276,7 +276,7 @@ def test_names_and_labels_of_objects_stay_with_their_points(tmp_path: Path) -> N
         ("a.xacro", "<robot>", "is to be expanded first: `xacro "),
         ("a.xml", "<?xml version='1.0'?>\n<mujoco model='a'/>", "is a model of MuJoCo: `edgepuck.mujoco.Lidar("),
         ("a.xml", "<robot name='a'/>", "is a robot in URDF: name it .urdf"),
-        ("a.xml", "<svg/>", "is XML: expected a robot in URDF"),
+        ("a.xml", "<svg/>", "is XML of another kind"),
         ("a.npz", "", "has points: `Scan.read("),
     ],
 )
