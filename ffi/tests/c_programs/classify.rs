@@ -10,7 +10,7 @@ use crate::compiler::{Compiler, static_link};
 use crate::{assert_program_succeeds, model, run, street, text};
 
 /// A cloud whose longest axis is y; the last line has the largest x.
-const CLOUD: &str = "0 0 0\n0.5 0.25 0.125\n0.1 0.75 0.2\n\n  1e-1\t0.9 .3\n";
+const CLOUD: &str = "0 0 0.01\n0.5 0.25 0.125\n0.1 0.75 0.2\n\n  1e-1\t0.9 .3\n";
 
 #[test]
 fn the_example_gives_what_the_rust_library_gives() {

@@ -6,9 +6,9 @@ use crate::tiny_model;
 #[test]
 fn points_that_are_not_finite_are_dropped_if_asked() {
     let folder = Folder::new();
-    folder.write("clean.xyz", "0 0 0\n1 2 3\n7 8 10\n");
+    folder.write("clean.xyz", "5 0 0\n1 2 3\n7 8 10\n");
     for word in ["nan", "inf", "-inf"] {
-        folder.write("c.xyz", format!("0 0 0\n1 2 3\n4 {word} 6\n7 8 10\n{word} 0 0\n"));
+        folder.write("c.xyz", format!("5 0 0\n1 2 3\n4 {word} 6\n7 8 10\n{word} 0 0\n"));
         let found = &folder.classify_json("--drop-invalid c.xyz")[0];
         assert_eq!((&found["points"], &found["dropped"]), (&3.into(), &2.into()));
         assert_eq!(found["logits"], folder.classify_json("clean.xyz")[0]["logits"]);
