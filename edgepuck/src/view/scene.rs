@@ -69,7 +69,8 @@ fn joined(scene: &Scene, scans: &[Scan], origin: [f64; 3]) -> Points {
     let names = scene.instances().iter().enumerate().map(name).collect();
     let mut object = Labels { name: "object", values: Vec::new(), names: Some(names) };
     let pose = scans.first().and_then(|scan| scan.pose);
-    let mut all = formats::Scan { origin, pose, ..formats::Scan::default() };
+    let object_texts = scene.object_texts();
+    let mut all = formats::Scan { origin, pose, object_texts, ..formats::Scan::default() };
     for (scan, number) in scans.iter().zip(0..) {
         let shift = [0, 1, 2].map(|axis| (scan.origin[axis] - origin[axis]) as f32);
         let place = |at: &[f32; 3]| [0, 1, 2].map(|axis| at[axis] + shift[axis]);
