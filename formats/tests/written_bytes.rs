@@ -21,6 +21,7 @@ pub fn scan(n: usize, origin: [f64; 3]) -> Scan {
         time_s: real(2.304e-6),
         triangle: whole(1 << 31),
         object: whole(0),
+        object_texts: Default::default(),
         intensity: real(0.01),
         power: real(1e-3),
         reflectivity: Some((0..n).map(|i| i as u8).collect()),
