@@ -155,7 +155,8 @@ mod tests {
         let floor = grid(60).map(|[x, y]| [bent(x), bent(y), -1.5]);
         for (points, expected) in [
             (vec![[1.0, 2.0, 3.0]], Err("found 1 in one place, [1.0, 2.0, 3.0]")),
-            (vec![[0.0; 3], [0.0; 3], [f64::NAN; 3]], Err("found 2 in one place")),
+            (vec![[4.0; 3], [4.0; 3], [f64::NAN; 3], [0.0; 3]], Err("found 2 in one place")),
+            (vec![[0.0; 3]; 9], Ok(None)),
             (vec![], Ok(None)),
             (vec![[-0.5; 3], [0.5; 3]], Err("found 2 on one line")),
             (
