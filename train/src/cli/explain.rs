@@ -83,11 +83,11 @@ pub fn run(args: &ExplainArgs) -> anyhow::Result<()> {
 
 fn read_finite(path: &Path) -> anyhow::Result<Cloud> {
     let mut cloud = read_cloud_as(path, None)?;
-    cloud.points.retain(|point| !is_lost(*point));
-    ensure!(!cloud.points.is_empty(), "{}: expected points, found none", path.display());
-    let bad = cloud.points.iter().position(|point| !point.iter().all(|x| x.is_finite()));
-    if let Some(i) = bad {
+    let is_bad = |p: &[f64; 3]| !is_lost(*p) && !p.iter().all(|x| x.is_finite());
+    if let Some(i) = cloud.points.iter().position(is_bad) {
         anyhow::bail!("{}: point {i} is not finite", path.display());
     }
+    cloud.points.retain(|point| !is_lost(*point));
+    ensure!(!cloud.points.is_empty(), "{}: expected points, found none", path.display());
     Ok(cloud)
 }
