@@ -230,7 +230,7 @@ fn folder(folder: &Path, points: &PointsArgs) -> anyhow::Result<Vec<Frame>> {
                 frames.push(Frame { name, turn: Some(number), ..frame });
             }
             Err(error) if number + 1 == n_files as u64 && frames.is_empty() => return Err(error),
-            Err(error) => program::say!("warning: {name} is left out: {error:#}"),
+            Err(error) => program::say!("warning: a file is left out: {error:#}"),
         }
         // So many that memory holds them.
         if n_points > 3 * MOST_POINTS || frames.len() >= MOST_FRAMES {
