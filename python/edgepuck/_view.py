@@ -120,11 +120,8 @@ def _points(shown: Any) -> NDArray[Any]:
 
 def _save_scene(scene: Scene, place: Path) -> str:
     """The file of a scene: its own, or one in the folder `place` of what was added to it."""
-    # The poses of all that was added or moved: 16 or 7 numbers, of which the quaternion is x, y, z, w in scenes
-    # that have `_moved`.
-    moved: Any = vars(scene).get("_moved", vars(scene).get("_poses"))
     if scene._file is not None and not scene._added:
-        if moved:
+        if scene._moved:
             warnings.warn(
                 f"{scene._file[0]}: shown as the file has it, without what moved",
                 stacklevel=4,
@@ -145,7 +142,7 @@ def _save_scene(scene: Scene, place: Path) -> str:
     accessors: list[Any] = []
     data = b""
     for number, (mesh, (scale, name, label, *_)) in enumerate(scene._added, first):
-        rotation, position = _rigid(moved[number], "_moved" in vars(scene))
+        rotation, position = _rigid(scene._moved[number])
         x, y, z = ((mesh.vertices * scale) @ rotation.T + position).astype(np.float32).T
         # The y axis of glTF points up.
         corners = np.column_stack([x, z, -y])
@@ -187,13 +184,13 @@ def _save_scene(scene: Scene, place: Path) -> str:
     return os.fspath(file)
 
 
-def _rigid(rows: Sequence[float], w_is_last: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The rotation and the position of a pose of a scene: 16 or 7 numbers."""
+def _rigid(rows: Sequence[float]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The rotation and the position of a pose of a scene: a matrix, or x, y, z and a quaternion x, y, z, w."""
     if len(rows) == 16:
         matrix = np.array(rows).reshape(4, 4)
         return matrix[:3, :3], matrix[:3, 3]
     x, y, z, *quaternion = rows
-    w, a, b, c = np.roll(quaternion, int(w_is_last)) / np.linalg.norm(quaternion)
+    w, a, b, c = np.roll(quaternion, 1) / np.linalg.norm(quaternion)
     skew = np.array([[0, -c, b], [c, 0, -a], [-b, a, 0]])
     return np.eye(3) + 2 * w * skew + 2 * skew @ skew, np.array([x, y, z])
 

@@ -22,7 +22,7 @@ export function classColour(name) {
   return known ? rgb(known) : numberColour(new TextEncoder().encode(name).reduce(mix, 0x811c9dc5));
 }
 
-export const nameOf = ({ names }, value) => names?.[value] ?? (value === 0xffffffff ? "air" : `${value}`);
+export const nameOf = ({ names }, value) => names?.[value] || (value === 0xffffffff ? "air" : `${value}`);
 
 /** How a column's values become colours, by `look`: from `low` to `high`, or each of `entries` its own. */
 export const scaleOf = (column, span) => (column.kind === "number" ? rampOf(span) : entriesOf(column));

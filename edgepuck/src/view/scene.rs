@@ -65,9 +65,6 @@ fn origin_of(scene: &Scene) -> [f64; 3] {
 fn joined(scene: &Scene, scans: &[Scan], origin: [f64; 3]) -> Points {
     let names = scene.sensors.iter().map(|mounted| mounted.name.clone()).collect();
     let mut sensor = Labels { name: "sensor", values: Vec::new(), names: Some(names) };
-    let name = |(i, of): (usize, &Instance)| of.name.clone().unwrap_or_else(|| i.to_string());
-    let names = scene.instances().iter().enumerate().map(name).collect();
-    let mut object = Labels { name: "object", values: Vec::new(), names: Some(names) };
     let pose = scans.first().and_then(|scan| scan.pose);
     let object_texts = scene.object_texts();
     let mut all = formats::Scan { origin, pose, object_texts, ..formats::Scan::default() };
@@ -77,11 +74,11 @@ fn joined(scene: &Scene, scans: &[Scan], origin: [f64; 3]) -> Points {
         all.positions.extend(scan.positions.iter().map(place));
         append(&mut all.range_m, &scan.range_m);
         append(&mut all.ring, &scan.ring);
-        object.values.extend(scan.object.iter().flatten());
+        append(&mut all.object, &scan.object);
         append(&mut all.intensity, &scan.intensity);
         sensor.values.resize(all.positions.len(), number);
     }
-    let labels = if scans.len() > 1 { vec![object, sensor] } else { vec![object] };
+    let labels = if scans.len() > 1 { vec![sensor] } else { Vec::new() };
     Points { scan: all, labels }
 }
 
