@@ -2,7 +2,7 @@
 
 use crate::{
     Outcome, adapters, calibrate, corrupt, gen_dataset, gen_scenes, merge_dataset, outcome,
-    profile, scan, signals, view,
+    profile, scan, signals, threads, view,
 };
 #[cfg(feature = "models")]
 use crate::{advise, detect};
@@ -75,6 +75,7 @@ fn by_task(command: clap::Command) -> clap::Command {
         }
         list.push('\n');
     }
+    list += outcome::EXIT_CODES;
     let template =
         "{about-with-newline}\n{usage-heading} {usage}{after-help}\n\nOptions:\n{options}";
     command.help_template(template).after_help(list)
@@ -118,7 +119,15 @@ fn run_as_program(command: &Command) -> anyhow::Result<Outcome> {
         // `live` ends with the objects of the last packets.
         #[cfg(feature = "models")]
         Command::Infer(infer_cpu::cli::Command::Live(_)) => {}
-        _ => signals::handle()?,
+        // Their threads are their own, of which `--threads` says how many there are.
+        #[cfg(feature = "models")]
+        Command::Infer(_) => signals::handle()?,
+        Command::Profile(_) => signals::handle()?,
+        _ => {
+            signals::handle()?;
+            // Data sets are made with two more for each.
+            threads::start(if let Command::GenDataset(_) = command { 2 } else { 0 })?;
+        }
     }
     run(command)
 }

@@ -32,6 +32,7 @@ mod shell;
 mod signals;
 #[cfg_attr(not(feature = "models"), allow(dead_code, reason = "`detect` uses the rest"))]
 mod street;
+mod threads;
 mod view;
 
 pub use program::outcome::{self, Outcome, Usage};

@@ -2,8 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use edgepuck_segment::other_axis_up;
 use formats::cloud_file::CloudFormat;
-use formats::plausible::{Warning, check_sweep, coarse_coordinates};
+use formats::plausible::{Warning, check_sweep, coarse_coordinates, judge_surroundings};
 use formats::points_file::{PointsReader, unread_packets};
 use formats::{ChosenSender, FormatError, Scan, Senders, pcap};
 
@@ -82,7 +83,7 @@ impl SweepArgs {
     #[cfg(feature = "models")]
     pub fn read_upright(&self) -> Result<Scan, FormatError> {
         let scan = self.read()?;
-        self.warn(edgepuck_segment::other_axis_up(&scan.positions));
+        self.warn_of_frame(&scan.positions);
         Ok(scan)
     }
 
@@ -102,6 +103,11 @@ impl SweepArgs {
         self.warn(check_sweep(self.relative(&scan), &self.sweep, remedy)?);
         self.warn(coarse_coordinates(points_from(&scan, [0.0; 3])));
         Ok(scan)
+    }
+
+    /// Prints whether `points`, metres from the sensor, are probably not around it, or z does not point up.
+    pub fn warn_of_frame(&self, points: &[[f32; 3]]) {
+        self.warn(judge_surroundings(points, || other_axis_up(points)));
     }
 
     /// Prints what is probably wrong with the sweep.

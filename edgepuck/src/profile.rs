@@ -46,6 +46,7 @@ pub fn run(args: &ProfileArgs) -> anyhow::Result<Outcome> {
     }
     if let Some(file) = &args.beams {
         atomic::write_bytes(file, beams(&pattern))?;
+        program::say!("{} beams: {}", pattern.len(), file.display());
     }
     Ok(Outcome::Success)
 }

@@ -114,7 +114,7 @@ impl MeshArgs {
 }
 
 pub fn run(args: &Args) -> anyhow::Result<Outcome> {
-    let format = ScanFormat::of_path(&args.out)?;
+    let format = ScanFormat::of_path(&args.out).map_err(|error| Usage(error.to_string()))?;
     let (mut scene, what) = scene(args)?;
     scene.warnings().iter().for_each(|warning| program::say!("warning: {warning}"));
     let mut returns = Returns::default();
@@ -155,10 +155,13 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         program::say!("{sensor}: {}: {}", summary(&scene, scan), file.display());
     }
     if scans.iter().all(|scan| scan.is_empty()) {
-        program::say!(
-            "warning: no beam returned a point: expected an object in the sensor's range and view, \
-             larger than the gaps between beams, and not seen edge-on"
-        );
+        let too_far = scene.sensors.iter().find_map(|mounted| too_far(&scene, mounted));
+        let why = too_far.unwrap_or_else(|| {
+            "expected an object in the sensor's range and view, larger than the gaps between beams, \
+             and not seen edge-on"
+                .to_owned()
+        });
+        program::say!("warning: no beam returned a point: {why}");
         return Ok(Outcome::SomeRefused);
     }
     Ok(Outcome::Success)
@@ -214,6 +217,10 @@ fn scene(args: &Args) -> anyhow::Result<(Scene, String)> {
 /// The meshes where their files have them, and a sensor that looks at their middle.
 fn scene_of_meshes(args: &Args) -> anyhow::Result<Scene> {
     let unit = args.meshes.units.unwrap_or_default();
+    let is_scaled = args.meshes.normalize.is_some_and(|it| it != Normalize::None);
+    let cause =
+        "--units: expected meshes that keep their size (--normalize none), since others are scaled";
+    ensure!(!is_scaled || args.meshes.units.is_none(), Usage(cause.to_owned()));
     let mut scene = Scene::new();
     scene.seed = args.meshes.seed.unwrap_or_default();
     scene.attributes.insert(Attribute::Intensity);
@@ -290,9 +297,23 @@ fn tell_objects(scene: &Scene) {
     }
 }
 
+/// Why a sensor sees nothing, if all objects are beyond its range.
+fn too_far(scene: &Scene, mounted: &MountedSensor) -> Option<String> {
+    let at_m = mounted.motion.as_ref().map_or(mounted.pose, |it| it.at(mounted.start_s)).position_m;
+    let nearest = scene.instances().iter().map(|it| it.extent().distance_m(at_m));
+    let (nearest_m, most_m) = (nearest.reduce(f64::min)?, mounted.sensor.profile().range.max_m);
+    let name = &mounted.name;
+    (nearest_m > most_m).then(|| {
+        format!("the nearest object is {nearest_m:.1} m from {name}, which sees {most_m} m far")
+    })
+}
+
 /// The number of points of `scan`, and what became of the other returns.
 fn summary(scene: &Scene, scan: &Scan) -> String {
     let (tally, effects) = (&scan.tally, &scene.effects);
+    if tally.points + tally.out_of_range + tally.dropped + tally.undetected == 0 {
+        return "no points: no beam met an object".to_owned();
+    }
     let of_the_air = effects.weather.as_ref().map(|_| format!("{} of the air, ", tally.scattered));
     let can_be_missed = effects.detection.is_some() || effects.weather.is_some();
     let undetected = can_be_missed.then(|| format!("{} undetected, ", tally.undetected));

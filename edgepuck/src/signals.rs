@@ -1,5 +1,6 @@
 //! What SIGINT and SIGTERM do to the program.
 
+use crate::threads;
 use edgepuck_dataset::Progress;
 use formats::atomic;
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -10,6 +11,9 @@ use std::time::Duration;
 
 /// The flags of a run that can be resumed: to stop it, and whether that comes too late.
 type Flags = (Arc<AtomicBool>, Arc<AtomicBool>);
+
+/// Bytes that a thread needs to end the program.
+const STACK: usize = 1 << 18;
 
 /// The flags of the run at work.
 static RUN: Mutex<Option<Flags>> = Mutex::new(None);
@@ -30,12 +34,12 @@ pub fn stop<T>(run: &Progress, work: impl FnOnce() -> T) -> T {
 /// Ends the program at SIGINT and SIGTERM, without the files that it has not finished. Of a run that
 /// can be resumed, they end the scanning. There, a second Ctrl-C ends the program immediately;
 /// schedulers may repeat SIGTERM.
-pub fn handle() -> std::io::Result<()> {
+pub fn handle() -> anyhow::Result<()> {
     let caught = Arc::new(AtomicUsize::new(0));
     for signal in [SIGINT, SIGTERM] {
         signal_hook::flag::register_usize(signal, Arc::clone(&caught), signal as usize)?;
     }
-    std::thread::spawn(move || {
+    let watch = move || {
         loop {
             std::thread::sleep(Duration::from_millis(10));
             match caught.swap(0, SeqCst) {
@@ -43,8 +47,9 @@ pub fn handle() -> std::io::Result<()> {
                 signal => end(signal as i32),
             }
         }
-    });
-    Ok(())
+    };
+    let watching = std::thread::Builder::new().stack_size(STACK).spawn(watch);
+    watching.map(drop).map_err(|cause| threads::cannot_start(1, &cause))
 }
 
 fn end(signal: i32) {

@@ -9,7 +9,13 @@ pub fn wilson(hits: usize, n: usize) -> (f64, f64) {
     if n == 0 {
         return (0.0, 1.0);
     }
-    let (n, share) = (n as f64, hits as f64 / n as f64);
+    wilson_of(hits as f64 / n as f64, n)
+}
+
+/// As [`wilson`], of a `share` of `n` trials, 1 or more.
+#[must_use]
+pub fn wilson_of(share: f64, n: usize) -> (f64, f64) {
+    let n = n as f64;
     let centre = share + Z * Z / (2.0 * n);
     let half = Z * (share * (1.0 - share) / n + Z * Z / (4.0 * n * n)).sqrt();
     let scale = 1.0 + Z * Z / n;

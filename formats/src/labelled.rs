@@ -104,6 +104,28 @@ impl LabelledSet {
         self.points[3 * self.offsets[i]..3 * self.offsets[i + 1]].as_chunks_mut::<3>().0
     }
 
+    /// What cloud `i` is a view of: its name without the number that gen-dataset appends after `_v`, or
+    /// in a set without names its own number.
+    #[must_use]
+    pub fn instance(&self, i: usize) -> String {
+        let Some(names) = &self.names else { return i.to_string() };
+        match names[i].rsplit_once("_v") {
+            Some((mesh, view)) if view.bytes().all(|b| b.is_ascii_digit()) => mesh.to_owned(),
+            _ => names[i].clone(),
+        }
+    }
+
+    /// How many meshes, or other instances, the clouds of each of `n_classes` labels are views of.
+    #[must_use]
+    pub fn n_instances(&self, n_classes: usize) -> Vec<usize> {
+        let all = (0..self.len()).map(|i| (self.labels[i], self.instance(i)));
+        let mut counts = vec![0; n_classes];
+        for (label, _) in all.collect::<std::collections::BTreeSet<_>>() {
+            counts[label] += 1;
+        }
+        counts
+    }
+
     /// The points of the smallest cloud; 0 without clouds.
     #[must_use]
     pub fn smallest_cloud(&self) -> usize {

@@ -11,6 +11,7 @@
 //! | `dataset` | scans, packed sets, sets of clusters, written and read; tars of WebDataset, written |
 //! | `pcap` | packets in captures: a VLP-32C's, written (`vlp32c`; whole scans with `dataset` too), and a VLP-16's, VLP-32C's (`velodyne`) or Ouster's (`ouster`), read |
 //! | `poses` | poses alone and over time (`geometry`), and trajectories read (`trajectory`) |
+//! | `mistakes` | all that is wrong with a file in TOML (`mistakes`) |
 //! | `weights` | models (`weights`) and their cards (`model_card`) |
 //!
 //! None of them needs a C compiler for its target.
@@ -64,6 +65,9 @@ pub mod interval;
 #[doc(hidden)]
 #[cfg(feature = "npz")]
 pub mod labelled_sweep;
+#[doc(hidden)]
+#[cfg(feature = "mistakes")]
+pub mod mistakes;
 #[doc(hidden)]
 #[cfg(feature = "pcap")]
 pub mod packets;

@@ -224,36 +224,8 @@ mod tests {
 
     #[test]
     fn a_line_that_is_no_pose_is_named() {
-        let numbers = "expected 8 numbers (time, x y z, qx qy qz qw) or 12 (a matrix), found 3";
-        let cases = [
-            ("", "f: line 1: expected a pose, found none in the file"),
-            ("1 2 3\n", &format!("f: line 1: {numbers}")),
-            (
-                "1 0 0 0 0 0 0 x",
-                "f: line 1: expected a number, found \"x\": begin lines of names with `#`",
-            ),
-            (
-                "1,0,0,0,0,0,0,1",
-                "f: line 1: expected numbers with blanks between them, found \"1,0,0,0,0,0,0,1\"",
-            ),
-            (
-                "1; 0; 0; 0; 0; 0; 0; 1",
-                "f: line 1: expected numbers with blanks between them, found \"1;\"",
-            ),
-            (
-                "timestamp x y z qx qy qz qw\n1 0 0 0 0 0 0 1",
-                "f: line 1: expected a number, found \"timestamp\": begin lines of names with `#`",
-            ),
-            ("1 0 nan 0 0 0 0 1", "f: line 1: expected a number, found \"nan\": it must be finite"),
-            ("1 0 0 0 0 0 0 2", "f: line 1: expected a quaternion of length 1, found length 2"),
-            ("2 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1", "f: line 2: expected a time after 2 s, found 1 s"),
-            (
-                "1 0 0 0 0 1 0 0 0 0 -1 0\n",
-                "f: line 1: expected a rotation in the matrix, found another map",
-            ),
-        ];
-        for (text, expected) in cases {
-            assert_eq!(read(text).unwrap_err(), expected);
+        for (text, expected) in test_support::said::faults(include_str!("trajectory_faults.txt")) {
+            assert_eq!(read(str::from_utf8(&text).unwrap()).unwrap_err(), expected);
         }
     }
 

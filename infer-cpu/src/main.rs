@@ -2,15 +2,13 @@
 
 use clap::{CommandFactory, Parser};
 use infer_cpu::cli::{Command, run};
-use program::outcome::{exit_code, parsed};
+use program::outcome::{EXIT_CODES, exit_code, parsed};
 use std::process::ExitCode;
 
 /// Classify point clouds on a CPU with PointNet, after a Critical Points Layer or another sampler.
 #[derive(Parser)]
 #[command(name = "infer-cpu", version, max_term_width = 100)]
-#[command(after_help = "\
-Exit status: 0 on success, 1 if an input failed (the message names it), 2 if the
-command line is invalid.")]
+#[command(after_help = EXIT_CODES)]
 struct Cli {
     #[command(subcommand)]
     command: Command,

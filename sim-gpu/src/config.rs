@@ -1,6 +1,5 @@
 //! Reading TOML files that users write: sensors, poses and scenes.
 
-use std::ffi::OsStr;
 use std::fmt;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -10,9 +9,8 @@ use formats::plausible::read_text;
 use serde::de::DeserializeOwned;
 
 use edgepuck_mesh::MeshFormat;
-use mistakes::Mistakes;
-
-mod mistakes;
+use formats::mistakes::Mistakes;
+pub(crate) use formats::mistakes::{did_you_mean, one_of};
 
 /// The limit of files, beyond any that people write, so that a wrong path (a mesh, a device) does
 /// not fill the memory.
@@ -95,10 +93,9 @@ pub fn read<T: DeserializeOwned, U, E: Into<Vec<InvalidValue>>>(
     if text.len() as u64 > MAX_FILE_BYTES {
         return Err(ConfigError::TooLong { file: file.to_owned() });
     }
-    // A mesh would have a mistake in each line.
-    let is_mesh =
-        |name: &&OsStr| MeshFormat::from_path(file).is_some() || name.eq_ignore_ascii_case("urdf");
-    let other = file.extension().filter(is_mesh);
+    // A mesh, or XML, would have a mistake in each line.
+    let is_other = MeshFormat::from_path(file).is_some() || text.trim_start().starts_with('<');
+    let other = file.extension().filter(|_| is_other);
     match other.filter(|_| text.parse::<toml::Table>().is_err()) {
         Some(extension) => Err(ConfigError::Content {
             file: file.to_owned(),
@@ -121,25 +118,6 @@ pub fn parse<T: DeserializeOwned, U, E: Into<Vec<InvalidValue>>>(
     Mistakes::find(text, |value| check(value).map_err(Into::into)).map_err(|mistakes| {
         ConfigError::Content { file: file.to_owned(), message: mistakes.to_string() }
     })
-}
-
-/// `expected one of range, ring, found "rnig"; did you mean "ring"?`
-pub(crate) fn one_of(word: &str, known: &[&str]) -> String {
-    let meant = did_you_mean(word, known.iter().copied());
-    format!("expected one of {}, found \"{word}\"{meant}", known.join(", "))
-}
-
-/// `; did you mean "noise"?` if one of `known` is close to `word`, and nothing otherwise.
-pub(crate) fn did_you_mean<'a>(word: &str, known: impl Iterator<Item = &'a str>) -> String {
-    let word = &*word.to_lowercase();
-    // As clap and git: at most a third of the word is wrong, or its unit is missing.
-    let distance = |known: &&str| match known.strip_prefix(word) {
-        Some(unit) if unit.starts_with('_') => 0,
-        _ => strsim::damerau_levenshtein(word, known),
-    };
-    let closest = known.min_by_key(distance);
-    let closest = closest.filter(|known| 3 * distance(known) <= word.chars().count());
-    closest.map(|known| format!("; did you mean \"{known}\"?")).unwrap_or_default()
 }
 
 /// Checks that `value`, if there is one, is neither infinite nor NaN: TOML can express both.

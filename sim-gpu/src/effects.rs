@@ -58,7 +58,7 @@ pub struct Effects {
 
 /// Gaussian noise of the measured point.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table with sigma_m, metres")]
 pub struct Noise {
     /// Mean in metres; default 0.
     #[serde(default)]
@@ -93,7 +93,7 @@ formats::named! {
 
 /// Independent random loss of returns.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table with probability, 0 to 1")]
 pub struct Dropout {
     /// The probability that a return is lost, in 0..=1.
     pub probability: f64,
@@ -295,7 +295,7 @@ impl Effects {
 }
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table of effects")]
 struct EffectsTable {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     noise: Option<Noise>,

@@ -69,7 +69,14 @@ impl Folder {
 
     fn edgepuck(&self, words: &str) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_edgepuck"));
-        command.current_dir(&self.0).args(words.split_whitespace());
+        command.current_dir(&self.0);
+        // `NAME=VALUE` before a command is for its environment.
+        for word in words.split_whitespace() {
+            match word.split_once('=').filter(|_| command.get_args().next().is_none()) {
+                Some((name, value)) => command.env(name, value),
+                None => command.arg(word),
+            };
+        }
         command
     }
 

@@ -55,7 +55,9 @@ tables! {
     senseless_commands_are_usage_errors,
     sensors_are_listed_and_described,
     sweeps_that_cannot_be_calibrated_are_refused,
+    sweeps_of_another_origin_or_of_one_object_are_warned_of,
     tars_are_made_of_bad_meshes_and_of_a_billion_views,
+    threads_that_do_not_start_are_named,
     unusable_sweeps_and_recipes_are_named,
     warnings_of_meshes_are_printed_once,
 }

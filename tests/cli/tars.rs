@@ -53,7 +53,7 @@ fn one_part_leaves_the_others_alone() {
     // Meshes of another class would change the meaning of labels.
     folder.write("meshes/aaa/train/a.off", meshes::off(8, 0.5));
     let other = format!("{WORDS} --out out --shard 2/2 --overwrite");
-    folder.refuses(1, &[(&other, "this part has other settings, other meshes")]);
+    folder.refuses(2, &[(&other, "this part has other settings, other meshes")]);
 }
 
 #[test]
@@ -70,7 +70,7 @@ fn missing_tars_are_made_again_and_torn_ones_found() {
     folder.write("out/part-0000-of-0001.json", "{");
     assert!(folder.exits(1, "gen-dataset --verify out").contains("part-0000-of-0001.json"));
     folder.succeeds("gen-dataset meshes --out ordinary --adapter cpu");
-    folder.refuses(1, &[(&format!("{WORDS} --out ordinary"), "part of a dataset without tars")]);
+    folder.refuses(2, &[(&format!("{WORDS} --out ordinary"), "part of a dataset without tars")]);
 }
 
 #[test]

@@ -2,13 +2,23 @@
 
 use std::path::Path;
 
-use formats::interval::wilson;
+use formats::interval::wilson_of;
 use infer_cpu::Evaluation;
 
 /// The accuracies and their intervals in one line, for data with `n_classes` classes.
 pub fn summary(found: &Evaluation, n_classes: usize, data: &Path) -> String {
     let (n, correct) = (found.total(), found.correct());
-    let (low, high) = wilson(correct, n);
+    let n_instances: usize = found.instances.iter().sum();
+    let (low, high) = match n {
+        0 => (0.0, 1.0),
+        _ => wilson_of(found.instance_accuracy(), n_instances),
+    };
+    // Views of one mesh are often right or wrong together.
+    let of = match n_instances < n {
+        true if n_instances == 1 => " of 1 mesh".to_owned(),
+        true => format!(" of {n_instances} meshes"),
+        false => String::new(),
+    };
     let name = data.file_name().unwrap_or(data.as_os_str()).to_string_lossy();
     let (class_mean, half_width) = found.class_accuracy();
     let n_found = found.confusion.iter().filter(|answers| answers.iter().any(|n| *n > 0)).count();
@@ -17,7 +27,7 @@ pub fn summary(found: &Evaluation, n_classes: usize, data: &Path) -> String {
         false => "classes".to_owned(),
     };
     format!(
-        "{correct} of {n} ({:.2} %, 95 % interval {:.2} to {:.2} %), mean over {classes} {:.2} % \
+        "{correct} of {n} ({:.2} %, 95 % interval{of} {:.2} to {:.2} %), mean over {classes} {:.2} % \
          (± {:.2}), on {name}",
         100.0 * found.instance_accuracy(),
         100.0 * low,
@@ -51,18 +61,21 @@ mod tests {
 
     #[test]
     fn a_mean_over_some_of_the_classes_says_so() {
-        let found = Evaluation { confusion: vec![vec![3, 1], vec![0, 0]] };
+        let (confusion, instances) = (vec![vec![3, 1], vec![0, 0]], vec![1, 0]);
+        let found = Evaluation { confusion, instances };
         for (n_classes, expected) in
             [(2, "mean over 1 of 2 classes 75.00 %"), (1, "mean over classes 75.00 %")]
         {
             let line = summary(&found, n_classes, Path::new("d/test.npz"));
+            // Of one trial, an interval of Wilson is wide.
+            assert!(line.contains("interval of 1 mesh 11.79 to 98.54 %)"), "{line}");
             assert!(line.contains(expected) && line.ends_with("on test.npz"), "{line}");
         }
     }
 
     #[test]
     fn a_matrix_has_a_row_for_each_true_class() {
-        let found = Evaluation { confusion: vec![vec![3, 1], vec![0, 2]] };
+        let found = Evaluation { confusion: vec![vec![3, 1], vec![0, 2]], instances: vec![4, 2] };
         let classes = ["cup, small", "a \"vase\""].map(str::to_owned);
         let expected =
             "class,\"cup, small\",\"a \"\"vase\"\"\"\n\"cup, small\",3,1\n\"a \"\"vase\"\"\",0,2\n";

@@ -1,7 +1,7 @@
 //! The batches of an epoch, which other threads prepare in advance.
 
 use std::sync::mpsc::{Receiver, sync_channel};
-use std::thread::Scope;
+use std::thread::{Builder, Scope};
 
 use formats::rng::StreamKey;
 use formats::streams::Stream;
@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use crate::augment::{TrainingCloud, augment};
 use crate::batch::Batch;
 use crate::clouds::Clouds;
+use crate::error::Error;
 use crate::matrix::Matrix;
 use crate::recipe::Recipe;
 
@@ -27,9 +28,9 @@ pub fn start<'s>(
     clouds: &'s Clouds,
     recipe: &'s Recipe,
     epoch: u32,
-) -> Receiver<Batch> {
+) -> Result<Receiver<Batch>, Error> {
     let (sender, receiver) = sync_channel(AHEAD);
-    scope.spawn(move || {
+    let prepare = move || {
         let order = order(&clouds.set.labels, clouds.classes.len(), epoch, recipe);
         for some in order.chunks_exact(recipe.batch) {
             let draw = |&(i, turn): &(usize, u32)| augment(clouds, i, (epoch, turn), recipe);
@@ -39,8 +40,9 @@ pub fn start<'s>(
                 break;
             }
         }
-    });
-    receiver
+    };
+    Builder::new().spawn_scoped(scope, prepare).map_err(Error::Thread)?;
+    Ok(receiver)
 }
 
 /// The clouds of an epoch in random order, each with the number of its earlier draws. With

@@ -159,7 +159,7 @@ impl Clouds {
         let mut meshes: Vec<(usize, Vec<usize>)> = Vec::new();
         let mut numbers = BTreeMap::new();
         for (i, &label) in self.set.labels.iter().enumerate() {
-            let number = *numbers.entry((label, self.instance(i))).or_insert(meshes.len());
+            let number = *numbers.entry((label, self.set.instance(i))).or_insert(meshes.len());
             meshes.resize_with(meshes.len().max(number + 1), || (label, Vec::new()));
             meshes[number].1.push(i);
         }
@@ -177,14 +177,5 @@ impl Clouds {
         learnt.sort_unstable();
         held.sort_unstable();
         (self.select(&learnt), self.select(&held))
-    }
-
-    /// The name of cloud `i` without the number of the view, which gen-dataset appends after `_v`.
-    fn instance(&self, i: usize) -> String {
-        let Some(names) = &self.set.names else { return i.to_string() };
-        match names[i].rsplit_once("_v") {
-            Some((mesh, view)) if view.bytes().all(|b| b.is_ascii_digit()) => mesh.to_owned(),
-            _ => names[i].clone(),
-        }
     }
 }

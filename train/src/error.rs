@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use formats::FormatError;
+use formats::{FormatError, InvalidValue};
 
 /// An error of training.
 #[derive(Debug, thiserror::Error)]
@@ -20,13 +20,8 @@ pub enum Error {
         cause: String,
     },
     /// A value in a recipe that is out of its limits.
-    #[error("recipe: `{key}`: {cause}")]
-    Recipe {
-        /// The key in the file.
-        key: &'static str,
-        /// The cause.
-        cause: String,
-    },
+    #[error("recipe: {0}")]
+    Recipe(#[from] InvalidValue),
     /// A loss that is not finite.
     #[error(
         "expected a finite loss, found {loss} at step {step} of epoch {epoch}; {layer} is the first \
@@ -43,6 +38,9 @@ pub enum Error {
         /// The first layer whose output is not finite.
         layer: String,
     },
+    /// The system does not start the thread that prepares batches.
+    #[error("cannot start 1 thread: {0}")]
+    Thread(#[source] std::io::Error),
     /// A model or a cloud that infer-cpu refuses.
     #[error(transparent)]
     Infer(#[from] infer_cpu::Error),

@@ -26,7 +26,7 @@ pub fn evaluate(path: &Path, clouds: &Clouds, options: &Options) -> Result<Evalu
         }
         confusion[label][answer.class] += 1;
     }
-    Ok(Evaluation { confusion })
+    Ok(Evaluation { confusion, instances: clouds.set.n_instances(n) })
 }
 
 /// The predictions of the model at `path` for `clouds`, whose classes may differ from the model's.

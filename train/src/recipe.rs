@@ -4,9 +4,10 @@
 use std::path::{Path, PathBuf};
 
 use edgepuck_assets::TRAINING_RECIPES;
-use formats::FormatError;
+use formats::mistakes::Mistakes;
 use formats::model_card::Normalization;
 use formats::plausible::read_text;
+use formats::{FormatError, InvalidValue};
 use serde::{Deserialize, Serialize};
 
 use crate::error::Error;
@@ -100,20 +101,17 @@ impl Recipe {
             }
             None => read_text(path, u64::MAX).map_err(|e| FormatError::io(path, e))?,
         };
-        let recipe: Self = toml::from_str(&text)
-            .map_err(|error| FormatError::malformed(path, "recipe", error.to_string().trim()))?;
-        recipe.check()?;
-        Ok(recipe)
+        let checked = |recipe: Self| recipe.check().map(|()| recipe).map_err(Vec::from);
+        Mistakes::find(&text, checked).map_err(|mistakes| Error::data(path, mistakes.to_string()))
     }
 
     /// The recipe as TOML, with all defaults.
     pub fn to_toml(&self) -> Result<String, Error> {
-        toml::to_string(self)
-            .map_err(|error| Error::Recipe { key: "recipe", cause: error.to_string() })
+        toml::to_string(self).map_err(|error| InvalidValue::new("recipe", error.to_string()).into())
     }
 
     /// Checks that every value is within its limits.
-    pub fn check(&self) -> Result<(), Error> {
+    pub fn check(&self) -> Result<(), InvalidValue> {
         let Self { network, augment, clusters, .. } = self;
         let is_metric = self.normalization.is_metric();
         let is_width = |width: usize| (1..=8192).contains(&width);
@@ -207,7 +205,7 @@ impl Recipe {
             |(key, x)| (key, (0.0..1.0).contains(&x), "expected 0 or more, and less than 1");
         checks.extend(below_1.map(is_below_1));
         match checks.into_iter().find(|(_, holds, _)| !holds) {
-            Some((key, _, cause)) => Err(Error::Recipe { key, cause: cause.to_owned() }),
+            Some((key, _, cause)) => Err(InvalidValue::new(key, cause)),
             None => Ok(()),
         }
     }

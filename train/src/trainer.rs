@@ -48,7 +48,7 @@ impl Trainer {
         let dropped = recipe.network.head.last().filter(|_| recipe.dropout > 0.0);
         let (mut loss, mut correct) = (0.0, 0);
         std::thread::scope(|scope| {
-            let batches = batches::start(scope, clouds, &recipe, self.epoch);
+            let batches = batches::start(scope, clouds, &recipe, self.epoch)?;
             for (batch, step) in batches.iter().zip(1..) {
                 let kept = dropped.map(|width| dropout(&recipe, self.step, (recipe.batch, *width)));
                 let cost = self.model.learn(&batch, kept, MOMENTUM);

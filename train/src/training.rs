@@ -4,7 +4,7 @@ use std::fs::{self, File, TryLockError};
 use std::path::Path;
 
 use formats::split::Split;
-use formats::{FormatError, atomic};
+use formats::{FormatError, InvalidValue, atomic};
 
 use crate::batches;
 use crate::clouds::Clouds;
@@ -103,10 +103,8 @@ fn check(clouds: &Clouds, recipe: &Recipe, data: &str) -> Result<(), Error> {
     }
     let lacks = |name: &&String| !clouds.classes.contains(name);
     if let Some(name) = recipe.unknown.iter().find(lacks) {
-        return Err(Error::Recipe {
-            key: "unknown",
-            cause: format!("expected some of the classes {:?}, found `{name}`", clouds.classes),
-        });
+        let cause = format!("expected some of the classes {:?}, found `{name}`", clouds.classes);
+        return Err(InvalidValue::new("unknown", cause).into());
     }
     Ok(())
 }

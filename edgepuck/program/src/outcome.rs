@@ -67,8 +67,17 @@ fn with_negative_numbers(command: clap::Command) -> clap::Command {
     command.mut_args(signed).mut_subcommands(with_negative_numbers)
 }
 
-/// Prints the error, if there is one, and returns the program's exit code: 0 for success, 1 for
-/// a failure, 2 for a [`Usage`], 3 if inputs were refused, and 75 for an interruption. A broken
+/// The exit codes, as `--help` lists them.
+pub const EXIT_CODES: &str = "\
+Exit codes:
+  0   done
+  1   failed, or some inputs did (each is named): a file is missing, malformed or cannot be
+      written, or the machine failed
+  2   the command line is wrong, or an output exists: another try does not help
+  3   done, except for inputs that were refused (each is named), or nothing came out
+  75  stopped by a signal: --resume continues";
+
+/// Prints the error, if there is one, and returns the program's exit code of [`EXIT_CODES`]. A broken
 /// pipe is success.
 pub fn exit_code(result: anyhow::Result<Outcome>) -> u8 {
     match result {

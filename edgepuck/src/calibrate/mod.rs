@@ -9,11 +9,12 @@ mod quantum;
 mod report;
 mod turning;
 
+use std::collections::HashMap;
 use std::io::Write;
 use std::path::PathBuf;
 
-use anyhow::{Context, bail, ensure};
-use formats::atomic;
+use anyhow::{bail, ensure};
+use formats::{atomic, hash};
 use program::outputs::{Overwrite, need_extension};
 use sim_gpu::sensors::{Layout, Rotating, SensorProfile, TypicalNoise};
 
@@ -68,7 +69,12 @@ pub fn run(args: &CalibrateArgs) -> anyhow::Result<Outcome> {
     let Layout::Rotating(head) = &base.layout else {
         bail!(Usage(format!("--sensor: expected a head that turns, found {}", base.name)));
     };
-    let name = args.inputs[0].display();
+    check_copies(&args.inputs)?;
+    let name = match &args.inputs[..] {
+        [one] => one.display().to_string(),
+        [first, .., last] => format!("{} to {}", first.display(), last.display()),
+        [] => String::new(),
+    };
     ensure!(
         recording.n_turns >= LEAST_TURNS,
         "{name}: expected {LEAST_TURNS} complete turns or more, found {}: record for longer, or give \
@@ -85,7 +91,10 @@ pub fn run(args: &CalibrateArgs) -> anyhow::Result<Outcome> {
             ring.number
         )));
     }
-    let found = figures(&recording).map_err(anyhow::Error::msg).context(name.to_string())?;
+    let found = figures(&recording).map_err(|cause| {
+        let moving = moving(args);
+        anyhow::Error::msg(cause).context(if moving.is_empty() { name.clone() } else { moving })
+    })?;
     if found.jumping.value > STILL {
         program::say!(
             "warning: {name}: ranges jump in {:.1} % of directions, which are left out: something \
@@ -100,6 +109,13 @@ pub fn run(args: &CalibrateArgs) -> anyhow::Result<Outcome> {
             found.drift
         );
     }
+    if rounded(found.repeatability_m.value) == 0.0 {
+        program::say!(
+            "warning: {name}: ranges do not differ from turn to turn, beyond their rounding: the \
+             profile keeps the noise of {}; are they copies of one turn, or simulated without noise?",
+            base.name
+        );
+    }
     let name = args.out.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let profile = calibrated(base, name, &recording, &found);
     let text = report::text(&found, &recording, &args.out);
@@ -109,8 +125,31 @@ pub fn run(args: &CalibrateArgs) -> anyhow::Result<Outcome> {
         true => writeln!(out, "{:#}", report::json(&found, &recording))?,
         false => out.write_all(text.as_bytes())?,
     }
-    program::say!("{}", args.out.display());
+    program::say!("profile from {} turns: {}", recording.n_turns, args.out.display());
     Ok(Outcome::Success)
+}
+
+/// That no two files are the same recording, whose noise would then seem smaller.
+fn check_copies(files: &[PathBuf]) -> anyhow::Result<()> {
+    let mut known = HashMap::new();
+    for file in files {
+        if let Some(first) = known.insert(hash::of_file(file)?, file) {
+            let [first, file] = [first, file].map(|it| it.display());
+            let cause = "expected other turns in each file: give each recording once";
+            bail!(Usage(format!("{file}: it has the same bytes as {first}; {cause}")));
+        }
+    }
+    Ok(())
+}
+
+/// Those of several captures that are not at rest by themselves.
+fn moving(args: &CalibrateArgs) -> String {
+    let moves = |file: &&PathBuf| {
+        let alone = firings::read(std::slice::from_ref(*file), &args.points);
+        alone.is_ok_and(|it| it.n_turns >= LEAST_TURNS && figures(&it).is_err())
+    };
+    let files = args.inputs.iter().filter(moves).map(|file| file.display().to_string());
+    files.collect::<Vec<_>>().join(", ")
 }
 
 /// The profile of the sensor that sent the packets.
@@ -141,7 +180,9 @@ fn calibrated(
     profile.sources.push("edgepuck calibrate".to_owned());
     let sigma_m = rounded(found.repeatability_m.value);
     let typical_sigma_m = profile.noise.map_or(sigma_m, |noise| noise.typical_sigma_m);
-    profile.noise = Some(TypicalNoise { typical_sigma_m, repeatability_m: Some(sigma_m) });
+    if sigma_m > 0.0 {
+        profile.noise = Some(TypicalNoise { typical_sigma_m, repeatability_m: Some(sigma_m) });
+    }
     // What the scene does not have does not narrow the sensor.
     let [least_m, largest_m] = found.ranges_m;
     profile.range.min_m = profile.range.min_m.min(rounded(least_m));

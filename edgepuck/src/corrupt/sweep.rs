@@ -2,7 +2,7 @@ use super::plan::{Plan, chosen};
 use super::{CorruptArgs, Written, ended, remove_former, usage, write_list};
 use crate::Outcome;
 use crate::points::SweepArgs;
-use edgepuck_segment::{Label, Segmenter, Settings, Sweep, other_axis_up};
+use edgepuck_segment::{Label, Segmenter, Settings, Sweep};
 use formats::Scan;
 use formats::atomic::UnfinishedFolder;
 use formats::hash::Hashing;
@@ -125,7 +125,7 @@ fn ground(input: &SweepArgs, scan: &Scan, sensor_m: DVec3) -> anyhow::Result<Vec
     let origin = DVec3::from_array(scan.origin) - sensor_m;
     let from_sensor = |point: &[f32; 3]| (origin + DVec3::from(point.map(f64::from))).as_vec3();
     let points: Vec<[f32; 3]> = scan.positions.iter().map(|p| from_sensor(p).to_array()).collect();
-    input.warn(other_axis_up(&points));
+    input.warn_of_frame(&points);
     let mut segmenter = Segmenter::new(Settings::default()).map_err(usage)?;
     let found = segmenter.segment(&Sweep { points: &points, rings: scan.ring.as_deref() })?;
     Ok(found.labels().iter().map(|label| *label == Label::Ground).collect())

@@ -10,7 +10,7 @@ pub fn beside<T>(progress: &Progress, work: impl FnOnce() -> T) -> T {
     let bar = ProgressBar::new(0).with_style(style());
     let done = AtomicBool::new(false);
     std::thread::scope(|scope| {
-        scope.spawn(|| {
+        let show = || {
             let started = Instant::now();
             while !done.load(Relaxed) && !progress.is_scanned.load(Relaxed) {
                 let rays = progress.rays_cast.load(Relaxed) + progress.rays_culled.load(Relaxed);
@@ -21,7 +21,9 @@ pub fn beside<T>(progress: &Progress, work: impl FnOnce() -> T) -> T {
                 std::thread::park_timeout(Duration::from_millis(100));
             }
             bar.finish_and_clear();
-        });
+        };
+        // Without a thread for it, there is no bar.
+        let _ = std::thread::Builder::new().spawn_scoped(scope, show);
         let result = work();
         done.store(true, Relaxed);
         result

@@ -4,6 +4,7 @@ use crate::Outcome;
 use crate::flags::dataset_folder;
 use anyhow::Context;
 use edgepuck_dataset::{Publication, publish};
+use program::outputs::Overwrite;
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Args)]
@@ -49,6 +50,14 @@ impl CardArgs {
             creator: self.creator.clone(),
             published: self.published.clone(),
         };
+        let files = ["README.md", "croissant.json"].map(|name| folder.join(name));
+        Overwrite::of(overwrite).check(files.iter().map(PathBuf::as_path))?;
+        if self.license.is_none() {
+            program::say!(
+                "warning: the card names no licence, without which nobody may use the data: --license \
+                 CC-BY-4.0, say"
+            );
+        }
         for file in publish(folder, &publication, overwrite)? {
             program::say!("{}", file.display());
         }

@@ -94,7 +94,7 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
     }
     let progress = Progress::default();
     let config = args.settings.config()?;
-    config.check()?;
+    config.check().map_err(usage)?;
     let are_tars = config.layouts.contains(&Layout::Webdataset);
     if let Some(flag) = args.tars.given().filter(|_| !are_tars) {
         return Err(usage(format!("{flag} applies to tars only: add --layout webdataset")));
@@ -131,6 +131,13 @@ pub(crate) fn run(args: &Args) -> anyhow::Result<Outcome> {
             program::say!("{}: {error}", out.display());
             Ok(Outcome::Interrupted)
         }
+        // Another command line helps, and trying again does not.
+        Some(
+            DatasetError::Occupied { .. }
+            | DatasetError::InTheWay { .. }
+            | DatasetError::Different { .. }
+            | DatasetError::Layout { .. },
+        ) => Err(usage(error)),
         _ => Err(error),
     })
 }

@@ -25,13 +25,21 @@ pub fn mesh_size(size_m: [f64; 3], unit: Unit, remedy: &'static str) -> Option<W
     })
 }
 
-/// As [`mesh_size`], of a mesh of a scene, which may be a terrain: only a solid of more than 200 m, or of
-/// less than 1 cm, has an odd size.
+/// Why the unit of an object of a scene, of this size in metres, is probably not `unit`, or not the metre
+/// if its user names none. The object may be a terrain or a building: only a solid of more than 100 m, or
+/// of 200 m if its unit is named, or a thing of less than 1 cm has an odd size. `is_around` a sensor, an
+/// object of unnamed unit and more than 20 m may be a small one in millimetres.
 #[must_use]
-pub fn scene_mesh_size(size_m: [f64; 3], unit: Unit, remedy: &'static str) -> Option<Warning> {
+pub fn mesh_in_scene(size_m: [f64; 3], unit: Option<Unit>, is_around: bool) -> Vec<Warning> {
     let (least, most) = (size_m.into_iter().fold(f64::INFINITY, f64::min), largest(size_m));
-    let is_odd = most > 200.0 && least > most / 10.0 || most < 0.01;
-    mesh_size(size_m, unit, remedy).filter(|_| is_odd)
+    let is_solid = least > most / 10.0;
+    let is_odd = is_solid && most > if unit.is_some() { 200.0 } else { 100.0 } || most < 0.01;
+    let remedy = "`units` of the object names another unit";
+    let size = mesh_size(size_m, unit.unwrap_or_default(), remedy).filter(|_| is_odd);
+    let is_inside = is_around && is_solid && (size.is_some() || unit.is_none() && most > 20.0);
+    let elsewhere = "another place, or `units` of the object (\"mm\", or \"m\" if it is a hall)";
+    let inside = is_inside.then(|| Warning::SensorInside(elsewhere.to_owned()));
+    size.into_iter().chain(inside).collect()
 }
 
 /// The unit of a mesh with these bounds whose scan `points`, metres, are: a fifth of them or more are in its
@@ -111,10 +119,15 @@ mod tests {
 
     #[test]
     fn terrain_in_a_scene_is_plausible() {
-        let is_odd = |size_m| scene_mesh_size(size_m, Unit::Metre, "").is_some();
-        let solids = [0.001, 1.0, 150.0, 4300.0].map(|size| is_odd([size; 3]));
-        assert_eq!(solids, [true, false, false, true]);
-        assert!(!is_odd([900.0, 900.0, 30.0]));
+        let n = |size_m, unit, is_around| mesh_in_scene(size_m, unit, is_around).len();
+        let solids = |unit, is_around| {
+            [0.001, 1.0, 30.0, 150.0, 4300.0].map(|size| n([size; 3], unit, is_around))
+        };
+        assert_eq!(solids(Some(Unit::Metre), false), [1, 0, 0, 0, 1]);
+        assert_eq!(solids(None, false), [1, 0, 0, 1, 1]);
+        assert_eq!(solids(Some(Unit::Metre), true), [2, 0, 0, 0, 2]);
+        assert_eq!(solids(None, true), [2, 0, 1, 2, 2]);
+        assert_eq!(n([900.0, 900.0, 30.0], None, true), 0);
     }
 
     #[test]

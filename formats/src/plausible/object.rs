@@ -1,10 +1,13 @@
 //! Whether points are those of one whole object.
 
-use super::sweep::{is_lost, length};
+use super::sweep::{coarser_than, is_lost, length};
 
 /// The largest distance from a line, as a share of its length, of points that are on it: f32 rounds
 /// to 6e-8.
 const ON_A_LINE: f64 = 1e-6;
+
+/// How many times as large as the step between its coordinates an object is, at least.
+const COARSEST: f32 = 200.0;
 
 /// Clouds of fewer points are not searched for rings: a turn of a VLP-16 has 28,800 beams.
 const FEWEST_OF_RINGS: usize = 4_000;
@@ -36,15 +39,16 @@ pub enum Unlike {
 /// they probably are instead. Lost returns and points that are not finite do not count.
 ///
 /// # Errors
-/// Points that are all in one place or on one line.
+/// Points that are all in one place or on one line, or coordinates that have lost their digits: numbers of 32
+/// bits in a map's frame, say.
 pub fn judge_object(points: &[[f64; 3]], sensor: [f64; 3]) -> Result<Option<Unlike>, String> {
-    let points = || {
+    let counted = || {
         let is_known = |p: &&[f64; 3]| !is_lost(**p) && p.iter().all(|x| x.is_finite());
         let finite = points.iter().filter(is_known);
         finite.map(|point| [0, 1, 2].map(|i| point[i] - sensor[i]))
     };
     let (mut n, mut low, mut high) = (0, [f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for point in points() {
+    for point in counted() {
         n += 1;
         (low, high) =
             ([0, 1, 2].map(|i| low[i].min(point[i])), [0, 1, 2].map(|i| high[i].max(point[i])));
@@ -53,20 +57,23 @@ pub fn judge_object(points: &[[f64; 3]], sensor: [f64; 3]) -> Result<Option<Unli
         let place = [0, 1, 2].map(|i| low[i] + sensor[i]);
         return Err(format!("expected points of an object, found {n} in one place, {place:?}"));
     }
-    if n > 0 && are_on_a_line(points()) {
+    if n > 0 && are_on_a_line(counted()) {
         return Err(format!("expected points of an object, found {n} on one line"));
     }
     let size = length([0, 1, 2].map(|i| high[i] - low[i]));
+    if let Some(coarse) = coarser_than(size as f32 / COARSEST, points.iter().copied()) {
+        return Err(coarse.to_string());
+    }
     let place = length([0, 1, 2].map(|i| (high[i] + low[i]) / 2.0));
     // Objects of streets in metres from the sensor; meshes are mostly nearer to their origin.
     if size < 30.0 && place > 3.0 * size && (2.0..200.0).contains(&place) {
         return Ok(Some(Unlike::OneSide));
     }
     // A sensor has most points near it; in objects, few are near the middle.
-    let farthest = points().map(length).fold(0.0, f64::max);
-    let near = points().filter(|point| length(*point) < 0.3 * farthest).count();
+    let farthest = counted().map(length).fold(0.0, f64::max);
+    let near = counted().filter(|point| length(*point) < 0.3 * farthest).count();
     let is_sweep = n >= 10_000 && 2 * near > n && (20.0..2e3).contains(&farthest);
-    Ok((is_sweep || n >= FEWEST_OF_RINGS && are_in_rings(points())).then_some(Unlike::Sweep))
+    Ok((is_sweep || n >= FEWEST_OF_RINGS && are_in_rings(counted())).then_some(Unlike::Sweep))
 }
 
 /// Whether all points lie on the line through the first point and the one farthest from it.
@@ -171,6 +178,23 @@ mod tests {
                 Ok(Some(Unlike::OneSide)),
             ),
             (vec![[-0.5; 3], [0.5; 3], [0.5, -0.5, 0.5]], Ok(None)),
+            // A chair in UTM: numbers of 32 bits are half a metre apart there.
+            (
+                vec![
+                    [456_789.0, 5_400_000.5, 0.0],
+                    [456_790.0, 5_400_000.0, 0.5],
+                    [456_789.5, 5_400_001.0, 1.0],
+                ],
+                Err("numbers of 32 bits, which are 0.5 m apart at 5400001 m"),
+            ),
+            (
+                vec![
+                    [456_789.1, 5_400_000.7, 0.0],
+                    [456_790.0, 5_400_000.2, 0.5],
+                    [456_789.3, 5_400_001.0, 1.0],
+                ],
+                Ok(None),
+            ),
             (floor.collect(), Ok(Some(Unlike::Sweep))),
             (grid(60).map(|[x, y]| [x, y, 0.0]).collect(), Ok(None)),
         ] {

@@ -1,6 +1,11 @@
 //! Whether numbers are the points of a sweep, metres from the sensor.
 
+#[cfg(feature = "poses")]
+use std::collections::BTreeMap;
 use std::path::Path;
+
+#[cfg(feature = "poses")]
+use glam::{DMat3, DVec3};
 
 use super::Warning;
 use crate::error::FormatError;
@@ -14,6 +19,10 @@ const EXPECTED_M: std::ops::RangeInclusive<f64> = 0.5..=2e3;
 /// Farther than the nearest thing that a sensor on a vehicle, a tripod or a roof sees, metres. A drone
 /// is as far from all, and above them.
 const NEAREST_M: f64 = 50.0;
+
+/// Longer than cars, vans and trucks without trailers, metres.
+#[cfg(feature = "poses")]
+const LONGEST_OBJECT_M: f64 = 12.0;
 
 /// The largest step between coordinates, metres: LiDARs measure ranges to millimetres.
 const COARSEST_M: f32 = 0.005;
@@ -83,6 +92,68 @@ pub fn judge_sweep(
     })
 }
 
+/// Why `points`, metres from the sensor, z up, are probably not those that a sensor on a vehicle, a robot
+/// or a mast sees around it: they are few, or of one object, or the ground is not below the origin. Where no
+/// ground is found, `other_axis` tells whether another axis than z points up.
+#[cfg(feature = "poses")]
+#[must_use]
+pub fn judge_surroundings(
+    points: &[[f32; 3]],
+    other_axis: impl FnOnce() -> Option<Warning>,
+) -> Option<Warning> {
+    let points = points.iter().map(|point| DVec3::from_array(point.map(f64::from)));
+    let returns: Vec<_> = points.filter(|at| at.is_finite() && *at != DVec3::ZERO).collect();
+    if returns.len() < 100 {
+        return Some(Warning::FewPoints(returns.len()));
+    }
+    let (low, high) =
+        returns.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), at| {
+            (low.min(*at), high.max(*at))
+        });
+    let is_aside = low.x > 0.0 || low.y > 0.0 || high.x < 0.0 || high.y < 0.0;
+    if is_aside && (high - low).length() < LONGEST_OBJECT_M {
+        return Some(Warning::OneObject((high - low).to_array()));
+    }
+    match ground_m(&returns) {
+        None => other_axis(),
+        Some(ground_m) if (-30.0..-0.15).contains(&ground_m) => None,
+        Some(ground_m) => Some(Warning::GroundAt(ground_m)),
+    }
+}
+
+/// The height of the ground at the origin, metres: of a plane through the lowest points of most places near it,
+/// if more is above than below.
+#[cfg(feature = "poses")]
+fn ground_m(returns: &[DVec3]) -> Option<f64> {
+    let near = || returns.iter().filter(|at| at.truncate().length() < 12.0);
+    let mut places = BTreeMap::new();
+    for at in near() {
+        let place = [at.x, at.y].map(|x| x.floor() as i32);
+        let lowest = places.entry(place).or_insert(*at);
+        *lowest = if at.z < lowest.z { *at } else { *lowest };
+    }
+    let n = places.len();
+    if n < 30 {
+        return None;
+    }
+    let (mut lowest, mut plane): (Vec<DVec3>, _) = (places.into_values().collect(), DVec3::ZERO);
+    let above = |plane: DVec3, at: &DVec3| at.z - plane.dot(at.with_z(1.0));
+    // Least squares, without what stands too high.
+    for limit_m in [1.0, 0.5, 0.3] {
+        let (mut squares, mut sums) = (DMat3::ZERO, DVec3::ZERO);
+        for at in &lowest {
+            let row = at.with_z(1.0);
+            squares += DMat3::from_cols(row.x * row, row.y * row, row);
+            sums += at.z * row;
+        }
+        plane = squares.inverse() * sums;
+        lowest.retain(|at| above(plane, at).abs() < limit_m);
+    }
+    let over = near().filter(|at| above(plane, at) > 0.5).count();
+    let under = near().filter(|at| above(plane, at) < -0.5).count();
+    (2 * lowest.len() > n && over >= 4 * under).then_some(plane.z)
+}
+
 /// The unit of angles, if the columns of `points`, between `low` and `high`, are probably a range and two
 /// angles: none is beyond its bounds, and one fills a turn, also for the nearest tenth of the points. To
 /// the sides, a sensor that looks ahead sees less far of what is near.
@@ -120,6 +191,14 @@ fn unit_of_angles(
 /// Why the coordinates of `points`, metres, have probably lost digits: all are numbers of 32 bits,
 /// which are too far apart at such coordinates.
 pub fn coarse_coordinates(points: impl IntoIterator<Item = [f64; 3]>) -> Option<Warning> {
+    coarser_than(COARSEST_M, points)
+}
+
+/// As [`coarse_coordinates`], beyond a step in the unit of the points.
+pub(super) fn coarser_than(
+    coarsest: f32,
+    points: impl IntoIterator<Item = [f64; 3]>,
+) -> Option<Warning> {
     let mut most = 0.0f32;
     for x in points.into_iter().flatten().filter(|x| x.is_finite()) {
         if f64::from(x as f32) != x {
@@ -128,7 +207,7 @@ pub fn coarse_coordinates(points: impl IntoIterator<Item = [f64; 3]>) -> Option<
         most = most.max((x as f32).abs());
     }
     let step_m = most.next_up() - most;
-    (step_m > COARSEST_M).then_some(Warning::CoarseCoordinates { step_m, at_m: most })
+    (step_m > coarsest).then_some(Warning::CoarseCoordinates { step_m, at_m: most })
 }
 
 pub(super) fn length(point: [f64; 3]) -> f64 {
@@ -137,7 +216,7 @@ pub(super) fn length(point: [f64; 3]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{Warning, coarse_coordinates, judge_sweep};
+    use super::*;
 
     #[test]
     fn sweeps_of_another_unit_or_origin_or_without_points_are_found() {
@@ -167,6 +246,38 @@ mod tests {
         }
         let below_a_drone = [[-60.0, -40.0, -79.0], [55.0, 62.0, -80.0], [1.0, 2.0, -79.5]];
         assert_eq!(judge_sweep(below_a_drone, ""), Ok(None));
+    }
+
+    /// A street that rises by 10 % to one side: the ground in rings 2 to 40 m away, and walls.
+    #[cfg(feature = "poses")]
+    #[test]
+    fn surroundings_have_their_ground_below_the_sensor() {
+        let judge = |points: &[[f32; 3]]| judge_surroundings(points, || Some(Warning::OnePose));
+        let street = |ground_m: f32| {
+            let at = move |n: u16, r: f32, up: f32| {
+                let (sin, cos) = (2.0 * f32::from(n % 180)).to_radians().sin_cos();
+                [r * cos, r * sin, ground_m + up + 0.1 * r * sin]
+            };
+            let ground = (0..3600).map(move |n| at(n, 2.0 * f32::from(n / 180 + 1), 0.0));
+            ground.chain((0..3600).map(move |n| at(n, 8.0, 0.2 * f32::from(n / 180))))
+        };
+        for (ground_m, expected) in [
+            (-1.73, None),
+            (-0.4, None),
+            (-12.0, None),
+            (0.02, Some("the ground is at z = 0.0 m")),
+            (1.2, Some("the ground is at z = 1.2 m")),
+            (-101.7, Some("the ground is at z = -101.7 m")),
+        ] {
+            let found = judge(&street(ground_m).collect::<Vec<_>>()).map(|it| it.to_string());
+            assert_eq!(found.is_some(), expected.is_some(), "{ground_m}: {found:?}");
+            assert!(found.unwrap_or_default().starts_with(expected.unwrap_or_default()));
+        }
+        let on_its_head: Vec<_> = street(-1.73).map(|[x, y, z]| [x, -y, -z]).collect();
+        assert_eq!(judge(&on_its_head), Some(Warning::OnePose), "no ground was found");
+        let chair: Vec<_> = (0..500u16).map(|n| [3.0, 1e-3 * f32::from(n), 0.0]).collect();
+        assert!(matches!(judge(&chair), Some(Warning::OneObject(_))));
+        assert_eq!(judge(&chair[..1]), Some(Warning::FewPoints(1)));
     }
 
     /// An f32 has 24 bits: at 5,400,000 m, between 2^22 and 2^23, the last is worth half a metre.

@@ -159,6 +159,21 @@ pub enum Warning {
          position of the sensor?"
     )]
     NearestPoint(f64),
+    /// A sweep has this number of points.
+    #[error("expected thousands of points, as of a turn of a sensor, found {0}")]
+    FewPoints(usize),
+    /// All points of a sweep are in a box of this size, metres, beside the sensor.
+    #[error(
+        "all points are within {}, beside the sensor: expected all that is around it; classify names \
+         one object", box_of(*.0)
+    )]
+    OneObject([f64; 3]),
+    /// The ground of a sweep is at this height, metres.
+    #[error(
+        "the ground is at z = {0:.1} m: expected it 0.2 to 30 m below the sensor; is the origin the \
+         vehicle's, or that of a map? --origin gives the sensor's position"
+    )]
+    GroundAt(f64),
     /// The columns of a sweep look like a range and two angles in this unit.
     #[error(
         "the columns are within the bounds of a range, an azimuth and an elevation in {0}: expected \

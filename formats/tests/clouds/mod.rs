@@ -28,5 +28,14 @@ fn error(name: &str, bytes: impl AsRef<[u8]>) -> String {
     message.strip_prefix(&format!("{name}: ")).unwrap_or(&message).to_owned()
 }
 
+#[test]
+fn faults_are_named_with_their_lines() {
+    for (file, message) in test_support::said::faults(include_str!("faults.txt")) {
+        let name_ends = file.windows(3).position(|part| part == b" | ").unwrap();
+        let (name, bytes) = (str::from_utf8(&file[..name_ends]).unwrap(), &file[name_ends + 3..]);
+        assert_eq!(error(name, bytes), message, "{}", String::from_utf8_lossy(&file));
+    }
+}
+
 /// A header that promises more points than any memory holds.
 const MANY: &str = "1000000000000000000";

@@ -109,52 +109,12 @@ fn compressed_points_lie_field_after_field() {
 }
 
 #[test]
-fn malformed_files_are_refused() {
-    let refuse = |header: &str, data: &[u8]| error("a.pcd", pcd(header, data));
-    let xyz = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\n";
-    for (header, message) in [
-        ("", "header: the line DATA is missing"),
-        (
-            "FIELDS x y\nSIZE 4 4\nTYPE F F\nPOINTS 1\nDATA ascii\n",
-            "FIELDS: expected a field z, found `x y`",
-        ),
-        ("VIEWPOINT nan 0 0 1 0 0 0\n", "line 3: expected finite numbers, or no line VIEWPOINT"),
-        ("FIELDS x y z\nSIZE 4 4\n", "line 4: expected 3 words, one for each of FIELDS, found 2"),
-        ("FIELDS x y z\nSIZE 4 4 -4\n", "line 4: expected a count, found `-4`"),
-        (
-            "FIELDS x y z\nSIZE 4 4 3\nTYPE F F F\nPOINTS 1\nDATA ascii\n",
-            "FIELDS: expected one number as z, found 1 of type F3",
-        ),
-        (
-            "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 2 1\nPOINTS 1\nDATA ascii\n",
-            "FIELDS: expected one number as y, found 2 of type F4",
-        ),
-    ] {
-        assert_eq!(refuse(header, b""), message);
-    }
-    let with = |rest: &str| format!("{xyz}{rest}");
-    assert_eq!(refuse(&with("DATA ascii\n"), b""), "header: the line POINTS is missing");
-    assert_eq!(
-        refuse(&with("POINTS 1\nDATA zip\n"), b""),
-        "line 8: expected ascii, binary or binary_compressed, found `zip`"
-    );
-    let ascii = with("POINTS 2\nDATA ascii\n");
-    assert_eq!(refuse(&ascii, b"1 2 3\n4 5\n"), "line 10: expected a number in column 3");
-    assert_eq!(refuse(&ascii, b"1 2 3\n4 5 x\n"), "line 10: expected a number, found `x`");
-    assert_eq!(refuse(&ascii, b"1 2 3\n"), "line 10: the file ends after 1 of 2");
-    assert_eq!(
-        refuse(&ascii, b"1 2 3\n4 5 6\n\n7 8 9\n"),
-        "line 12: expected 2 lines by the header, found more"
-    );
-    let binary = with("POINTS 2\nDATA binary\n");
-    assert_eq!(refuse(&binary, &[0; 23]), "points: the file ends after 1 of 2");
-    assert_eq!(refuse(&binary, &[0; 48]), "points: expected 2 by the header, found 4");
-    assert_eq!(read("a.pcd", pcd(&binary, &[0; 35])).len(), 2);
-    // The Point Cloud Library refuses it, too.
-    assert_eq!(
-        refuse(&with("WIDTH 3\nHEIGHT 2\nPOINTS 5\nDATA ascii\n"), b""),
-        "header: expected as many POINTS as WIDTH times HEIGHT, 6, found 5"
-    );
+fn binary_points_of_another_number_are_refused() {
+    let binary = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 2\nDATA binary\n";
+    let refuse = |n: usize| error("a.pcd", pcd(binary, &vec![0; n]));
+    assert_eq!(refuse(23), "points: the file ends after 1 of 2");
+    assert_eq!(refuse(48), "points: expected 2 by the header, found 4");
+    assert_eq!(read("a.pcd", pcd(binary, &[0; 35])).len(), 2);
 }
 
 #[test]

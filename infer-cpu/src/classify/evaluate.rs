@@ -11,6 +11,8 @@ use crate::error::Error;
 pub struct Evaluation {
     /// The number of clouds for each label and predicted class: `[label][prediction]`.
     pub confusion: Vec<Vec<usize>>,
+    /// The number of meshes, or other instances, of each label: clouds are views of them.
+    pub instances: Vec<usize>,
 }
 
 /// Classifies every cloud of `set`, whose labels are indices into [`Classifier::classes`].
@@ -36,7 +38,7 @@ pub fn evaluate(classifier: &mut Classifier, set: &LabelledSet) -> Result<Evalua
         let answers = confusion.get_mut(label).ok_or(Error::UnknownLabel { label, n_classes })?;
         answers[classifier.classify_on_ground(set.cloud(i), set.ground_z(i))?.class] += 1;
     }
-    Ok(Evaluation { confusion })
+    Ok(Evaluation { confusion, instances: set.n_instances(n_classes) })
 }
 
 impl Evaluation {
@@ -61,19 +63,20 @@ impl Evaluation {
     /// The mean over classes of the share of correct predictions, and the half width of its 95 %
     /// interval. Classes without clouds do not count.
     ///
-    /// The interval treats each class as independent trials and adds two of each outcome (Agresti
-    /// and Coull 1998), so that a class without errors does not count as certain.
+    /// The interval treats the instances of each class as independent trials, but not the views of one,
+    /// and adds two of each outcome (Agresti and Coull 1998), so that a class without errors does not count
+    /// as certain.
     #[must_use]
     pub fn class_accuracy(&self) -> (f64, f64) {
         let classes = self.confusion.iter().enumerate().filter_map(|(class, answers)| {
             let n: usize = answers.iter().sum();
-            (n > 0).then(|| (answers[class] as f64, n as f64))
+            (n > 0).then(|| (answers[class] as f64 / n as f64, self.instances[class] as f64))
         });
         let classes: Vec<(f64, f64)> = classes.collect();
         let count = classes.len().max(1) as f64;
-        let mean = classes.iter().map(|(right, n)| right / n).sum::<f64>() / count;
-        let variance = classes.iter().map(|(right, n)| {
-            let share = (right + 2.0) / (n + 4.0);
+        let mean = classes.iter().map(|(share, _)| share).sum::<f64>() / count;
+        let variance = classes.iter().map(|(share, n)| {
+            let share = (share * n + 2.0) / (n + 4.0);
             share * (1.0 - share) / (n + 4.0)
         });
         (mean, Z * variance.sum::<f64>().sqrt() / count)
@@ -86,9 +89,12 @@ mod tests {
 
     #[test]
     fn accuracies_are_shares_of_the_diagonal() {
-        let found = Evaluation { confusion: vec![vec![3, 1], vec![2, 2]] };
+        let confusion = vec![vec![3, 1], vec![2, 2]];
+        let found = Evaluation { confusion, instances: vec![4, 4] };
         assert_eq!((found.total(), found.correct()), (8, 5));
         assert_eq!(found.instance_accuracy(), 0.625);
         assert_eq!(found.class_accuracy().0, 0.625);
+        let views = Evaluation { instances: vec![1, 1], ..found.clone() };
+        assert!(views.class_accuracy().1 > 1.2 * found.class_accuracy().1);
     }
 }

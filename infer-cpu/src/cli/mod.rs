@@ -56,8 +56,8 @@ fn of_setup(error: crate::Error) -> anyhow::Error {
         | Error::KernelPrecision { .. }
         | Error::Sampler(_)
         | Error::FrontMissing { .. }
-        | Error::TooManyThreads(_)
-        | Error::Threads { .. } => Usage(error.to_string()).into(),
+        | Error::TooManyThreads(_) => Usage(error.to_string()).into(),
+        Error::Threads { .. } => anyhow::anyhow!("{error}; --threads 1 starts none"),
         _ => error.into(),
     }
 }

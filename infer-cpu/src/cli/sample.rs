@@ -13,7 +13,7 @@ use program::outputs::Overwrite;
 use super::input;
 use super::model::ModelArgs;
 use super::sampler::SamplerArgs;
-use super::{Outcome, of_setup};
+use super::{Outcome, Usage, of_setup};
 
 /// Flags of `sample`.
 #[derive(clap::Args)]
@@ -58,7 +58,7 @@ pub struct SampleArgs {
 
 pub fn run(args: &SampleArgs) -> anyhow::Result<Outcome> {
     // An unknown extension fails before a long computation.
-    CloudFormat::of_output(&args.output)?;
+    CloudFormat::of_output(&args.output).map_err(|error| Usage(error.to_string()))?;
     args.overwrite.check([&*args.output])?;
     let Cloud { mut points, .. } = input::read(&args.input, args.input_format)?;
     if args.drop_invalid {

@@ -105,6 +105,9 @@ pub enum DatasetError {
         /// The number of views that were tried.
         tried: u32,
     },
+    /// The system does not start this number of threads.
+    #[error("cannot start {0} threads: {1}; set RAYON_NUM_THREADS=1 to use fewer")]
+    Threads(usize, #[source] std::io::Error),
     /// A setting is invalid.
     #[error(transparent)]
     Invalid(#[from] InvalidValue),

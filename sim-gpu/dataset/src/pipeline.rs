@@ -21,6 +21,7 @@ use std::collections::VecDeque;
 use std::sync::atomic::Ordering::{Relaxed, SeqCst};
 use std::sync::atomic::{AtomicBool, AtomicUsize};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::thread::Builder;
 
 /// Bytes that the meshes in progress may hold together.
 const MEMORY_BUDGET: u64 = 1 << 30;
@@ -70,16 +71,20 @@ pub(crate) fn scan_all(
         error: Mutex::default(),
     };
     let budget = Budget::new(MEMORY_BUDGET);
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let threads = rayon::current_num_threads();
     let (to_caster, prepared) = bounded(2 * threads);
     let (to_writers, cast) = bounded(2 * threads);
     std::thread::scope(|scope| {
-        for _ in 0..threads {
-            let to_caster = to_caster.clone();
+        let started = (0..threads).try_for_each(|_| {
+            let (to_caster, cast) = (to_caster.clone(), cast.clone());
             let (shared, budget) = (&shared, &budget);
-            scope.spawn(move || shared.prepare_all(budget, &to_caster));
-            let cast = cast.clone();
-            scope.spawn(move || shared.write_all(&cast));
+            let prepare = move || shared.prepare_all(budget, &to_caster);
+            Builder::new().spawn_scoped(scope, prepare)?;
+            Builder::new().spawn_scoped(scope, move || shared.write_all(&cast)).map(drop)
+        });
+        // Those that have started then end.
+        if let Err(cause) = started {
+            shared.stop(DatasetError::Threads(2 * threads, cause));
         }
         drop(to_caster);
         drop(cast);

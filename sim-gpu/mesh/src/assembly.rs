@@ -23,8 +23,9 @@ pub struct Assembly {
 pub struct AssembledMesh {
     /// Its triangles.
     pub mesh: TriangleMesh,
-    /// Numbers of [`Assembly::colours`], and of the triangles in a row that have them.
-    pub colours: Vec<(Option<usize>, usize)>,
+    /// Luminances, 0 to 1, of base colours times vertices' colours, and the number of triangles in a row
+    /// that have them.
+    pub colours: Vec<(f64, usize)>,
 }
 
 /// A mesh at a place.

@@ -161,6 +161,8 @@ pub(super) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
 
 #[cfg(test)]
 mod tests {
+    use test_support::said::faults;
+
     use super::super::testing::{fails, is_the_triangle};
     use super::*;
 
@@ -226,20 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_name_their_line() {
-        let bad_lines = [
-            ("\nf 1 2 4\n", "line 5: index 4 is out of range: there are 3 vertices"),
-            ("f 1 2 3\n\nf 1 2 0\n", "line 6: index 0 is out of range: there are 3 vertices"),
-            ("f 1 2 -4\n", "line 4: index -4 is out of range: there are 3 vertices"),
-            ("f 1 /2 3\n", "line 4: expected an index, found \"\""),
-            ("v 0 0\n", "line 4: expected 3 coordinates of a vertex, found 2"),
-            ("#\nv 0 x 0\n", "line 5: expected a finite coordinate, found \"x\""),
-            ("v 1 1 1 0\n", "line 4: expected a weight other than 0, found \"0\""),
-            ("\n\nv 0 NaN 0\n", "line 6: expected a finite coordinate, found \"NaN\""),
-            ("v 0 -inf 0\n", "line 4: expected a finite coordinate, found \"-inf\""),
-        ];
-        fails(parse, bad_lines.map(|(lines, message)| (format!("{CORNERS}{lines}"), message)));
-        let too_early = "line 1: index -1 is out of range: there are 3 vertices";
-        fails(parse, [(format!("f -1 -1 -1\n{CORNERS}"), too_early)]);
+    fn faults_are_named_with_their_lines() {
+        fails(parse, faults(include_str!("obj_faults.txt")));
     }
 }

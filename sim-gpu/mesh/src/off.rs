@@ -105,6 +105,8 @@ fn check_kind(kind: &[u8]) -> Result<(), Malformed> {
 
 #[cfg(test)]
 mod tests {
+    use test_support::said::faults;
+
     use super::super::testing::{fails, is_the_triangle};
     use super::*;
 
@@ -174,87 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn other_files_are_named_for_what_they_begin_with() {
-        let cases = [
-            ("solid cube\n", "line 1: expected an OFF file, found \"solid\""),
-            (
-                "\n\nXOFF 3 1 0\n",
-                "line 3: expected an OFF file of three dimensions, found \"XOFF\"",
-            ),
-            ("\u{7f}ELF\u{1}", "line 1: expected an OFF file, found \" ELF \""),
-            ("4OFF 3 1 0\n", "line 1: expected an OFF file of three dimensions, found \"4OFF\""),
-            ("nOFF 3 3 1 0\n", "line 1: expected an OFF file of three dimensions, found \"nOFF\""),
-            ("OFF BINARY\n\0\0", "line 1: expected ASCII OFF, found binary OFF"),
-            (" \n# only a comment\n", "the file is empty"),
-        ];
-        fails(parse, cases);
-    }
-
-    #[test]
-    fn a_truncated_file_says_how_far_it_came() {
-        let cases = [
-            ("OFF\n3 1 0\n0 0 0\n", "line 4: truncated: expected 3 vertices, found 1"),
-            (
-                "OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2",
-                "line 6: truncated: expected 2 faces, found 1",
-            ),
-            (
-                "OFF\n3 1 0\n0 0 0\n1 0",
-                "line 4: expected 3 coordinates of a vertex on the line, found 2",
-            ),
-            (
-                "OFF3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1",
-                "line 5: expected 3 corners of a face on the line, found 2",
-            ),
-            ("OFF", "line 1: expected 2 counts on the line, found 0"),
-            ("OFF\n3", "line 2: expected 2 counts on the line, found 1"),
-        ];
-        fails(parse, cases);
-    }
-
-    #[test]
-    fn a_promise_of_billions_is_an_error() {
-        let cases = [
-            (
-                "OFF\n4000000000 9000000000000000000 0\n0 0 0\n",
-                "line 4: truncated: expected 4000000000 vertices, found 1",
-            ),
-            (
-                "OFF\n9000000000000000000 1 0\n0 0 0\n",
-                "line 2: expected at most 4294967295 vertices, found 9000000000000000000",
-            ),
-            (
-                "OFF3 1 0\n0 0 0\n1 0 0\n0 1 0\n4000000000 0 1 2\n",
-                "line 5: expected 4000000000 corners of a face on the line, found 3",
-            ),
-        ];
-        fails(parse, cases);
-    }
-
-    #[test]
-    fn bad_numbers_are_named_with_their_line() {
-        let cases = [
-            ("OFF\n-3 1 0\n", "line 2: expected a count, found \"-3\""),
-            ("OFF\n3 -1 0\n", "line 2: expected a count, found \"-1\""),
-            ("OFF\n3.5 1 0\n", "line 2: expected a count, found \"3.5\""),
-            ("OFF\n3 1 0\n0 0 zero\n", "line 3: expected a finite coordinate, found \"zero\""),
-            ("OFF\n3 1 0\n0 nan 0\n", "line 3: expected a finite coordinate, found \"nan\""),
-            ("OFF\n3 1 0\n\n0 0 -inf\n", "line 4: expected a finite coordinate, found \"-inf\""),
-            ("OFF\n3 1 0\n0 0 1e999\n", "line 3: expected a finite coordinate, found \"1e999\""),
-        ];
-        fails(parse, cases);
-        let bad_faces = [
-            ("3 0 1 3", "line 6: index 3 is out of range: there are 3 vertices"),
-            ("3 0 -1 2", "line 6: index -1 is out of range: there are 3 vertices"),
-            ("3 0 1 4294967296", "line 6: index 4294967296 is out of range: there are 3 vertices"),
-            ("3 0 1 2.0", "line 6: expected a vertex index, found \"2.0\""),
-            (
-                "3 0 1 12345678901234567890",
-                "line 6: expected a vertex index, found \"12345678901234567890\"",
-            ),
-            ("three 0 1 2", "line 6: expected a number of corners, found \"three\""),
-        ];
-        let with = |face: &str| format!("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n{face}\n");
-        fails(parse, bad_faces.map(|(face, message)| (with(face), message)));
+    fn faults_are_named_with_their_lines() {
+        fails(parse, faults(include_str!("off_faults.txt")));
     }
 }

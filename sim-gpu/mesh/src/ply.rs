@@ -126,6 +126,8 @@ fn syntax(error: FormatError) -> ParseError {
 
 #[cfg(test)]
 mod tests {
+    use test_support::said::faults;
+
     use super::super::format::MeshFormat;
     use super::super::load::parse as parse_any;
     use super::super::testing::{fails, is_the_triangle};
@@ -222,30 +224,6 @@ mod tests {
     }
 
     #[test]
-    fn a_promise_of_billions_is_an_error() {
-        let nothing = "element nothing 9000000000\nelement face";
-        let cases = [
-            (
-                header("ascii", "float", 4_000_000_000, 1),
-                "line 15: the file ends after 4 of 4000000000",
-            ),
-            (
-                header("binary_little_endian", "float", 4_000_000_000, 1),
-                "element vertex: the file ends after 2 of 4000000000",
-            ),
-            (
-                header("binary_big_endian", "float", 1, u64::MAX),
-                "element face: the file ends after 0 of 18446744073709551615",
-            ),
-            (
-                header("ascii", "float", 3, 2).replace("element face", nothing),
-                "line 16: the file ends after 1 of 2",
-            ),
-        ];
-        fails(parse, cases.map(|(header, message)| (header + BODY, message)));
-    }
-
-    #[test]
     fn a_vertex_that_is_not_finite_is_a_fault_only_if_a_face_uses_it() {
         let text = header("ascii", "float", 4, 1) + "nan 0 inf\n2 0 0\n3 0 0\n2 1 0\n3 1 2 3\n";
         let mesh = parse_any(text.as_bytes(), MeshFormat::Ply).unwrap().mesh;
@@ -258,30 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_name_their_cause_and_in_text_their_line() {
-        let start = "line 1: expected a PLY file, found \"plx \"";
-        let no_vertex = "ply\nformat ascii 1.0\nend_header\n";
-        let (no_z, no_list) = (
-            "element vertex: property z is missing",
-            "element face: expected a \
-            list called vertex_indices or vertex_index",
-        );
-        let header = header("ascii", "float", 3, 1);
-        let cases = [
-            ("plx\n".to_owned(), start),
-            (no_vertex.to_owned(), "element vertex: missing"),
-            (header.replace("float z", "float w"), no_z),
-            (header.replace("vertex_indices", "strip"), no_list),
-            (format!("{header}0 0 0\n1 0 zero\n"), "line 12: expected a number, found `zero`"),
-            (format!("{header}0 0 0\n"), "line 12: the file ends after 1 of 3"),
-        ];
-        fails(parse, cases);
-        let bad_faces = [
-            ("3 0 1 -1", "face 1 of 1: index -1 is out of range: there are 3 vertices"),
-            ("3 0 1 0.5", "face 1 of 1: index 0.5 is out of range: there are 3 vertices"),
-            ("3 0 1 3", "face 1 of 1: index 3 is out of range: there are 3 vertices"),
-        ];
-        let with = |face: &str| header.clone() + &BODY.replace("3 0 1 2", face);
-        fails(parse, bad_faces.map(|(face, message)| (with(face), message)));
+    fn faults_are_named_with_their_places() {
+        fails(parse, faults(include_str!("ply_faults.txt")));
     }
 }

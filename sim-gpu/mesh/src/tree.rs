@@ -59,7 +59,8 @@ pub enum TreeError {
     /// The folder has no mesh.
     #[error("{}: no mesh found; looked for {}", .0.display(), mesh_extensions().map(|e| format!("*.{e}")).join(", "))]
     NoMesh(PathBuf),
-    /// Two meshes have equal names even with a hash of their paths.
+    /// Two meshes have equal names even with a hash of their paths, or two folders of classes once all
+    /// systems can have them.
     #[error("{first} and {second}: both would be called {name}; rename one")]
     SameName {
         /// The path of the first mesh from the dataset's folder.
@@ -82,8 +83,9 @@ pub enum TreeError {
 /// the class is the folder below `root` (CLASS), and the name that of the next folder (ID).
 ///
 /// Of the meshes without a split, 4 of 5 are in the training set. The split is a function of
-/// `seed`, class and name alone, so that a new mesh does not move others. Folders above `root`
-/// count too: `root` may itself be a class, or a split of one.
+/// `seed`, class and name alone, so that a new mesh does not move others; but a class that would have
+/// none in one of the splits has one there, if it has two. Folders above `root` count too: `root` may
+/// itself be a class, or a split of one.
 ///
 /// Characters that some platform forbids in file names become `_`. If several meshes have the same
 /// class, split and name (`a.obj` beside `a.off`, or in folders at different depths), `_` and a
@@ -115,6 +117,8 @@ pub fn discover(root: &Path, seed: u64) -> Result<Vec<MeshEntry>, TreeError> {
 
     let mut entries: Vec<MeshEntry> =
         places.iter().map(|place| place.entry(has_own_folder, seed)).collect();
+    check_classes(&places, &entries, has_own_folder)?;
+    stratify(&places, &mut entries, seed);
     make_unique(&mut entries)?;
     entries.sort_by(|a, b| (&a.class, a.split, &a.name).cmp(&(&b.class, b.split, &b.name)));
     Ok(entries)
@@ -283,20 +287,24 @@ impl Place {
         self.below().len() > 1 && self.split.is_none_or(|(_, is_own)| !is_own)
     }
 
+    /// The folder that is its class.
+    fn class(&self, has_own_folder: bool) -> &str {
+        match (self.below(), self.folders.last()) {
+            ([class, ..], _) if self.may_have_own_folder() && has_own_folder => class,
+            (_, class) => class.map_or("mesh", |class| class),
+        }
+    }
+
     fn entry(&self, has_own_folder: bool, seed: u64) -> MeshEntry {
         let own = self.may_have_own_folder() && has_own_folder;
-        let (class, name) = match (self.below(), self.folders.last()) {
-            ([class, name, ..], _) if own => (&**class, name.clone()),
-            (_, class) => (
-                class.map_or("mesh", |class| class),
-                self.path.file_stem().map(text).unwrap_or_default(),
-            ),
+        let name = match self.below() {
+            [_, name, ..] if own => name.clone(),
+            _ => self.path.file_stem().map(text).unwrap_or_default(),
         };
-        let (class, name) = (safe_name(class), safe_name(&name));
-        let split = self.split.map(|(split, _)| split).unwrap_or_else(|| {
-            let unit = Stream::Split { class: &class, name: &name }.key(seed).unit(0);
-            if unit < TRAIN_SHARE { Split::Train } else { Split::Test }
-        });
+        let (class, name) = (safe_name(self.class(has_own_folder)), safe_name(&name));
+        let drawn =
+            || if unit(&class, &name, seed) < TRAIN_SHARE { Split::Train } else { Split::Test };
+        let split = self.split.map_or_else(drawn, |(split, _)| split);
         let (path, relative) = (self.path.clone(), self.relative.clone());
         MeshEntry { path, relative, class, split, name }
     }
@@ -310,6 +318,54 @@ fn text(part: &OsStr) -> String {
         chunk.invalid().iter().for_each(|byte| text += &format!("\\x{byte:02X}"));
     }
     text
+}
+
+/// What decides the split of a mesh, 0 to 1.
+fn unit(class: &str, name: &str, seed: u64) -> f64 {
+    Stream::Split { class, name }.key(seed).unit(0)
+}
+
+/// That no two folders become one class.
+fn check_classes(places: &[Place], entries: &[MeshEntry], own: bool) -> Result<(), TreeError> {
+    let mut folders = HashMap::new();
+    for (place, entry) in places.iter().zip(entries) {
+        let first = *folders.entry(&entry.class).or_insert(place.class(own));
+        if first != place.class(own) {
+            let [first, second] = [first, place.class(own)].map(str::to_owned);
+            return Err(TreeError::SameName { first, second, name: entry.class.clone() });
+        }
+    }
+    Ok(())
+}
+
+/// Lets each class of two meshes or more, whose splits no folder says, have one in each split: the one
+/// that was nearest to it.
+fn stratify(places: &[Place], entries: &mut [MeshEntry], seed: u64) {
+    let mut classes: HashMap<String, Vec<usize>> = HashMap::new();
+    for (i, entry) in entries.iter().enumerate() {
+        classes.entry(entry.class.clone()).or_default().push(i);
+    }
+    for mut of_class in classes.into_values().filter(|of_class| of_class.len() > 1) {
+        let split = entries[of_class[0]].split;
+        of_class.sort_by(|a, b| {
+            let [a, b] = [a, b].map(|i| &entries[*i]);
+            let of = |it: &MeshEntry| unit(&it.class, &it.name, seed);
+            of(a).total_cmp(&of(b)).then_with(|| a.relative.cmp(&b.relative))
+        });
+        if of_class.iter().all(|&i| entries[i].split == split && places[i].split.is_none()) {
+            let (nearest, other) = match split {
+                Split::Train => (of_class.len() - 1, Split::Test),
+                Split::Test => (0, Split::Train),
+            };
+            // Files of one name are of one object.
+            let name = entries[of_class[nearest]].name.to_lowercase();
+            let is_same = |&i: &usize| entries[i].name.to_lowercase() == name;
+            let same: Vec<usize> = of_class.iter().copied().filter(is_same).collect();
+            if same.len() < of_class.len() {
+                same.into_iter().for_each(|i| entries[i].split = other);
+            }
+        }
+    }
 }
 
 fn make_unique(entries: &mut [MeshEntry]) -> Result<(), TreeError> {
@@ -457,6 +513,26 @@ mod tests {
         assert!(names.contains(&"n"), "a name of its own stays: {names:?}");
         let again = discover(&root, 1).unwrap();
         assert_eq!(again, entries);
+    }
+
+    #[test]
+    fn small_classes_have_a_mesh_in_each_split_and_no_other_class_s() {
+        let paths: Vec<_> = (0..9).map(|n| format!("{}/{n}.off", ["a", "b", "c"][n % 3])).collect();
+        let (_folder, root) = tree(&paths.iter().map(String::as_str).collect::<Vec<_>>());
+        for seed in 0..40 {
+            let entries = discover(&root, seed).unwrap();
+            let has =
+                |class, split| entries.iter().any(|it| it.class == class && it.split == split);
+            assert!(
+                ["a", "b", "c"].iter().all(|c| Split::ALL.iter().all(|s| has(*c, *s))),
+                "{seed}"
+            );
+        }
+        for [first, second] in [["CON", "_CON"], ["a b ", "a b_"], ["x?", "x:"]] {
+            let (_folder, root) = tree(&[&format!("{first}/1.off"), &format!("{second}/2.off")]);
+            let message = discover(&root, 1).unwrap_err().to_string();
+            assert!(message.contains("both would be called"), "{message}");
+        }
     }
 
     #[test]

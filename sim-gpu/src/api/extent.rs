@@ -60,6 +60,12 @@ impl Extent {
         effect_on_mesh(self.size_m(), effects.noise.map(|noise| noise.sigma_m), quantum_m)
     }
 
+    /// How far its bounding box is from a place, metres; 0 inside.
+    #[must_use]
+    pub fn distance_m(&self, place_m: DVec3) -> f64 {
+        place_m.clamp(self.low, self.high).distance(place_m)
+    }
+
     /// Whether one of `sensors_m` stands inside its bounding box: it then sees the mesh from inside.
     #[must_use]
     pub fn surrounds(&self, sensors_m: &[DVec3]) -> bool {

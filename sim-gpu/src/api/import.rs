@@ -124,14 +124,10 @@ fn looks(
         within(&format!("material {name:?}: luminance"), *luminance, 0.0..=1.0)?;
         warnings.extend(has_image.then(|| Warning::ImageOfMaterial(name.clone())));
     }
-    let look = |mesh: &AssembledMesh| {
-        let of = |number: &Option<usize>| number.map_or(1.0, |number| colours[number].luminance);
-        let runs: Vec<_> = mesh.colours.iter().map(|(number, n)| (of(number), *n)).collect();
-        match &runs[..] {
-            [] => (1.0, None),
-            [(first, _), others @ ..] if others.iter().all(|it| it.0 == *first) => (*first, None),
-            runs => (1.0, Some(Arc::new(Materials::of_runs(runs)))),
-        }
+    let look = |mesh: &AssembledMesh| match &mesh.colours[..] {
+        [] => (1.0, None),
+        [(first, _), others @ ..] if others.iter().all(|it| it.0 == *first) => (*first, None),
+        runs => (1.0, Some(Arc::new(Materials::of_runs(runs)))),
     };
     Ok(meshes.iter().map(look).collect())
 }
@@ -169,19 +165,22 @@ mod tests {
     fn gltf(nodes: &str) -> String {
         let corners = [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
         let bytes: Vec<u8> = corners.iter().flat_map(|x| x.to_le_bytes()).collect();
-        let primitive =
-            |material| format!(r#"{{"attributes": {{"POSITION": 0}}, "material": {material}}}"#);
+        // The colours of the second are the positions of its corners.
+        let primitive = |material, colour| {
+            format!(r#"{{"attributes": {{"POSITION": 0{colour}}}, "material": {material}}}"#)
+        };
         format!(
             r#"{{"asset": {{"version": "2.0"}}, "scenes": [{{"nodes": [0, 1, 2]}}], "nodes": [{nodes}],
             "meshes": [{{"name": "tile", "primitives": [{}, {}]}}, {{"primitives": [{}]}}],
-            "materials": [{{"pbrMetallicRoughness": {{"baseColorFactor": [1, 0, 0.5, 1]}}}}, {{}}],
+            "materials": [{{"pbrMetallicRoughness": {{"baseColorFactor": [1, 0, 0.5, 1]}}}}, {{"extensions": {{
+                "KHR_materials_pbrSpecularGlossiness": {{"diffuseFactor": [0.5, 0.5, 0.5, 1]}}}}}}],
             "accessors": [{{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
                 "min": [0, 0, 0], "max": [1, 1, 0]}}],
             "bufferViews": [{{"buffer": 0, "byteLength": 36}}],
             "buffers": [{{"byteLength": 36, "uri": "data:;base64,{}"}}]}}"#,
-            primitive(0),
-            primitive(1),
-            primitive(0),
+            primitive(0, ""),
+            primitive(1, r#", "COLOR_0": 0"#),
+            primitive(0, ""),
             STANDARD.encode(bytes)
         )
     }
@@ -212,9 +211,9 @@ mod tests {
         let import = Import { base_colours: true, ..Import::default() };
         let ids = scene.add_file(&file, &import).unwrap();
         let materials = scene[ids[0]].materials.as_ref().unwrap();
-        // 0.2126 + 0.0722 / 2, by the weights of BT.709.
+        // 0.2126 + 0.0722 / 2, by the weights of BT.709; half of (0.2126 + 0.7152) / 3.
         let found = [0, 1].map(|triangle| materials.of_triangle(triangle).reflectivity);
-        assert_eq!(found.map(|x| (1e9 * x).round()), [248_700_000.0, 1e9]);
+        assert_eq!(found.map(|x| (1e9 * x).round()), [248_700_000.0, 154_633_333.0]);
         assert!((scene[ids[2]].reflectivity - 0.2487).abs() < 1e-9);
     }
 

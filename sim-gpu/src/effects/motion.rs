@@ -9,7 +9,7 @@ use crate::pose::{Pose, Trajectory};
 /// The uniform motion of a sensor without a trajectory. Points are motion-distorted, as a driver
 /// that ignores ego-motion reports them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table with velocity_m_s and yaw_rate_deg_s")]
 pub struct EvenMotion {
     /// The velocity in the sensor's frame at the start of the scan, metres per second.
     #[serde(default)]

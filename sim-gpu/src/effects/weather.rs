@@ -6,7 +6,7 @@ use crate::config::{InvalidValue, within};
 
 /// Rain, snow, fog, haze, dust and spray: EFFECTS.md has the models. The default is clear air.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table with rain_mm_h, fog_visibility_m and others")]
 pub struct Weather {
     /// The rate of rain, millimetres per hour.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -33,7 +33,7 @@ pub struct Weather {
 
 /// A box of dust or spray, along the world's axes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table with min_m, max_m and visibility_m")]
 pub struct Volume {
     /// The lowest corner, metres.
     pub min_m: [f64; 3],

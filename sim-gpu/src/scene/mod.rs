@@ -54,8 +54,8 @@ pub struct SceneObject {
     pub up: Option<Up>,
     /// `unit-sphere`, `bbox` or `none`. `None`, the default, is `none`: the mesh keeps its units.
     pub normalize: Option<Normalize>,
-    /// The unit of its file; the metre by default.
-    pub units: Unit,
+    /// The unit of its file; `None` is the metre.
+    pub units: Option<Unit>,
     /// The position of the mesh's origin, metres.
     pub position_m: DVec3,
     /// The rotation of the upright, scaled mesh.

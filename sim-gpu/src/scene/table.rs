@@ -64,7 +64,7 @@ pub(super) struct ObjectTable {
     /// The scale and the place of the mesh; by default those of its file.
     normalize: Option<Normalize>,
     #[serde(default)]
-    units: Unit,
+    units: Option<Unit>,
     #[serde(default)]
     position_m: [f64; 3],
     yaw_deg: Option<f64>,
@@ -203,8 +203,8 @@ pub(crate) fn check_motion(
     [from_s, to_s]: [f64; 2],
 ) -> Result<(), InvalidValue> {
     let [first_s, last_s] = trajectory.known_s();
-    // A recording may end within its last revolution.
-    if first_s == last_s || (first_s <= from_s && to_s <= last_s + KITTI_PERIOD_S) {
+    // Unix times are rounded to 2e-7 s.
+    if first_s == last_s || (first_s <= from_s && to_s <= last_s + 1e-6) {
         return Ok(());
     }
     let cause = format!(
@@ -318,6 +318,10 @@ impl ObjectTable {
             Scale::Uniform(factor) => [factor; 3],
             Scale::PerAxis(factors) => factors,
         };
+        if self.units.is_some() && self.normalize.is_some_and(|it| it != Normalize::None) {
+            let cause = "expected a mesh that keeps its size (normalize = \"none\"), since others are scaled";
+            return Err(InvalidValue::new(key("units"), cause).into());
+        }
         let reflectivity = self.reflectivity.unwrap_or(1.0);
         let numbers = check_object(key, scale, reflectivity, self.retroreflection);
         let keys = PoseKeys {

@@ -58,57 +58,8 @@ fn an_object_is_scaled_then_turned_then_moved() {
 
 #[test]
 fn bad_scenes_are_named() {
-    let object = |keys: &str| format!("{OBJECT}{keys}\n{SENSOR}");
-    let sensor = |keys: &str| format!("{OBJECT}[[sensor]]\n{keys}\n");
-    let both = |keys: &str| format!("{keys}\n{OBJECT}{SENSOR}");
-    for (text, part) in [
-        (String::new(), "expected at least one [[object]]"),
-        (OBJECT.to_owned(), "expected at least one [[sensor]]"),
-        (SENSOR.to_owned(), "expected at least one [[object]]"),
-        (format!("{OBJECT}{OBJECT}{SENSOR}"), "object[1].name: \"a\" is the name of object[0] too"),
-        (format!("{OBJECT}{SENSOR}{SENSOR}"), "sensor[1].name: \"vlp16\" is the name of"),
-        (object("colour = 1"), "colour"),
-        (object("scale = 0"), "object[0].scale"),
-        (object("scale = [1, -1, 1]"), "object[0].scale"),
-        (object("scale = [1, 1]"), "as scale"),
-        (object("reflectivity = 1.5"), "object[0].reflectivity"),
-        (object("reflectivity = nan"), "object[0].reflectivity"),
-        (object("retroreflection = 2"), "object[0].retroreflection"),
-        (object("materials = { a = 0.5 }"), "expected the name of a built-in material"),
-        (object("materials = { a = \"paint\" }"), "object[0].materials.a: expected one of asphalt"),
-        (
-            object("materials = { a = { reflectivity = -1 } }"),
-            "object[0].materials.a.reflectivity: expected a number within 0..=1",
-        ),
-        (both("effects = { detection = { range_m = 5 } }"), "effects.detection.reflectivity"),
-        (object("up = \"x\""), "object[0].up: expected one of"),
-        (object("normalize = \"sphere\""), "object[0].normalize: expected one of"),
-        (object("position_m = [0, 0, inf]"), "object[0].position_m"),
-        (object("name = \" \""), "object[0].name: expected a name"),
-        (object("yaw_deg = 1\nquaternion_xyzw = [0, 0, 0, 1]"), "found several of them"),
-        (format!("[[object]]\nmesh = \"\"\n{SENSOR}"), "object[0].mesh: expected the path"),
-        (
-            sensor("profile = \"vlp23\"\nposition_m = [0, 0, 0]\nyaw_deg = 0"),
-            "sensor[0].profile: expected the path of a TOML profile or one of",
-        ),
-        (sensor("profile = \"vlp16\"\nposition_m = [0, 0, 0]"), "sensor[0]: expected look_at_m"),
-        (sensor("profile = \"./none.toml\"\nposition_m = [0, 0, 0]"), "scenes/./none.toml"),
-        (sensor("position_m = [0, 0, 0]"), "profile"),
-        (both("seed = -1"), "seed"),
-        (both("attributes = [\"range\", \"colour\"]"), "attributes[1]"),
-        (both("attributes = [\"range\", \"range\"]"), "attributes[1]: found \"range\""),
-        (both("attributes = [\"intensity\"]"), "requires effects.intensity"),
-        (both("effects = { fog = true }"), "fog"),
-        (both("effects = { dropout = { probability = 2 } }"), "effects.dropout.probability"),
-        (
-            format!(
-                "{OBJECT}[[sensor]]\nprofile = \"kinect-v2\"\nposition_m = [1, 0, 0]\n\
-                     yaw_deg = 0\n[effects]\nquantise_m = true"
-            ),
-            "has no range.quantum_m",
-        ),
-        ("seed = \n".to_owned(), "line 1"),
-    ] {
+    for (text, part) in test_support::said::faults(include_str!("bad.txt")) {
+        let text = String::from_utf8(text).unwrap();
         let error = parse(&text).unwrap_err().to_string();
         assert!(error.contains(part), "{text}\n-> {error}");
         assert!(error.contains("my.toml") || error.contains("none.toml"), "{error}");

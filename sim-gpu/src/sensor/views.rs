@@ -84,6 +84,16 @@ impl Views {
     pub fn validate(&self) -> Result<(), InvalidValue> {
         at_least("views.count", Some(f64::from(self.count)), 1.0)?;
         positive("views.distance_m", self.distance_m)?;
+        for (key, from, to) in [
+            ("views.distance_to_m", self.distance_m, self.distance_to_m),
+            ("views.elevation_to_deg", self.elevation_deg, self.elevation_to_deg),
+        ] {
+            if let Some(to) = to.filter(|to| *to < from) {
+                let cause =
+                    format!("expected the smaller number first, {to},{from}, found {from},{to}");
+                return Err(InvalidValue::new(key, cause));
+            }
+        }
         at_least("views.distance_to_m", self.distance_to_m, self.distance_m)?;
         within("views.elevation_deg", self.elevation_deg, -90.0..=90.0)?;
         within("views.elevation_to_deg", self.elevation_to_deg, self.elevation_deg..=90.0)?;

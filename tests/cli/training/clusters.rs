@@ -102,5 +102,5 @@ fn an_unknown_class_that_the_data_lack_is_an_error() {
     std::fs::write(folder.path().join("r.toml"), recipe).unwrap();
     let ran = train(folder.path(), "train --data train.npz --recipe r.toml --out m.safetensors");
     let error = stderr(&ran);
-    assert!(error.contains("`unknown`: expected some of the classes") && error.contains("`tree`"));
+    assert!(error.contains("unknown: expected some of the classes") && error.contains("`tree`"));
 }

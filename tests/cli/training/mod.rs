@@ -134,73 +134,15 @@ fn unsuited_data_and_recipes_are_errors_that_name_them() {
     let mut in_sphere = clouds(12);
     in_sphere.iter_mut().for_each(|(points, _)| normalize_unit_sphere(points));
     npz("sphere.npz", &in_sphere, &CLASSES);
-    std::fs::write(folder.path().join("metric.toml"), "normalization = \"metric\"").unwrap();
     std::fs::create_dir_all(folder.path().join("set/packed")).unwrap();
     npz("set/packed/a-train.npz", &clouds(9), &CLASSES);
     npz("set/packed/b-train.npz", &clouds(9), &CLASSES);
-    std::fs::write(folder.path().join("bad.toml"), "epoch = 3").unwrap();
-    std::fs::write(folder.path().join("zero.toml"), "epochs = 0").unwrap();
-    std::fs::write(folder.path().join("cpl.toml"), "points = 32\n[cpl]\nkeep = 33").unwrap();
-    std::fs::write(folder.path().join("scale.toml"), "[augment]\nscale = [2, 1]").unwrap();
-    let in_one_place = "cloud 8 (rod_0008): expected points of an object, found all in one place";
-    for (words, expected) in [
-        ("--data nan.npz", "point 1 of cloud 7 (disc_0007) is not finite"),
-        ("--data place.npz", in_one_place),
-        (
-            "--data missing.npz",
-            "missing.npz: expected clouds of every class, found none of disc: make",
-        ),
-        (
-            "--data missing.npz --recipe metric.toml",
-            "found none of disc: more --sweeps of gen-scenes",
-        ),
-        ("--data one.npz", "one.npz: expected two classes or more, found one"),
-        (
-            "--data few.npz",
-            "few.npz: expected a batch of 10 clouds to learn from, found 9: set a smaller `batch`",
-        ),
-        ("--data empty.npz", "empty.npz: expected clouds, found none: its train part is empty"),
-        ("--data set", "with train.npz; found set/packed/a, set/packed/b: name one"),
-        ("--data nowhere", "nowhere: expected a packed NPZ"),
-        ("--data set/packed/c", "; found set/packed/a, set/packed/b: name one"),
-        (
-            "--data . --recipe scale.toml",
-            "`augment.scale`: expected two finite factors above 0, ascending",
-        ),
-        ("--data twice.npz", "twice.npz: expected a name for each class, found two classes `ball`"),
-        (
-            "--data sphere.npz --recipe metric.toml",
-            "sphere.npz: expected clouds in metres, as a network with normalization = \"metric\" takes \
-             them, found clouds in the unit sphere",
-        ),
-        (
-            "--data . --points 33",
-            ".: expected clouds of 33 points or more, found 32: give at most 32",
-        ),
-        ("--data . --recipe bad.toml", "unknown field `epoch`"),
-        (
-            "--data . --recipe street-12",
-            "street-12: expected a recipe's file, or one of edge-64, c",
-        ),
-        ("--data . --recipe street-128", "`unknown`: expected some of the classes"),
-        ("--data . --recipe zero.toml", "`epochs`: expected 1 or more"),
-        ("--data . --recipe cpl.toml", "`cpl.keep`: expected 1 to `points`"),
-    ] {
-        let recipe = if words.contains("--recipe") { "" } else { "--recipe small.toml" };
-        let ran = train(folder.path(), &format!("train {recipe} {words} --out m.safetensors"));
-        assert!(
-            !ran.status.success() && stderr(&ran).contains(expected),
-            "{words}: {}",
-            stderr(&ran)
-        );
-        assert!(!folder.path().join("m.safetensors").exists());
-    }
-    let ran = train(folder.path(), "eval --model edge-64 --data place.npz");
-    assert!(!ran.status.success() && stderr(&ran).contains(in_one_place), "{}", stderr(&ran));
-    let ran = train(folder.path(), "eval --model edge-64 --data sphere.npz");
-    let strange =
-        "sphere.npz: expected classes of edge-64, found ball: rename it in the file's `classes`";
-    assert!(!ran.status.success() && stderr(&ran).contains(strange), "{}", stderr(&ran));
+    let table = crate::in_repository("tests/cli/training/refused.txt");
+    test_support::said::play(&table, folder.path(), |code, words, parts| {
+        let ran = train(folder.path(), words);
+        assert_eq!(ran.status.code(), Some(code), "{words}: {}", stderr(&ran));
+        test_support::said::assert_parts(words, &stderr(&ran), parts);
+    });
 }
 
 #[test]
@@ -217,32 +159,4 @@ fn a_second_run_in_a_folder_is_refused() {
     drop(lock);
     let ran = train(folder.path(), words);
     assert!(ran.status.success(), "{}", stderr(&ran));
-}
-
-#[test]
-fn a_wrong_command_line_exits_with_2_and_a_failure_with_1() {
-    let folder = folder();
-    std::fs::create_dir(folder.path().join("folder.safetensors")).unwrap();
-    for file in ["mine.safetensors", "mine.csv", "mine.svg", "mine.xyz"] {
-        std::fs::write(folder.path().join(file), "0 0 0").unwrap();
-    }
-    for (words, code) in [
-        ("train --recipe small.toml --data . --epochs many --out m.safetensors", 2),
-        ("train --recipe small.toml --data nowhere --out m.safetensors", 1),
-        ("explain --model m.safetensors --cloud c.xyz --points 0", 2),
-        ("explain --model m.safetensors --cloud nowhere.xyz", 1),
-        ("explain --model edge-64 --cloud mine.xyz", 1),
-        ("train --data . --out m.pth", 2),
-        ("train --data . --out folder.safetensors", 2),
-        ("train --data . --out mine.safetensors", 2),
-        ("eval --model edge-64 --data . --csv mine.csv", 2),
-        ("eval --model edge-64 --data . --csv c.txt", 2),
-        ("eval --model edge-64 --data test.npz --data ./test.npz", 2),
-        ("explain --model edge-64 --cloud c.xyz --svg mine.svg", 2),
-        ("explain --model edge-64 --cloud c.xyz --svg c.png", 2),
-        ("sample --sampler all mine.xyz mine.xyz", 2),
-    ] {
-        let ran = train(folder.path(), words);
-        assert_eq!(ran.status.code(), Some(code), "{words}: {}", stderr(&ran));
-    }
 }

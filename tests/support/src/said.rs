@@ -69,6 +69,17 @@ pub fn play(file: &Path, folder: &Path, mut run: impl FnMut(i32, &str, &[&str]))
     }
 }
 
+/// The files of a table with lines `FILE -> MESSAGE`, in the escapes of [`play`]'s files, and the messages.
+///
+/// # Panics
+/// If a line has no arrow.
+pub fn faults(table: &str) -> impl Iterator<Item = (Vec<u8>, &str)> {
+    table.lines().filter(|line| !line.starts_with('#')).map(|line| {
+        let (file, message) = line.rsplit_once(" -> ").expect("FILE -> MESSAGE");
+        (unescaped(&format!("{file}\\c")), message)
+    })
+}
+
 /// Asserts that `text` has these parts of a table.
 ///
 /// # Panics

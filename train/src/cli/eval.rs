@@ -22,7 +22,8 @@ For clouds of one size, `eval` prints the accuracy. For clusters whose file hold
 sensor or ids, for several files, and with --known, --tracks or --min-points, it prints a
 table: the shares of right answers, with 95 % intervals, by class, label, range, number of
 points, sensor and file. An object whose label is not a class of the model is a negative;
-the right answer to it is `unknown`.")]
+the right answer to it is `unknown`. Views of one mesh are often right or wrong together: the
+interval of an accuracy counts meshes, which the names of the clouds tell.")]
 pub struct EvalArgs {
     /// The model file, or the name of a bundled model
     #[arg(long, value_name = "MODEL")]
@@ -100,6 +101,7 @@ fn report_clouds(
     super::print(&accuracy_report::summary(&found, n_classes, data))?;
     if let Some(path) = &args.csv {
         atomic::write_bytes(path, accuracy_report::to_csv(&found, names))?;
+        program::say!("confusion matrix: {}", path.display());
     }
     Ok(())
 }
@@ -161,6 +163,7 @@ fn report_objects(
     }
     if let Some(path) = &args.csv {
         atomic::write_bytes(path, table.to_csv())?;
+        program::say!("table: {}", path.display());
     }
     Ok(())
 }

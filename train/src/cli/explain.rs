@@ -77,6 +77,7 @@ pub fn run(args: &ExplainArgs) -> anyhow::Result<()> {
     print(&format!("critical points: {}", critical.len()))?;
     if let Some(path) = &args.svg {
         atomic::write_bytes(path, explanation_drawing::draw(&points, &found, &critical))?;
+        say(format!("drawing: {}", path.display()));
     }
     Ok(())
 }

@@ -1,6 +1,7 @@
 use std::path::PathBuf;
 
 use crate::clouds::Clouds;
+use crate::error::Error;
 use crate::job::{Job, Progress};
 use crate::recipe::Recipe;
 use formats::split::Split;
@@ -98,6 +99,6 @@ fn recipe(args: &TrainArgs) -> anyhow::Result<Recipe> {
     recipe.epochs = args.epochs.unwrap_or(recipe.epochs);
     recipe.seed = args.seed.unwrap_or(recipe.seed);
     recipe.init = args.init.clone().or(recipe.init);
-    recipe.check()?;
+    recipe.check().map_err(Error::from)?;
     Ok(recipe)
 }

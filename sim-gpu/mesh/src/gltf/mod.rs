@@ -32,6 +32,8 @@ const ALLOWED: [&str; 8] = [
     "EXT_lights_",
     "KHR_xmp",
 ];
+/// The colours of vertices.
+const COLOUR: gltf::Semantic = gltf::Semantic::Colors(0);
 /// Without it, the file has one of many instances, even where it is not required.
 const INSTANCING: &str = "EXT_mesh_gpu_instancing";
 
@@ -67,6 +69,7 @@ fn read(
     let mut reader = Reader {
         buffers: Buffers::of(&file, folder)?,
         assembly: Assembly::default(),
+        world_from_file,
         numbers: vec![None; file.meshes().len()],
         warnings: Warnings::default(),
     };
@@ -167,6 +170,7 @@ impl Warnings {
 struct Reader<'a> {
     buffers: Buffers<'a>,
     assembly: Assembly,
+    world_from_file: DAffine3,
     /// The numbers in the assembly of the file's meshes that were read.
     numbers: Vec<Option<usize>>,
     warnings: Warnings,
@@ -194,10 +198,12 @@ fn place(node: &Node<'_>, parent: DAffine3) -> Result<DAffine3, String> {
 
 impl Reader<'_> {
     /// Adds the mesh of a node.
-    fn add(&mut self, node: &Node<'_>, world_from_mesh: DAffine3) -> Result<(), String> {
+    fn add(&mut self, node: &Node<'_>, mut world_from_mesh: DAffine3) -> Result<(), String> {
         let Some(mesh) = node.mesh() else { return Ok(()) };
         if node.skin().is_some() {
             self.warnings.add(Warning::Skin);
+            // Joints alone place a skin (glTF 2.0, 3.7.3.3).
+            world_from_mesh = self.world_from_file;
         }
         if mesh.primitives().any(|primitive| primitive.morph_targets().len() > 0) {
             self.warnings.add(Warning::MorphTargets);
@@ -249,7 +255,7 @@ impl Reader<'_> {
         let positions = primitive.get(&gltf::Semantic::Positions);
         let positions = positions.ok_or("expected the attribute POSITION, found none")?;
         let TriangleMesh { vertices, triangles } = &mut to.mesh;
-        let (first, before) = (vertices.len(), triangles.len());
+        let first = vertices.len();
         self.buffers.each(&positions, Dimensions::Vec3, |at| {
             vertices.push(DVec3::new(at[0], at[1], at[2]));
         })?;
@@ -271,8 +277,29 @@ impl Reader<'_> {
         if let Some(outside) = indices.iter().find(|index| **index as usize >= n) {
             return Err(format!("expected indices of {n} vertices, found {outside}"));
         }
-        let mut face =
-            |corners: [u32; 3]| triangles.push(corners.map(|corner| first as u32 + corner));
+        let base = base_colour(&primitive.material()).0;
+        let mut colours = vec![base; if primitive.get(&COLOUR).is_some() { 0 } else { n }];
+        if let Some(accessor) = primitive.get(&COLOUR) {
+            self.buffers.each(&accessor, accessor.dimensions(), |rgb| {
+                colours.push([0, 1, 2].map(|i| base[i] * rgb[i].clamp(0.0, 1.0)));
+            })?;
+            if colours.len() != n
+                || !matches!(accessor.dimensions(), Dimensions::Vec3 | Dimensions::Vec4)
+            {
+                return Err(format!(
+                    "expected {n} colours of 3 or 4 numbers in COLOR_0, found others"
+                ));
+            }
+        }
+        let mut face = |corners: [u32; 3]| {
+            triangles.push(corners.map(|corner| first as u32 + corner));
+            let [a, b, c] = corners.map(|corner| luminance(colours[corner as usize]));
+            let of_face = if a == b && b == c { a } else { (a + b + c) / 3.0 };
+            match to.colours.last_mut() {
+                Some((last, n)) if *last == of_face => *n += 1,
+                _ => to.colours.push((of_face, 1)),
+            }
+        };
         match mode {
             // Every other triangle of a strip runs the other way round (glTF 2.0, 3.7.2.1).
             Mode::TriangleStrip => indices.windows(3).enumerate().for_each(|(i, w)| {
@@ -283,19 +310,28 @@ impl Reader<'_> {
             }
             _ => indices.as_chunks::<3>().0.iter().for_each(|corners| face(*corners)),
         }
-        to.colours.push((primitive.material().index(), triangles.len() - before));
         Ok(())
     }
 }
 
-/// The colour of a material, whose factor is linear: its luminance by the weights of ITU-R BT.709.
 fn colour(material: &gltf::Material<'_>) -> BaseColour {
-    let surface = material.pbr_metallic_roughness();
-    let [red, green, blue, _] = surface.base_color_factor().map(f64::from);
+    let (factor, has_image) = base_colour(material);
     let place = || format!("materials[{}]", material.index().unwrap_or_default());
-    BaseColour {
-        name: material.name().map_or_else(place, str::to_owned),
-        luminance: 0.2126 * red + 0.7152 * green + 0.0722 * blue,
-        has_image: surface.base_color_texture().is_some(),
-    }
+    let name = material.name().map_or_else(place, str::to_owned);
+    BaseColour { name, luminance: luminance(factor), has_image }
+}
+
+/// The linear factor of a material's colour, and whether an image is multiplied by it.
+fn base_colour(material: &gltf::Material<'_>) -> ([f64; 3], bool) {
+    let metal = material.pbr_metallic_roughness();
+    let (factor, has_image) = match material.pbr_specular_glossiness() {
+        Some(gloss) => (gloss.diffuse_factor(), gloss.diffuse_texture().is_some()),
+        None => (metal.base_color_factor(), metal.base_color_texture().is_some()),
+    };
+    ([0, 1, 2].map(|i| f64::from(factor[i])), has_image)
+}
+
+/// The luminance of a linear colour by the weights of ITU-R BT.709.
+fn luminance([red, green, blue]: [f64; 3]) -> f64 {
+    0.2126 * red + 0.7152 * green + 0.0722 * blue
 }

@@ -200,6 +200,15 @@ fn animated_nodes_stand_at_rest_with_a_warning() {
 }
 
 #[test]
+fn a_skin_stands_where_it_was_bound_wherever_its_node_is() {
+    let node = r#"{"mesh": 0, "skin": 0, "translation": [100, 0, 0]}"#;
+    let text = json(node, 4, 3).replace(r#""meshes""#, r#""skins": [{"joints": [0]}], "meshes""#);
+    let root = DAffine3::from_translation(DVec3::X);
+    let found = assemble(&glb(&text, &buffer()), None, root).unwrap();
+    assert_eq!((found.parts[0].world_from_mesh, found.warnings), (root, vec![Warning::Skin]));
+}
+
+#[test]
 fn rotation_of_length_0_is_an_error() {
     let file = glb(&json(r#"{"rotation": [0, 0, 0, 0], "mesh": 0}"#, 4, 3), &buffer());
     let error = parse(&file, None).unwrap_err().to_string();

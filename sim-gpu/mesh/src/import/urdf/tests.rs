@@ -139,67 +139,11 @@ fn meshes_are_found_beside_the_robot_and_in_packages() {
 
 #[test]
 fn faults_are_named_with_their_lines() {
-    let swap = |from: &str, to: &str| {
-        let changed = ARM.replace(from, to);
-        assert_ne!(changed, ARM);
-        changed
-    };
-    for (text, expected) in [
-        ("<robot>".to_owned(), "expected URDF, which is XML"),
-        ("<a/>".to_owned(), "line 1: expected the element robot, found a"),
-        ("<robot/>".to_owned(), "line 1: expected one link without a joint above, found none"),
-        ("<robot><link name=\"a\"/></robot>".to_owned(), "expected a link with visual geometry"),
-        (
-            "<robot><link name=\"a\"><collision><geometry><box size=\"1 1 1\"/></geometry></collision></link></robot>".to_owned(),
-            "expected a link with visual geometry, found only collision geometry: `collision = true` takes it",
-        ),
-        (
-            "<robot xmlns:x=\"http://www.ros.org/wiki/xacro\">\n<x:macro name=\"a\"/></robot>".to_owned(),
-            "line 2: expected URDF, found xacro:macro: run `xacro` on the file first",
-        ),
-        (swap("</link>", ""), "line 25: expected URDF, which is XML: expected 'link' tag"),
-        (
-            swap(" type=\"revolute\"", ""),
-            "line 4: joint \"shoulder\": joint: expected the attribute type",
-        ),
-        (swap("revolute", "hinge"), "expected one of revolute, continuous"),
-        (
-            swap("child link=\"lower\"", "child link=\"none\""),
-            "line 10: joint \"elbow\": expected a link as child",
-        ),
-        (
-            swap("child link=\"lower\"", "child link=\"base\""),
-            "expected joints from one root to each link, found a circle",
-        ),
-        (swap("parent link=\"upper\"", "parent link=\"hand\""), "found a circle of links"),
-        (
-            swap("child link=\"hand\"", "child link=\"lower\""),
-            "link \"lower\": expected one joint above",
-        ),
-        (
-            swap("<link name=\"hand\">", "<link name=\"base\">"),
-            "line 24: expected links of different names",
-        ),
-        (swap("0 0 3", "0 0 0"), "joint \"shoulder\": expected an axis of a length above 0"),
-        (
-            swap("0 0 3", "0 x 3"),
-            "line 6: joint \"shoulder\": axis: expected 3 finite numbers as xyz",
-        ),
-        (
-            swap("2 0.2 0.2", "2 nan 0.2"),
-            "line 8: link \"upper\": box: expected 3 finite numbers as size",
-        ),
-        (
-            swap("length=\"2\"", "length=\"-2\""),
-            "link \"lower\": cylinder: expected length above 0, found -2",
-        ),
-        (swap("radius=\"0.2\"", "radius=\"1e9\""), "expected a radius up to 100 m"),
-        (swap("<sphere radius=\"0.2\"/>", ""), "expected a shape in geometry"),
-        (
-            swap("mimic joint=\"shoulder\"", "mimic joint=\"elbow\""),
-            "joint \"elbow\": expected it to follow up to 100 joints",
-        ),
-    ] {
+    for (swapped, expected) in test_support::said::faults(include_str!("faults.txt")) {
+        let swapped = String::from_utf8(swapped).unwrap();
+        let (from, to) = swapped.split_once(" | ").unwrap();
+        let text = if from.is_empty() { to.to_owned() } else { ARM.replace(from, to) };
+        assert_ne!(text, ARM, "{from}");
         let error = read_at(&text, &[]).unwrap_err().to_string();
         assert!(error.contains(expected), "{expected}: {error}");
     }

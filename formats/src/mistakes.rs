@@ -11,7 +11,7 @@ use serde::de::DeserializeOwned;
 use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue, Deserializer, Error};
 
-use super::{InvalidValue, one_of};
+use crate::InvalidValue;
 
 /// The largest number of mistakes in a message.
 const MOST: usize = 20;
@@ -27,12 +27,14 @@ const STAND_INS: [&str; 8] =
     ["1", "\"x\"", "true", "[1, 1, 1]", "[1, 1]", "[1, 1, 1, 1]", "[]", "{}"];
 
 /// Everything that is wrong with a file, sorted by line.
-pub(super) struct Mistakes {
+#[derive(Debug)]
+pub struct Mistakes {
     all: Vec<Mistake>,
     /// How many of them a message has.
     most: usize,
 }
 
+#[derive(Debug)]
 struct Mistake {
     /// The line, from 1; `None` where the key's table is the file itself.
     line: Option<usize>,
@@ -41,6 +43,10 @@ struct Mistake {
 
 impl Mistakes {
     /// What `check` makes of the `text`, or everything that is wrong with it.
+    ///
+    /// # Errors
+    /// All unknown keys, missing keys and values of other types; in a file without these, all that `check`
+    /// refuses.
     pub fn find<T: DeserializeOwned, U>(
         text: &str,
         check: impl Fn(T) -> Result<U, Vec<InvalidValue>>,
@@ -293,6 +299,27 @@ impl<'a> Reader<'a> {
         };
         format!("{expected}, found {found}")
     }
+}
+
+/// `expected one of range, ring, found "rnig"; did you mean "ring"?`
+#[must_use]
+pub fn one_of(word: &str, known: &[&str]) -> String {
+    let meant = did_you_mean(word, known.iter().copied());
+    format!("expected one of {}, found \"{word}\"{meant}", known.join(", "))
+}
+
+/// `; did you mean "noise"?` if one of `known` is close to `word`, and nothing otherwise.
+#[must_use]
+pub fn did_you_mean<'a>(word: &str, known: impl Iterator<Item = &'a str>) -> String {
+    let word = &*word.to_lowercase();
+    // As clap and git: at most a third of the word is wrong, or its unit is missing.
+    let distance = |known: &&str| match known.strip_prefix(word) {
+        Some(unit) if unit.starts_with('_') => 0,
+        _ => strsim::damerau_levenshtein(word, known),
+    };
+    let closest = known.min_by_key(distance);
+    let closest = closest.filter(|known| 3 * distance(known) <= word.chars().count());
+    closest.map(|known| format!("; did you mean \"{known}\"?")).unwrap_or_default()
 }
 
 /// Serde's name of a type, in TOML's terms.
