@@ -286,9 +286,7 @@ impl Reader<'_> {
             if colours.len() != n
                 || !matches!(accessor.dimensions(), Dimensions::Vec3 | Dimensions::Vec4)
             {
-                return Err(format!(
-                    "expected {n} colours of 3 or 4 numbers in COLOR_0, found others"
-                ));
+                return Err(format!("expected {n} colours of 3 or 4 numbers, found others"));
             }
         }
         let mut face = |corners: [u32; 3]| {
