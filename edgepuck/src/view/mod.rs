@@ -117,7 +117,8 @@ fn lay_meshes_under_scans(panes: &mut Vec<Pane>) {
     let (meshes, mut others): (Vec<_>, Vec<_>) =
         std::mem::take(panes).into_iter().partition(Pane::has_meshes);
     for mesh in meshes {
-        let lies = others.iter_mut().map(|scan| scan.lay_over(&mesh)).fold(false, |a, b| a || b);
+        let mut lies = false;
+        others.iter_mut().for_each(|scan| lies |= scan.lay_over(&mesh));
         if !lies {
             mesh.warn_of_size();
             panes.push(mesh);

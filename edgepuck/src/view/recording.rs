@@ -69,7 +69,7 @@ impl<'a> Cdr<'a> {
 
     /// The frame that a header names, after its time.
     fn header(&mut self) -> Option<String> {
-        (self.u32()?, self.u32()?);
+        let _time = (self.u32()?, self.u32()?);
         self.text()
     }
 
@@ -80,7 +80,7 @@ impl<'a> Cdr<'a> {
     }
 
     fn cloud(&mut self) -> Option<Scan> {
-        (self.header()?, self.u32()?, self.u32()?);
+        let _size = (self.header()?, self.u32()?, self.u32()?);
         let mut fields = Vec::new();
         for _ in 0..self.u32()? {
             fields.push((self.text()?, self.u32()? as usize, self.take::<1>()?[0], self.u32()?));
