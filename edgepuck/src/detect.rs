@@ -107,16 +107,14 @@ pub(crate) fn run(args: &DetectArgs) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-/// A detector; prints a warning if the model is not for clusters.
 fn open(model: &Path, options: &Options, min_points: usize) -> anyhow::Result<Detector> {
-    let detector = Detector::open(model, options, min_points).map_err(|error| match error {
+    Detector::open(model, options, min_points).map_err(|error| match error {
         DetectError::Settings(error) => anyhow::Error::new(Usage(error.to_string())),
+        DetectError::Model(infer_cpu::Error::WholeObjects(cause)) => {
+            Usage(format!("{}: {cause}", model.display())).into()
+        }
         error => error.into(),
-    })?;
-    if let Some(warning) = detector.warning() {
-        program::say!("warning: {}: {warning}", model.display());
-    }
-    Ok(detector)
+    })
 }
 
 fn json_of(object: &Object) -> Value {

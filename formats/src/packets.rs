@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use crate::returns::Return;
+use crate::velodyne::{Sector, UnsentPackets};
 use crate::vlp32c::SEQUENCE_US;
 use crate::{ouster, velodyne};
 
@@ -20,7 +21,12 @@ pub enum PacketError {
 /// Decodes the packets of one sensor.
 pub enum Decoder {
     /// A VLP-16 or VLP-32C.
-    Velodyne(velodyne::Decoder),
+    Velodyne {
+        /// Its decoder.
+        decoder: velodyne::Decoder,
+        /// The packets that it does not send.
+        unsent: UnsentPackets,
+    },
     /// An OS0, OS1 or OS2.
     Ouster {
         /// Its decoder.
@@ -46,8 +52,12 @@ pub struct Facts {
     pub azimuth_rad: f64,
     /// The speed of the head, radians per microsecond.
     pub speed_rad_us: f64,
-    /// The packets between the previous one and this that the sensor does not send.
+    /// The packets between the previous one and this that the sensor does not send. Those of a Velodyne
+    /// are known when they are missing again, and are counted twice then.
     pub n_unsent: u64,
+    /// Where the packet goes on behind a sector that the sensor does not send: microseconds after its first
+    /// firing, and the azimuth of the head, radians clockwise from x.
+    pub resumes: Option<(f64, f64)>,
 }
 
 impl Decoder {
@@ -58,13 +68,22 @@ impl Decoder {
     pub fn new(metadata: Option<&ouster::Metadata>, payload: &[u8]) -> Result<Self, PacketError> {
         let Some(metadata) = metadata else {
             let header = velodyne::Header::parse(payload)?;
-            return Ok(Self::Velodyne(velodyne::Decoder::new(header.model)));
+            let decoder = velodyne::Decoder::new(header.model);
+            return Ok(Self::Velodyne { decoder, unsent: UnsentPackets::default() });
         };
         let decoder = Box::new(ouster::Decoder::new(metadata));
         let before = decoder.header(payload)?.measurement_id;
         let unsent = metadata.n_columns_unsent() / metadata.columns_per_packet;
         let yaw_rad = metadata.yaw_rad();
         Ok(Self::Ouster { decoder, yaw_rad, n_unsent: unsent.into(), before })
+    }
+
+    /// The same decoder, which knows that the sensor sends this sector only.
+    pub(crate) fn of_sector(mut self, sector: &Sector) -> Self {
+        if let Self::Velodyne { unsent, .. } = &mut self {
+            *unsent = UnsentPackets::outside(sector);
+        }
+        self
     }
 
     /// Decodes a packet into `returns`.
@@ -78,14 +97,17 @@ impl Decoder {
     ) -> Result<Facts, PacketError> {
         returns.clear();
         match self {
-            Self::Velodyne(decoder) => {
+            Self::Velodyne { decoder, unsent } => {
                 let header = decoder.decode(payload, |found| returns.push(*found))?;
                 Ok(Facts {
                     stamp_us: f64::from(header.time_us),
                     duration_us: header.duration_us(),
                     azimuth_rad: f64::from(header.azimuth) * UNIT_RAD,
                     speed_rad_us: header.units_per_us * UNIT_RAD,
-                    n_unsent: 0,
+                    n_unsent: unsent.take(&header),
+                    resumes: header
+                        .resumes()
+                        .map(|(us, azimuth)| (us, f64::from(azimuth) * UNIT_RAD)),
                 })
             }
             Self::Ouster { decoder, yaw_rad, n_unsent, before } => {
@@ -99,6 +121,7 @@ impl Decoder {
                     azimuth_rad: f64::from(header.measurement_id) * column_rad - *yaw_rad,
                     speed_rad_us: f64::from(header.columns) * column_rad / header.duration_us,
                     n_unsent: if is_new_turn { *n_unsent } else { 0 },
+                    resumes: None,
                 })
             }
         }
@@ -108,7 +131,7 @@ impl Decoder {
     #[must_use]
     pub fn most_offset_rad(&self) -> f64 {
         match self {
-            Self::Velodyne(decoder) => decoder.most_offset_rad(),
+            Self::Velodyne { decoder, .. } => decoder.most_offset_rad(),
             Self::Ouster { decoder, .. } => decoder.most_offset_rad(),
         }
     }
@@ -117,7 +140,7 @@ impl Decoder {
     #[must_use]
     pub fn elevations_deg(&self) -> Vec<f32> {
         let radians = match self {
-            Self::Velodyne(decoder) => decoder.elevations_rad(),
+            Self::Velodyne { decoder, .. } => decoder.elevations_rad(),
             Self::Ouster { decoder, .. } => decoder.elevations_rad(),
         };
         radians.into_iter().map(f32::to_degrees).collect()
@@ -128,7 +151,7 @@ impl Decoder {
     pub fn wraps_us(&self) -> Option<f64> {
         match self {
             // Velodyne counts microseconds past the hour.
-            Self::Velodyne(_) => Some(3.6e9),
+            Self::Velodyne { .. } => Some(3.6e9),
             Self::Ouster { .. } => None,
         }
     }
@@ -137,7 +160,7 @@ impl Decoder {
     #[must_use]
     pub fn step_rad(&self, facts: &Facts) -> f64 {
         let step_us = match self {
-            Self::Velodyne(_) => SEQUENCE_US,
+            Self::Velodyne { .. } => SEQUENCE_US,
             Self::Ouster { decoder, .. } => facts.duration_us / f64::from(decoder.columns()),
         };
         step_us * facts.speed_rad_us

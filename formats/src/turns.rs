@@ -61,7 +61,7 @@ pub fn read_turns(
         }
         let decoder = match &mut decoder {
             Some(decoder) => decoder,
-            None => decoder.insert(Decoder::new(metadata, payload)?),
+            None => decoder.insert(Decoder::new(metadata, payload)?.of_sector(&sector)),
         };
         let facts = decoder.decode(payload, &mut found)?;
         // Of two returns of a beam, the strongest is used, or the first of an Ouster.
@@ -76,11 +76,9 @@ pub fn read_turns(
         if let Some(before) = head
             && now.gaps > before.gaps
         {
-            let passed = sector.unsent_between(before.facts.azimuth_rad, facts.azimuth_rad);
-            let unsent_us =
-                if passed > 0.0 { passed * TAU / before.facts.speed_rad_us } else { 0.0 };
-            let step = (now.time_us - before.time_us - unsent_us) / before.facts.duration_us;
-            lost += (step.round() as u64).saturating_sub(1 + facts.n_unsent);
+            let step = (now.time_us - before.time_us) / before.facts.duration_us;
+            lost += (step.round() as u64).saturating_sub(1);
+            lost = lost.saturating_sub(facts.n_unsent);
         }
         head = Some(now);
         let start = *start.get_or_insert_with(|| {
@@ -122,7 +120,7 @@ pub fn read_turns(
     }
     counts.missing = lost;
     let model = match decoder {
-        Some(Decoder::Velodyne(decoder)) => Some(decoder.model()),
+        Some(Decoder::Velodyne { decoder, .. }) => Some(decoder.model()),
         _ => None,
     };
     Ok((model, counts))

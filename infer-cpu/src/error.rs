@@ -10,6 +10,9 @@ pub enum Error {
     /// A file cannot be read, or has the wrong format.
     #[error(transparent)]
     Format(#[from] FormatError),
+    /// A model of whole objects was to classify clusters of a scan.
+    #[error("{0}")]
+    WholeObjects(String),
     /// The cloud has no points.
     #[error("the cloud has no points that are finite and not at 0, 0, 0")]
     NoPoints,

@@ -125,8 +125,8 @@ fn an_ouster_sees_the_same_street() {
     let sent: Vec<_> = (0..n_packets).map(|number| ouster_packet(&things, number)).collect();
     let since_s = |i: usize| i as f64 / OUSTER_PACKETS_PER_S as f64;
     let lost = |i: usize| i % 640 == 20;
-    // It sends all 64 packets of a turn, or the first half of them.
-    for (last_column, n_sent) in [(1023, 64), (511, 32)] {
+    // It sends all 64 packets of a turn, or the first of them.
+    for (last_column, n_sent, n_lost) in [(1023, 64, 2), (511, 32, 2), (239, 15, 0)] {
         let window = format!("\"column_window\": [0, {last_column}], \"pixels_per_column\"");
         let metadata = ouster_metadata().replace("\"pixels_per_column\"", &window);
         let mut options = all();
@@ -136,10 +136,71 @@ fn an_ouster_sees_the_same_street() {
         let objects = run(&mut pipeline, coming.map(|(i, packet)| (since_s(i), &packet[..])));
         pipeline.take(&sent[0][..48], Arrival { time_s: START_S, moment: None });
         let counts = pipeline.counts();
-        let expected = ((n_packets * n_sent / 64) as u64 - 2, 2, 1);
+        let expected = ((n_packets / 64 * n_sent) as u64 - n_lost, n_lost, 1);
         assert_eq!((counts.packets, counts.lost, counts.foreign), expected, "{n_sent}");
+        assert_eq!((counts.dropped_points, pipeline.stats().n_turns()), (0, 19), "{n_sent}");
         if n_sent == 64 {
             last_of_tracks(&objects, &things, 18);
+        }
+    }
+}
+
+/// The packets of a sensor in the street that sends a sector only, units of 0.01 degree: packets go on
+/// behind what is not sent (`is_filled`), or those outside are left out.
+fn of_sector([from, to]: [u16; 2], is_filled: bool) -> Vec<(f64, [u8; PACKET])> {
+    let sent = packets(&street(), 5_000, 3 * PACKETS_PER_S);
+    let after = |azimuth: u16| (azimuth + 36_000 - from) % 36_000;
+    let is_sent = |block: &[u8]| after(u16::from_le_bytes([block[2], block[3]])) < after(to);
+    if !is_filled {
+        let inside = on_time(&sent).filter(|(_, packet)| packet[..1200].chunks(100).all(is_sent));
+        return inside.map(|(since_s, packet)| (since_s, packet.try_into().unwrap())).collect();
+    }
+    let blocks = sent.iter().flat_map(|packet| packet[..1200].chunks(100)).enumerate();
+    let inside: Vec<_> = blocks.filter(|(_, block)| is_sent(block)).collect();
+    let packet = |blocks: &[(usize, &[u8])]| {
+        let since_s = blocks[0].0 as f64 * PACKET_S / 12.0;
+        let mut bytes = sent[0];
+        let inside = blocks.iter().flat_map(|(_, block)| block.iter().copied());
+        bytes.iter_mut().zip(inside).for_each(|(byte, new)| *byte = new);
+        bytes[1200..1204].copy_from_slice(&(5_000 + (since_s * 1e6) as u32).to_le_bytes());
+        (since_s, bytes)
+    };
+    inside.chunks_exact(12).map(packet).collect()
+}
+
+#[test]
+fn a_sensor_that_sends_a_sector_sees_what_is_in_it_and_loses_nothing() {
+    let sent = packets(&street(), 5_000, 3 * PACKETS_PER_S);
+    let whole = run(&mut pipeline(&all()), on_time(&sent));
+    for [from, to] in [[32_000, 5_000], [1_000, 6_000], [30_000, 24_000]] {
+        for is_filled in [true, false] {
+            let sent = of_sector([from, to], is_filled);
+            let mut pipeline = pipeline(&all());
+            let objects =
+                run(&mut pipeline, sent.iter().map(|(at_s, packet)| (*at_s, &packet[..])));
+            let Counts { lost, late, restarts, dropped_points, .. } = *pipeline.counts();
+            let name = format!("{from} to {to}, {is_filled}");
+            assert_eq!([lost, late, restarts, dropped_points], [0; 4], "{name}");
+            // The parked car is in each turn.
+            let turns: BTreeSet<_> = objects.iter().map(|object| object.turn).collect();
+            assert!(turns.iter().copied().eq(0..turns.len() as u64), "{name}: {turns:?}");
+            assert!((29..=31).contains(&turns.len()), "{name}: {turns:?}");
+            let is_inside = |object: &&Object| {
+                let azimuth_deg = (-object.position_m[1]).atan2(object.position_m[0]).to_degrees();
+                let after_deg =
+                    |azimuth_deg: f64| (azimuth_deg - f64::from(from) / 100.0).rem_euclid(360.0);
+                let width_deg = after_deg(f64::from(to) / 100.0);
+                object.turn > 2 && (13.0..width_deg - 13.0).contains(&after_deg(azimuth_deg))
+            };
+            let is_seen = |whole: &&Object| {
+                objects.iter().any(|found| {
+                    let off = |i: usize| (found.position_m[i] - whole.position_m[i]).abs();
+                    (found.last_s - whole.last_s).abs() < 1e-4 && off(0).max(off(1)) < 0.01
+                })
+            };
+            let expected: Vec<_> = whole.iter().filter(is_inside).collect();
+            let n_seen = expected.iter().copied().filter(is_seen).count();
+            assert!(n_seen > 20 && 10 * n_seen > 9 * expected.len(), "{name}: {n_seen}");
         }
     }
 }

@@ -1,5 +1,5 @@
 use crate::arrays::sweep;
-use crate::error::{raised, raised_with_causes, warn};
+use crate::error::{raised, raised_with_causes};
 use infer_cpu::Options;
 use infer_cpu::detect::{Detector, Object, OrientedBox, Sweep};
 use numpy::{IntoPyArray, PyReadonlyArray1, PyReadonlyArray2};
@@ -23,8 +23,6 @@ pub fn detect<'py>(
     let points = sweep(py, &cloud)?;
     let opened = py.detach(|| Detector::open(Path::new(model), &options, min_points));
     let mut detector = opened.map_err(|error| raised_with_causes(error.into()))?;
-    let warning = detector.warning().map(|warning| format!("{model}: {warning}"));
-    warn(py, warning.as_slice())?;
     detector.min_confidence = min_confidence;
     let sweep = Sweep { points: &points, rings: rings.as_deref() };
     let found = py.detach(|| detector.detect(&sweep));

@@ -63,6 +63,18 @@ fn or_zero(x: f32, least: f32) -> f32 {
 mod tests {
     use super::*;
 
+    /// With a constant gradient, each step is the rate: the means are corrected for their start at 0.
+    #[test]
+    fn a_constant_gradient_moves_a_weight_by_the_rate_in_each_step() {
+        let mut weight = Parameter::new("w".to_owned(), vec![2], vec![0.0, 0.0]);
+        weight.gradient = vec![1.0, -50.0];
+        (1..=10).for_each(|step| update(&mut weight, step, 1e-3));
+        let near = |found: f32, expected: f64| (f64::from(found) / expected - 1.0).abs() < 1e-5;
+        assert!(near(weight.value[0], -0.01) && near(weight.value[1], 0.01), "{weight:?}");
+        assert!(near(weight.mean[0], 1.0 - 0.9f64.powi(10)), "{weight:?}");
+        assert!(near(weight.square[0], 1.0 - 0.999f64.powi(10)), "{weight:?}");
+    }
+
     #[test]
     fn a_weight_that_only_the_l2_term_moves_ends_at_0_and_is_never_subnormal() {
         let mut weight = Parameter::new("w".to_owned(), vec![2], vec![0.1, -1e-19]);

@@ -36,10 +36,10 @@ impl fmt::Display for Epoch {
 }
 
 /// Whether `epoch` is better on the validation set than all `earlier` ones. Compares the share of
-/// correct clouds or, if `by_class`, its mean over classes.
-pub fn is_best(epoch: &Epoch, earlier: &[Epoch], by_class: bool) -> bool {
+/// correct clouds or, if the recipe has a `balance`, its mean over classes.
+pub fn is_best(epoch: &Epoch, earlier: &[Epoch], balance: f64) -> bool {
     let score = |row: &Epoch| {
-        if by_class { row.validation_class } else { row.validation_instance }.unwrap_or(0.0)
+        if balance > 0.0 { row.validation_class } else { row.validation_instance }.unwrap_or(0.0)
     };
     earlier.iter().all(|row| score(row) < score(epoch))
 }
@@ -58,4 +58,28 @@ pub fn to_csv(epochs: &[Epoch]) -> String {
         )
     };
     epochs.iter().map(line).fold(HEADER.to_owned(), |csv, line| csv + &line)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_best_epoch_is_that_of_clouds_or_with_a_balance_that_of_classes() {
+        let of = |instance, class| Epoch {
+            epoch: 1,
+            rate: 1.0,
+            loss: 1.0,
+            accuracy: 0.5,
+            validation_instance: Some(instance),
+            validation_class: Some(class),
+            seconds: 1.0,
+            clouds_per_second: 1.0,
+        };
+        let (clouds, classes) = (of(0.9, 0.4), of(0.8, 0.6));
+        for (balance, [first, second]) in [(0.0, [true, false]), (0.5, [false, true])] {
+            assert_eq!(is_best(&clouds, &[classes], balance), first);
+            assert_eq!(is_best(&classes, &[clouds], balance), second);
+        }
+    }
 }

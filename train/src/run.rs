@@ -77,7 +77,7 @@ impl<'a> Run<'a> {
             epoch.validation_class = Some(found.class_accuracy().0);
         }
         (self.report)(Progress::Epoch(&epoch));
-        let is_best = is_best(&epoch, &self.epochs, self.trainer.recipe.balance > 0.0);
+        let is_best = is_best(&epoch, &self.epochs, self.trainer.recipe.balance);
         self.epochs.push(epoch);
         // Without a validation set, the last epoch is taken.
         if held.set.is_empty() || is_best {

@@ -58,21 +58,20 @@ impl Trainer {
                     return Err(Error::NotFinite { loss, step, epoch, layer });
                 }
                 self.step += 1;
-                let progress = f64::from(self.epoch) + (step - 1) as f64 / steps as f64;
-                let factor = recipe.schedule.factor(progress, recipe.epochs);
-                adam::step(&mut self.model, self.step, recipe.rate * factor);
+                let done = (step - 1) as f64 / steps as f64;
+                adam::step(&mut self.model, self.step, rate(&recipe, self.epoch, done));
                 loss += cost.total;
                 correct += cost.correct;
             }
             Ok(())
         })?;
-        let factor = recipe.schedule.factor(f64::from(self.epoch), recipe.epochs);
+        let rate = rate(&recipe, self.epoch, 0.0);
         self.epoch += 1;
         let n = (steps * recipe.batch) as f64;
         let seconds = begun.elapsed().as_secs_f64();
         Ok(Epoch {
             epoch: self.epoch,
-            rate: recipe.rate * factor,
+            rate,
             loss: loss / steps as f64,
             accuracy: correct as f64 / n,
             validation_instance: None,
@@ -81,6 +80,11 @@ impl Trainer {
             clouds_per_second: n / seconds,
         })
     }
+}
+
+/// The learning rate after a part of an epoch, from 0 to 1, where `epoch` are finished.
+fn rate(recipe: &Recipe, epoch: u32, part: f64) -> f64 {
+    recipe.rate * recipe.schedule.factor(f64::from(epoch) + part, recipe.epochs)
 }
 
 /// The dropout mask of the last hidden features in `step`: 0 for what is dropped, and what is kept
@@ -98,6 +102,18 @@ fn dropout(recipe: &Recipe, step: u64, (clouds, width): (usize, usize)) -> Matri
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::recipe_tables::Schedule;
+
+    /// Half of the cosine is over in the middle of the fourth of six epochs, the first of which warms up.
+    #[test]
+    fn the_rate_follows_the_schedule_within_an_epoch() {
+        let schedule = Schedule::Cosine { warm_up: 1.0 };
+        let recipe = Recipe { schedule, rate: 2.0, epochs: 6, ..Recipe::default() };
+        let expected = [(0, 0.5, 0.51), (1, 0.0, 1.0), (3, 0.5, 0.505), (6, 0.0, 0.01)];
+        for (epoch, part, factor) in expected {
+            assert!((rate(&recipe, epoch, part) - 2.0 * factor).abs() < 1e-12, "{epoch} {part}");
+        }
+    }
 
     #[test]
     fn each_step_drops_its_share_of_other_features() {

@@ -15,3 +15,4 @@ pub use capture::{count_returns, read_turn};
 pub use model::Model;
 pub use packet::{Decoder, Header, PacketError};
 pub(crate) use sector::Sector;
+pub use sector::UnsentPackets;

@@ -143,6 +143,23 @@ impl Header {
         number as f64 * self.model.block_us() + pause_us
     }
 
+    /// Within the packet, the azimuths from and to which the head turns without sending.
+    pub(super) fn unsent(&self) -> Option<(u16, u16)> {
+        let (from, width) = self.spans().next()?;
+        self.jump.map(|jump| ((from + width) % TURN, jump.azimuth))
+    }
+
+    /// Where the packet goes on behind a sector that the sensor does not send: microseconds after its
+    /// start, and the azimuth.
+    pub(crate) fn resumes(&self) -> Option<(f64, u16)> {
+        self.jump.map(|jump| (self.firing_us(jump.firing), jump.azimuth))
+    }
+
+    /// The azimuth at its end.
+    pub(super) fn end(&self) -> u16 {
+        self.spans().last().map_or(self.azimuth, |(from, width)| (from + width) % TURN)
+    }
+
     /// The azimuths over which it fires: where each span begins, and its width.
     pub(super) fn spans(&self) -> impl Iterator<Item = (u16, u16)> {
         let step = self.units_per_us * self.model.block_us();

@@ -1,4 +1,5 @@
-//! The azimuths that a sensor sends, if it was set to a part of the turn.
+//! The azimuths that a sensor sends, if it was set to a part of the turn: from the first turns of a
+//! capture ([`Sector`]), or as packets come ([`UnsentPackets`]).
 
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
@@ -13,6 +14,10 @@ use crate::error::FormatError;
 /// wide, azimuth units. A packet of a VLP-32C at 1200 rpm spans 4.8 degrees, and one is lost now and
 /// then, but hardly in all turns at the same azimuth.
 const LEAST_UNSENT: u16 = 300;
+
+/// More than the step from one block to the next, azimuth units: a turn of the sector begins and ends with
+/// any block.
+const NEAR: u16 = 100;
 
 /// The number of azimuths.
 const N: usize = TURN as usize;
@@ -86,8 +91,6 @@ impl Sector {
     /// How far the start of a turn's first packet is from where the turn begins: the start of the sector, or
     /// this packet if the whole turn is sent. Below 0 is the sector of the turn before.
     pub(super) fn after_start(&self, azimuth: u16) -> f64 {
-        // Less than a block: a turn of the sector begins with its first block, at any azimuth.
-        const NEAR: u16 = 100;
         let ahead = forward(self.start, azimuth);
         match self.unsent {
             0 => 0.0,
@@ -106,13 +109,61 @@ impl Sector {
     pub(crate) fn since_start(&self, azimuth_rad: f64) -> f64 {
         self.after_start(units(azimuth_rad)) / f64::from(TURN)
     }
+}
 
-    /// The turns that the head passes without sending from one azimuth to a later one, radians.
-    pub(crate) fn unsent_between(&self, from_rad: f64, to_rad: f64) -> f64 {
-        match self.is_passed(units(from_rad), units(to_rad)) {
-            true => self.unsent() / f64::from(TURN),
-            false => 0.0,
+/// Tells packets that are not sent from those that are lost, as packets come: a sector that is not sent
+/// is missing in each turn.
+#[derive(Clone, Debug, Default)]
+pub struct UnsentPackets {
+    before: Option<Header>,
+    /// Where the latest gap begins and ends.
+    gap: Option<(u16, u16)>,
+    /// Packets of the latest gap that may have been lost.
+    n_doubtful: u64,
+}
+
+impl UnsentPackets {
+    /// Those of a sensor that sends this sector only.
+    pub(crate) fn outside(sector: &Sector) -> Self {
+        let from = (sector.start + TURN - sector.unsent) % TURN;
+        let gap = (sector.unsent > 0).then_some((from, sector.start));
+        Self { gap, ..Self::default() }
+    }
+
+    /// The number of packets between the one before and this one that were not sent. The first time, they
+    /// seem to be lost; the second time, those of the first are counted with them.
+    pub(crate) fn take(&mut self, header: &Header) -> u64 {
+        let Some(before) = self.before else {
+            (self.before, self.gap) = (Some(*header), header.unsent().or(self.gap));
+            return 0;
+        };
+        if step_us(&before, header) <= 0.0 {
+            return 0;
         }
+        self.before = Some(*header);
+        let gap = (before.end(), header.azimuth);
+        let width = |(from, to)| forward(from, to);
+        let is_gap =
+            header.units_per_us > 0.0 && (LEAST_UNSENT..=TURN - LEAST_UNSENT).contains(&width(gap));
+        let within = |known: &(u16, u16)| {
+            let ahead = forward(gap.0, (known.0 + NEAR) % TURN);
+            u32::from(ahead) + u32::from(width(*known)) <= u32::from(width(gap) + 2 * NEAR)
+        };
+        // Both durations are rounded, the one by stamps and this one by azimuths.
+        let n_packets = |gap| {
+            (f64::from(width(gap)) / header.units_per_us / header.sending_us() + 0.05).round()
+                as u64
+        };
+        let n_unsent = match self.gap.filter(within) {
+            _ if !is_gap => 0,
+            Some(known) => n_packets(known) + std::mem::take(&mut self.n_doubtful),
+            None => {
+                (self.gap, self.n_doubtful) = (Some(gap), n_packets(gap));
+                0
+            }
+        };
+        self.gap = header.unsent().or(self.gap);
+        n_unsent
     }
 }
 

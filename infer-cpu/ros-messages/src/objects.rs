@@ -56,25 +56,31 @@ impl Object {
         BoundingBox3D { center, size: Vector3 { x, y, z } }
     }
 
-    fn detection(&self) -> Detection3D {
+    fn detection(&self) -> Option<Detection3D> {
         let bbox = self.bbox();
-        let hypothesis = |class: &String| ObjectHypothesisWithPose {
+        let hypothesis = ObjectHypothesisWithPose {
             hypothesis: ObjectHypothesis {
-                class_id: class.clone(),
+                class_id: self.named()?.to_owned(),
                 score: self.probability.unwrap_or_default(),
             },
             pose: PoseWithCovariance { pose: bbox.center.clone(), ..PoseWithCovariance::default() },
         };
-        Detection3D {
+        Some(Detection3D {
             header: self.header(),
-            results: self.class.iter().map(hypothesis).collect(),
+            results: vec![hypothesis],
             bbox,
             id: self.track.to_string(),
-        }
+        })
+    }
+
+    /// The class, unless it is unknown.
+    fn named(&self) -> Option<&str> {
+        self.class.as_deref().filter(|class| *class != "unknown")
     }
 
     /// A box, and a text above it.
-    fn markers(&self) -> [Marker; 2] {
+    fn markers(&self) -> Option<[Marker; 2]> {
+        let class = self.named()?;
         let BoundingBox3D { center, size } = self.bbox();
         let cube = Marker {
             header: self.header(),
@@ -84,7 +90,7 @@ impl Object {
             kind: Marker::CUBE,
             pose: center,
             scale: size,
-            color: color(self.class.as_deref()),
+            color: color(class),
             lifetime: Duration { sec: 0, nanosec: (MARKER_LIFETIME_S * 1e9) as u32 },
             ..Marker::default()
         };
@@ -93,35 +99,32 @@ impl Object {
             kind: Marker::TEXT_VIEW_FACING,
             scale: Vector3 { x: 0.0, y: 0.0, z: LETTER_M },
             color: ColorRGBA { r: 1.0, g: 1.0, b: 1.0, a: 1.0 },
-            text: format!("{} {}", self.class.as_deref().unwrap_or("?"), self.track),
+            text: format!("{class} {}", self.track),
             ..cube.clone()
         };
         text.pose.position.z += cube.scale.z / 2.0 + LETTER_M;
-        [cube, text]
+        Some([cube, text])
     }
 }
 
-/// The objects of a turn. The array's time and frame are those of the last object.
+/// The objects of a turn that have a class other than unknown. The array's time and frame are those of
+/// the last object of any kind.
 #[must_use]
 pub fn detections(objects: &[Object]) -> Detection3DArray {
     Detection3DArray {
         header: objects.last().map(Object::header).unwrap_or_default(),
-        detections: objects.iter().map(Object::detection).collect(),
+        detections: objects.iter().filter_map(Object::detection).collect(),
     }
 }
 
-/// The objects of a turn for RViz and other viewers: a box and a text for each, with the track as
-/// `id`.
+/// The same objects for RViz and other viewers: a box and a text for each, with the track as `id`.
 #[must_use]
 pub fn markers(objects: &[Object]) -> MarkerArray {
-    MarkerArray { markers: objects.iter().flat_map(Object::markers).collect() }
+    MarkerArray { markers: objects.iter().filter_map(Object::markers).flatten().collect() }
 }
 
-/// The colour of a class: a hue that depends only on its name, or grey without a class.
-fn color(class: Option<&str>) -> ColorRGBA {
-    let Some(class) = class.filter(|class| *class != "unknown") else {
-        return ColorRGBA { r: 0.6, g: 0.6, b: 0.6, a: 0.5 };
-    };
+/// The colour of a class: a hue that depends only on its name.
+fn color(class: &str) -> ColorRGBA {
     // FNV-1a, 32 bits (RFC 9923).
     let hash = class
         .bytes()
@@ -169,19 +172,17 @@ mod tests {
         let unknown = Object { class: Some("unknown".to_owned()), ..object() };
         let nameless = Object { class: None, probability: None, last_s: 11.0, ..object() };
         let array = detections(&[object(), unknown, nameless]);
-        let [car, unknown, nameless] = &array.detections[..] else { panic!("{array:?}") };
+        let [car] = &array.detections[..] else { panic!("{array:?}") };
         assert_eq!(array.header.stamp, Time { sec: 11, nanosec: 0 });
         assert_eq!((&car.header, &*car.id), (&header(), "7"));
         assert_eq!(car.bbox.size, Vector3 { x: 4.0, y: 2.0, z: 1.5 });
         let [result] = &car.results[..] else { panic!("{car:?}") };
         let class = |class: &str| ObjectHypothesis { class_id: class.to_owned(), score: 0.8 };
         assert_eq!(result.hypothesis, class("car"));
-        assert_eq!(unknown.results[0].hypothesis, class("unknown"));
         assert_eq!(result.pose.covariance, [[0.0; 6]; 6]);
         for found in [&car.bbox.center, &result.pose.pose] {
             assert_near(found, &pose(3.0));
         }
-        assert_eq!(nameless.results, []);
     }
 
     #[test]
@@ -192,12 +193,12 @@ mod tests {
         let object: Object = serde_json::from_str(&line).unwrap();
         let nothing = LINE.replace('}', r#","whole_box":null}"#);
         assert_eq!(serde_json::from_str::<Object>(&nothing).unwrap(), self::object());
-        let BoundingBox3D { center, size } = &object.detection().bbox;
+        let BoundingBox3D { center, size } = &object.detection().unwrap().bbox;
         assert_eq!(center.position, Point { x: 2.0, y: 3.0, z: 3.5 });
         assert_eq!(*size, Vector3 { x: 5.0, y: 2.5, z: 2.0 });
         // A quarter turn to the right about z.
         assert!((center.orientation.z + 0.5f64.sqrt()).abs() < 1e-15, "{center:?}");
-        let [cube, text] = object.markers();
+        let [cube, text] = object.markers().unwrap();
         assert_eq!((&cube.pose, &cube.scale), (center, size));
         assert_eq!(text.pose.position, Point { z: 3.5 + 1.0 + 0.4, ..center.position });
     }
@@ -205,7 +206,7 @@ mod tests {
     #[test]
     fn an_object_becomes_a_box_and_a_text() {
         let array = markers(&[object(), Object { class: None, ..object() }]);
-        let [cube, text, nameless, _] = &array.markers[..] else { panic!("{array:?}") };
+        let [cube, text] = &array.markers[..] else { panic!("{array:?}") };
         assert_eq!((cube.kind, cube.id, cube.ns.as_str(), cube.action), (1, 7, "boxes", 0));
         assert_eq!((text.kind, text.id, text.ns.as_str(), text.action), (9, 7, "names", 0));
         assert_eq!(text.text, "car 7");
@@ -219,9 +220,8 @@ mod tests {
         assert_near(&text.pose, &pose(3.0 + 0.75 + 0.4));
         let names = ["car", "pedestrian", "cyclist", "truck"];
         for (i, name) in names.iter().enumerate() {
-            assert!(names[..i].iter().all(|other| color(Some(name)) != color(Some(other))));
+            assert!(names[..i].iter().all(|other| color(name) != color(other)));
         }
-        assert_eq!(nameless.color, color(Some("unknown")));
     }
 
     /// The expected bytes follow from the definition and from CDR's alignment: a number of n bytes

@@ -14,7 +14,13 @@ pub struct ClusterClassifier {
 
 impl ClusterClassifier {
     /// With as many threads as `classifier` has.
+    ///
+    /// # Errors
+    /// A model of whole objects, which cannot tell clusters apart; threads that cannot be started.
     pub fn new(classifier: Classifier) -> Result<Self, Error> {
+        classifier
+            .unsuited_to_clusters()
+            .map_or(Ok(()), |cause| Err(Error::WholeObjects(cause)))?;
         let rule = Rule::new(&classifier);
         Ok(Self { team: ClassifierTeam::new(classifier)?, rule })
     }

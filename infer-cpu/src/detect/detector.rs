@@ -22,7 +22,6 @@ pub struct Detector {
     /// Wider clusters are no objects, metres.
     widest_m: f32,
     classifier: ClusterClassifier,
-    unsuited: Option<String>,
     /// The least confidence of an object, [`LEAST_CONFIDENCE`] at first; clusters below count as
     /// unknown.
     pub min_confidence: f64,
@@ -73,7 +72,7 @@ impl Detector {
     /// `min_points` points.
     ///
     /// # Errors
-    /// A model that cannot be loaded with these options.
+    /// A model that cannot be loaded with these options, or that has learnt whole objects.
     pub fn open(model: &Path, options: &Options, min_points: usize) -> Result<Self, DetectError> {
         let classifier = Classifier::load(model, options)?;
         let mut settings = Settings::default();
@@ -82,16 +81,9 @@ impl Detector {
         Ok(Self {
             segmenter: Segmenter::new(settings)?,
             widest_m,
-            unsuited: classifier.unsuited_to_clusters(),
             classifier: ClusterClassifier::new(classifier)?,
             min_confidence: LEAST_CONFIDENCE,
         })
-    }
-
-    /// A warning if the model has learnt whole objects in place of clusters.
-    #[must_use]
-    pub fn warning(&self) -> Option<&str> {
-        self.unsuited.as_deref()
     }
 
     /// Cuts `sweep`, in the sensor's frame, into the clusters that are recognised best.
@@ -186,7 +178,7 @@ mod tests {
         let (points, rings) = sweep();
         let sweep = Sweep { points: &points, rings: Some(&rings) };
         let mut detector = detector(20).unwrap();
-        assert_eq!((detector.warning(), detector.min_confidence), (None, LEAST_CONFIDENCE));
+        assert_eq!(detector.min_confidence, LEAST_CONFIDENCE);
         for (min_confidence, n_objects) in [(0.0, None), (1.1, Some(0))] {
             detector.min_confidence = min_confidence;
             let found = detector.detect(&sweep).unwrap();

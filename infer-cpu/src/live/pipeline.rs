@@ -1,4 +1,4 @@
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::TAU;
 use std::time::Instant;
 
 use formats::geometry::Pose;
@@ -174,9 +174,10 @@ impl Pipeline {
         }
     }
 
-    /// The time of a packet; `None` if it is late or a duplicate. Counts the relation of the packet
-    /// to the one before. After a long gap, all clusters before it are completed.
-    fn in_order(&mut self, facts: &Facts, arrival: Arrival) -> Option<Tag> {
+    /// The time of a packet, and whether others are missing before it; `None` if it is late or a
+    /// duplicate. Counts the relation of the packet to the one before. After a gap of a turn, all clusters
+    /// before it are completed.
+    fn in_order(&mut self, facts: &Facts, arrival: Arrival) -> Option<(Tag, bool)> {
         let clock = &mut self.sensor.as_mut()?.clock;
         let (succession, time_s) = clock.take(facts.stamp_us, facts.duration_us, arrival.time_s);
         if let Some([recorded_s, stamped_s]) = clock.disagreement_s() {
@@ -192,25 +193,25 @@ impl Pipeline {
                 self.tracker.forget();
             }
             Succession::Follows { missing } => {
-                self.counts.lost += missing.saturating_sub(facts.n_unsent);
-                // Beyond a quarter of a turn, the azimuth does not determine how far the head has
-                // turned.
+                self.counts.lost = (self.counts.lost + missing).saturating_sub(facts.n_unsent);
+                // Beyond a turn, the azimuth does not determine how far the head has turned.
                 let turned_rad = missing as f64 * facts.duration_us * facts.speed_rad_us;
-                if turned_rad > FRAC_PI_2 {
+                if turned_rad > TAU {
                     self.end();
                 }
             }
         }
         let is_used = !matches!(succession, Succession::Duplicate | Succession::Late);
-        is_used.then_some(Tag { time_s, moment: arrival.moment, ring: 0 })
+        let is_behind_gap = matches!(succession, Succession::Follows { missing: 1.. });
+        is_used.then_some((Tag { time_s, moment: arrival.moment, ring: 0 }, is_behind_gap))
     }
 
     /// Passes the decoded returns of a packet to the stream.
-    fn segment(&mut self, facts: &Facts, packet: Tag) {
+    fn segment(&mut self, facts: &Facts, packet: (Tag, bool)) {
         let Self { sensor: Some(sensor), options, returns, waiting, counts, .. } = self else {
             return;
         };
-        self.taken_s = Some(packet.time_s);
+        self.taken_s = Some(packet.0.time_s);
         counts.packets += 1;
         counts.points += returns.len() as u64;
         if facts.speed_rad_us > 0.0 {
@@ -220,7 +221,7 @@ impl Pipeline {
         sensor.push(facts, returns, packet, waiting, options.ego_motion.as_ref());
         counts.dropped_points = sensor.stream.dropped().total();
         if sensor.stream.n_turns() > n_turns {
-            self.stats.end_turn();
+            self.stats.end_turn(counts);
         }
     }
 

@@ -128,12 +128,12 @@ impl Recorder {
         Ok(())
     }
 
-    /// Writes the data since the last whole turn and ends the recording. A file without data is
-    /// removed.
+    /// Writes the data since the last whole turn and ends the recording, and returns the file and the
+    /// number of its turns. A file without data is removed.
     ///
     /// # Errors
     /// A file that cannot be written.
-    pub fn finish(mut self, pipeline: &Pipeline) -> Result<(), RecordError> {
+    pub fn finish(mut self, pipeline: &Pipeline) -> Result<(PathBuf, u32), RecordError> {
         self.end_turn(pipeline)?;
         let finished = self.writer.finish().map(drop).map_err(io_error).and_then(|()| {
             match self.n_turns == 0 && self.file.metadata()?.is_file() {
@@ -141,7 +141,10 @@ impl Recorder {
                 false => Ok(()),
             }
         });
-        finished.map_err(|source| failure(&self.file, source))
+        match finished {
+            Ok(()) => Ok((self.file, self.n_turns)),
+            Err(source) => Err(failure(&self.file, source)),
+        }
     }
 
     fn end_turn(&mut self, pipeline: &Pipeline) -> Result<(), RecordError> {

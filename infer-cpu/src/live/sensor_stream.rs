@@ -1,6 +1,6 @@
 //! The data of one sensor: its packets, their order, and the stream of its returns.
 
-use edgepuck_segment::Stream;
+use edgepuck_segment::{Stream, StreamCluster};
 use formats::geometry::Trajectory;
 use formats::returns::Return;
 
@@ -41,24 +41,35 @@ impl SensorStream {
         Ok(Self { decoder, clock, stream, n_foreign: 0 })
     }
 
-    /// Passes the returns of a packet to the stream; `packet` has its time.
+    /// Passes the returns of a packet, which may follow a gap, to the stream; `packet` has its time.
     pub fn push(
         &mut self,
         facts: &Facts,
         returns: &[Return],
-        packet: Tag,
+        (packet, is_behind_gap): (Tag, bool),
         waiting: &mut Waiting,
         motion: Option<&Trajectory>,
     ) {
         let Self { decoder, stream, .. } = self;
+        let offset_rad = decoder.most_offset_rad();
         let turn = stream.n_turns();
-        stream.advance((facts.azimuth_rad - decoder.most_offset_rad()) as f32, |cluster| {
-            waiting.push(&cluster, turn, motion);
-        });
+        let mut each = |cluster: StreamCluster<'_, Tag>| waiting.push(&cluster, turn, motion);
+        let start_rad = (facts.azimuth_rad - offset_rad) as f32;
+        match is_behind_gap {
+            true => stream.skip(start_rad, facts.n_unsent > 0, &mut each),
+            false => stream.advance(start_rad, &mut each),
+        }
+        let mut resumes = facts.resumes;
         for found in returns {
+            if let Some((_, azimuth_rad)) = resumes.take_if(|(us, _)| found.after_us >= *us) {
+                stream.skip((azimuth_rad - offset_rad) as f32, true, &mut each);
+            }
             let time_s = packet.time_s + found.after_us * 1e-6;
             let tag = Tag { time_s, ring: found.ring, ..packet };
             stream.push(found.point_m, found.ring, tag);
+        }
+        if let Some((_, azimuth_rad)) = resumes {
+            stream.skip((azimuth_rad - offset_rad) as f32, true, &mut each);
         }
     }
 

@@ -2,6 +2,8 @@ use std::time::Duration;
 
 use hdrhistogram::Histogram;
 
+use super::counts::Counts;
+
 formats::named! {
     /// A stage of the pipeline.
     pub enum Stage: "stage" {
@@ -22,6 +24,8 @@ pub struct Stats {
     turn: [Duration; Stage::ALL.len()],
     stages: [Histogram<u64>; Stage::ALL.len()],
     latency: Histogram<u64>,
+    /// The counts at the end of the last whole turn.
+    whole: Counts,
     /// The longest time of the first turn, whose ground is known at its end.
     first_turn: Option<Duration>,
 }
@@ -37,6 +41,7 @@ impl Stats {
             turn: [Duration::ZERO; Stage::ALL.len()],
             stages: Stage::ALL.map(|_| histogram()),
             latency: histogram(),
+            whole: Counts::default(),
             first_turn: None,
         }
     }
@@ -45,7 +50,8 @@ impl Stats {
         self.turn[stage as usize] += time;
     }
 
-    pub(super) fn end_turn(&mut self) {
+    pub(super) fn end_turn(&mut self, counts: &Counts) {
+        self.whole = *counts;
         for (stage, time) in self.stages.iter_mut().zip(&mut self.turn) {
             stage.saturating_record(time.as_micros() as u64);
             *time = Duration::ZERO;
@@ -57,6 +63,12 @@ impl Stats {
             0 => self.first_turn = self.first_turn.max(Some(latency)),
             _ => self.latency.saturating_record(latency.as_micros() as u64),
         }
+    }
+
+    /// Points and clusters of the average turn.
+    #[must_use]
+    pub fn per_turn(&self) -> [f64; 2] {
+        [self.whole.points, self.whole.clusters].map(|n| n as f64 / self.n_turns().max(1) as f64)
     }
 
     /// The number of measured turns.
@@ -105,12 +117,12 @@ mod tests {
             stats.spend(Stage::Segment, Duration::from_millis(turn));
             stats.spend(Stage::Segment, Duration::from_millis(2));
             stats.answered_after(Duration::from_millis(20 - turn), turn);
-            stats.end_turn();
+            stats.end_turn(&Counts { points: 5 * (turn + 1), ..Counts::default() });
         }
         let near = |found: f64, expected: f64| (found - expected).abs() <= 0.01 * expected;
         assert!(near(stats.mean_ms(Stage::Segment), 6.5) && stats.mean_ms(Stage::Track) == 0.0);
         assert!(near(stats.stage_ms(Stage::Segment, 1.0), 11.0) && stats.n_turns() == 10);
-        assert_eq!(stats.first_turn_ms(), Some(20.0));
+        assert_eq!((stats.first_turn_ms(), stats.per_turn()), (Some(20.0), [5.0, 0.0]));
         assert!(near(stats.latency_ms(1.0).unwrap(), 19.0));
     }
 }

@@ -195,6 +195,31 @@ impl<T: Copy + Default> Stream<T> {
     /// clusters that this completes to `each`. An azimuth behind the previous one has no effect. The
     /// first call marks where the stream begins.
     pub fn advance(&mut self, azimuth_rad: f32, mut each: impl FnMut(StreamCluster<'_, T>)) {
+        let ahead = self.columns_to(azimuth_rad);
+        // More than half a turn ahead is behind: azimuths of packets may go back a little.
+        if ahead <= self.waiting.len() / 2 {
+            (0..ahead).for_each(|_| self.close(&mut each));
+        }
+    }
+
+    /// The same over a gap in the data of up to a turn: packets were lost, or the sensor does not send a
+    /// sector (`is_unsent`), whose end is where its turns begin.
+    pub fn skip(
+        &mut self,
+        azimuth_rad: f32,
+        is_unsent: bool,
+        mut each: impl FnMut(StreamCluster<'_, T>),
+    ) {
+        (0..self.columns_to(azimuth_rad)).for_each(|_| self.close(&mut each));
+        if is_unsent && self.ground.is_some() && self.front != Some(self.turn_start) {
+            // The ground stays: a part of a turn tells too little of it.
+            self.n_turns += 1;
+            self.begin_turn();
+        }
+    }
+
+    /// The number of columns from the front to an azimuth; the first one is the front.
+    fn columns_to(&mut self, azimuth_rad: f32) -> usize {
         let n_columns = self.waiting.len();
         // A margin for rounding: the error of `angle::atan2` is at most 2e-5.
         const ROUNDING: f32 = 1e-4;
@@ -203,13 +228,9 @@ impl<T: Copy + Default> Stream<T> {
         let Some(front) = self.front else {
             self.front = Some(column as u64);
             self.turn_start = column as u64;
-            return;
+            return 0;
         };
-        let ahead = ahead(front, column, n_columns);
-        // More than half a turn ahead is behind: azimuths of packets may go back a little.
-        if ahead <= n_columns / 2 {
-            (0..ahead).for_each(|_| self.close(&mut each));
-        }
+        ahead(front, column, n_columns)
     }
 
     /// Reports all clusters so far, complete or not. The stream begins anew at the next call of
@@ -350,6 +371,10 @@ impl<T: Copy + Default> Stream<T> {
                 (self.turn_start..end).for_each(|place| self.open(place, each));
             }
         }
+        self.begin_turn();
+    }
+
+    fn begin_turn(&mut self) {
         self.turn_start = self.front.unwrap_or(0);
         self.turn.clear();
     }

@@ -11,8 +11,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use crate::live::{Counts, Flaw, LiveOptions, Pipeline, Recorder, Timeline, Trajectory};
-use crate::{Classifier, Options, Precision};
+use crate::live::{Counts, Flaw, LiveError, LiveOptions, Pipeline, Recorder, Timeline, Trajectory};
+use crate::{Classifier, Error, Options, Precision};
 use formats::ouster::Metadata;
 use formats::plausible::sensor_motion;
 use formats::trajectory::check_cover;
@@ -83,8 +83,9 @@ pub struct LiveArgs {
     json: bool,
 
     /// Record points and objects to a new file that ROS 2, Foxglove and Rerun read: MCAP with
-    /// /points (PointCloud2), /objects (Detection3DArray), /objects/markers (MarkerArray),
-    /// /tf_static and, with --poses, /tf; each turn is in the file when it ends
+    /// /points (PointCloud2), /objects (Detection3DArray) and /objects/markers (MarkerArray) of the
+    /// objects with a class other than unknown, /tf_static and, with --poses, /tf; each turn is in
+    /// the file when it ends
     #[arg(long, value_name = "FILE")]
     mcap: Option<PathBuf>,
 
@@ -248,10 +249,12 @@ impl LiveArgs {
         let threads = n_threads(self.threads);
         let options = Options { precision: self.precision, threads, ..Options::default() };
         let classifier = Classifier::load(&model, &options).map_err(of_setup)?;
-        if let Some(warning) = classifier.unsuited_to_clusters() {
-            program::say!("warning: {}: {warning}", model.display());
-        }
-        Ok(Pipeline::new(classifier, live)?)
+        Pipeline::new(classifier, live).map_err(|error| match error {
+            LiveError::Classifier(Error::WholeObjects(cause)) => {
+                Usage(format!("{}: {cause}", model.display())).into()
+            }
+            error => error.into(),
+        })
     }
 
     fn options(&self) -> anyhow::Result<LiveOptions> {

@@ -54,11 +54,14 @@ impl Outputs {
     }
 
     pub fn end(self, pipeline: &Pipeline) -> anyhow::Result<()> {
-        let recorded = self.recorder.map_or(Ok(()), |recorder| recorder.finish(pipeline));
+        let recorded = self.recorder.map(|recorder| recorder.finish(pipeline)).transpose();
         if let Some(failure) = self.lines_failure.filter(|f| f.kind() != ErrorKind::BrokenPipe) {
             return Err(failure.into());
         }
-        self.recorder_failure.map_or(recorded, Err)?;
+        if let Some((file, n_turns @ 1..)) = self.recorder_failure.map_or(recorded, Err)? {
+            let n_objects = pipeline.counts().clusters;
+            program::say!("{}: {n_turns} turns, {n_objects} boxes of objects", file.display());
+        }
         Ok(())
     }
 }

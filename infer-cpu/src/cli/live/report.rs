@@ -25,12 +25,10 @@ pub fn print(pipeline: &Pipeline, read: &Read) {
              at most"
         );
     }
-    let n_turns = stats.n_turns().max(1) as f64;
+    let [points, clusters] = stats.per_turn();
     program::say!(
-        "{} turns of {:.0} points and {:.1} clusters on average",
-        stats.n_turns(),
-        counts.points as f64 / n_turns,
-        counts.clusters as f64 / n_turns
+        "{} turns of {points:.0} points and {clusters:.1} clusters on average",
+        stats.n_turns()
     );
     program::say!(
         "{} packets{}; {} lost, {} late, {} duplicate, {} foreign, {} from other addresses, {} overrun, \
