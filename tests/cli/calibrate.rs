@@ -112,6 +112,16 @@ fn five_sensors_are_found_as_they_were_simulated_and_once_more_by_their_profiles
         }
         // The room ends 18 m from the sensor, at its far corners.
         assert!(found["largest_range_m"].as_f64().unwrap() < 19.0, "{name}");
+        // The sensor reaches as far as before.
+        let most_m = |text: &str| {
+            text.lines().find_map(|line| {
+                line.strip_prefix("max_m = ")?.split(' ').next()?.parse::<f64>().ok()
+            })
+        };
+        let before =
+            fs::read_to_string(crate::in_repository(&format!("assets/sensors/{name}.toml")))
+                .unwrap();
+        assert_eq!(most_m(&folder.text(&format!("a-{name}.toml"))), most_m(&before), "{name}");
     }
     let told = folder.succeeds("profile a-os1-128.toml");
     assert!(told.contains("0.03 m, 0.01") && told.contains("131072"), "{told}");

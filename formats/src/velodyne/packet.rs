@@ -101,12 +101,14 @@ impl Header {
         };
         let model = Model::of_byte(model).ok_or(PacketError::Model(model))?;
         let returns = Returns::of_byte(mode).ok_or(PacketError::Returns(mode))?;
-        let firings = Vec::from_iter(
-            blocks.chunks_exact(returns.blocks_per_sequence()).map(|blocks| azimuth(blocks[0])),
-        );
+        let mut firings = [0; BLOCKS];
+        let own = blocks.chunks_exact(returns.blocks_per_sequence());
+        let n_firings = own.len();
+        firings.iter_mut().zip(own).for_each(|(firing, blocks)| *firing = azimuth(blocks[0]));
+        let firings = &firings[..n_firings];
         let n_steps = (firings.len() - 1) as f64;
         let first = firings[0];
-        let (turned, n_even, jump) = match find_jump(&firings) {
+        let (turned, n_even, jump) = match find_jump(firings) {
             Some((firing, even)) => (even, n_steps - 1.0, Some(firing)),
             None => (advance(first, firings[firings.len() - 1]), n_steps, None),
         };
