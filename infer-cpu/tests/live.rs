@@ -149,7 +149,7 @@ fn an_ouster_sees_the_same_street() {
 /// behind what is not sent (`is_filled`), or those outside are left out.
 fn of_sector([from, to]: [u16; 2], is_filled: bool) -> Vec<(f64, [u8; PACKET])> {
     let sent = packets(&street(), 5_000, 3 * PACKETS_PER_S);
-    let after = |azimuth: u16| (azimuth + 36_000 - from) % 36_000;
+    let after = |azimuth: u16| (u32::from(azimuth) + 36_000 - u32::from(from)) % 36_000;
     let is_sent = |block: &[u8]| after(u16::from_le_bytes([block[2], block[3]])) < after(to);
     if !is_filled {
         let inside = on_time(&sent).filter(|(_, packet)| packet[..1200].chunks(100).all(is_sent));

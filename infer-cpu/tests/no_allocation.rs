@@ -14,6 +14,8 @@ mod tiny_model;
 use std::path::Path;
 
 use formats::model_card::ModelCard;
+#[cfg(feature = "live")]
+use formats::model_card::Normalization;
 use formats::rng::StreamKey;
 use infer_cpu::sampler::{SamplerKind, SamplerSpec};
 use infer_cpu::{Classifier, ClassifierTeam, Options, Precision};
@@ -100,7 +102,11 @@ fn main() {
     assert_eq!(allocations(&model, &many, &clouds, MANY), 0);
     team_allocates_nothing(&model, &clouds);
     #[cfg(feature = "live")]
-    live_allocates_nothing(&model);
+    {
+        let card = ModelCard { normalization: Normalization::Metric, ..ModelCard::default() };
+        let path = folder.path().join("clusters.safetensors");
+        live_allocates_nothing(&tiny_model::write(&path, &tiny_model::tensors(4), &card));
+    }
 }
 
 /// A team classifies many clouds, in one thread and in more threads than cores.

@@ -120,8 +120,8 @@ fn a_sweep_is_cut_and_its_clusters_are_named() {
     }
     assert_eq!(labels.lines().count(), confident.count());
 
-    let said = folder.succeeds(&format!("detect {sweep} --model edge-64 --out whole.json"));
-    assert!(said.contains("warning: edge-64: expected a model of clusters in metres"), "{said}");
+    let whole = format!("detect {sweep} --model edge-64 --out whole.json");
+    folder.refuses(2, &[(&whole, "edge-64: expected a model of clusters in metres")]);
 }
 
 /// SemanticKITTI's class (semantic-kitti.yaml) of a kind.

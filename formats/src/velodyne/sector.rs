@@ -15,10 +15,6 @@ use crate::error::FormatError;
 /// then, but hardly in all turns at the same azimuth.
 const LEAST_UNSENT: u16 = 300;
 
-/// More than the step from one block to the next, azimuth units: a turn of the sector begins and ends with
-/// any block.
-const NEAR: u16 = 100;
-
 /// The number of azimuths.
 const N: usize = TURN as usize;
 
@@ -91,6 +87,8 @@ impl Sector {
     /// How far the start of a turn's first packet is from where the turn begins: the start of the sector, or
     /// this packet if the whole turn is sent. Below 0 is the sector of the turn before.
     pub(super) fn after_start(&self, azimuth: u16) -> f64 {
+        // Less than a block: a turn of the sector begins with its first block, at any azimuth.
+        const NEAR: u16 = 100;
         let ahead = forward(self.start, azimuth);
         match self.unsent {
             0 => 0.0,
@@ -142,12 +140,17 @@ impl UnsentPackets {
         }
         self.before = Some(*header);
         let gap = (before.end(), header.azimuth);
-        let width = |(from, to)| forward(from, to);
-        let is_gap =
-            header.units_per_us > 0.0 && (LEAST_UNSENT..=TURN - LEAST_UNSENT).contains(&width(gap));
+        let width = |(from, to)| u32::from(forward(from, to));
+        // A sensor may leave out whole packets: its sector then begins and ends with any of those
+        // near its ends.
+        let packet = (header.units_per_us * header.sending_us()) as u32;
+        // One packet or two are lost now and then, also at the same azimuth in two turns.
+        let is_gap = packet > 0
+            && width(gap) > 2 * packet + u32::from(LEAST_UNSENT)
+            && forward(gap.0, gap.1) <= TURN - LEAST_UNSENT;
         let within = |known: &(u16, u16)| {
-            let ahead = forward(gap.0, (known.0 + NEAR) % TURN);
-            u32::from(ahead) + u32::from(width(*known)) <= u32::from(width(gap) + 2 * NEAR)
+            let ahead = (width((gap.0, known.0)) + packet) % u32::from(TURN);
+            ahead + width(*known) <= width(gap) + 2 * packet
         };
         // Both durations are rounded, the one by stamps and this one by azimuths.
         let n_packets = |gap| {
@@ -156,7 +159,10 @@ impl UnsentPackets {
         };
         let n_unsent = match self.gap.filter(within) {
             _ if !is_gap => 0,
-            Some(known) => n_packets(known) + std::mem::take(&mut self.n_doubtful),
+            Some(known) => {
+                let is_same = width(gap) <= width(known) + 2 * packet;
+                n_packets(if is_same { gap } else { known }) + std::mem::take(&mut self.n_doubtful)
+            }
             None => {
                 (self.gap, self.n_doubtful) = (Some(gap), n_packets(gap));
                 0

@@ -202,9 +202,8 @@ fn a_model_of_whole_objects_warns_and_bundled_models_have_names() {
     assert_eq!((err.as_str(), n_cars >= 10), ("", true), "{n_cars}");
     assert_eq!(cars("--model street-128"), (err, n_cars));
     for model in ["edge-64", "shapes-rotational-64"] {
-        let (err, _) = cars(&format!("--model {model}"));
-        let start = format!("warning: {model}: expected a model of clusters in metres");
-        assert!(err.starts_with(&start) && err.lines().count() == 1, "{err}");
+        let ran = folder.run(&format!("live --pcap drive.pcap --model {model}"));
+        ran.assert_refused(2, &format!("error: {model}: expected a model of clusters in metres"));
     }
 }
 

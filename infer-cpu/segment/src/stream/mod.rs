@@ -211,7 +211,13 @@ impl<T: Copy + Default> Stream<T> {
         mut each: impl FnMut(StreamCluster<'_, T>),
     ) {
         (0..self.columns_to(azimuth_rad)).for_each(|_| self.close(&mut each));
-        if is_unsent && self.ground.is_some() && self.front != Some(self.turn_start) {
+        // A sector begins with any of the firings near its start: some degrees more or less.
+        let n_columns = self.waiting.len() as u64;
+        let near = n_columns / 36;
+        let turned = self.front.unwrap_or(self.turn_start) - self.turn_start;
+        if is_unsent && turned > n_columns - near {
+            self.end_turn(&mut each);
+        } else if is_unsent && turned > near && self.ground.is_some() {
             // The ground stays: a part of a turn tells too little of it.
             self.n_turns += 1;
             self.begin_turn();
