@@ -5,7 +5,7 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 
 /// The metrics of one epoch.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Epoch {
     /// The epoch, counted from 1.
     pub epoch: u32,
@@ -67,19 +67,12 @@ mod tests {
     #[test]
     fn the_best_epoch_is_that_of_clouds_or_with_a_balance_that_of_classes() {
         let of = |instance, class| Epoch {
-            epoch: 1,
-            rate: 1.0,
-            loss: 1.0,
-            accuracy: 0.5,
             validation_instance: Some(instance),
             validation_class: Some(class),
-            seconds: 1.0,
-            clouds_per_second: 1.0,
+            ..Epoch::default()
         };
         let (clouds, classes) = (of(0.9, 0.4), of(0.8, 0.6));
-        for (balance, [first, second]) in [(0.0, [true, false]), (0.5, [false, true])] {
-            assert_eq!(is_best(&clouds, &[classes], balance), first);
-            assert_eq!(is_best(&classes, &[clouds], balance), second);
-        }
+        assert!(is_best(&clouds, &[classes], 0.0) && is_best(&classes, &[clouds], 0.5));
+        assert!(!is_best(&classes, &[clouds], 0.0) && !is_best(&clouds, &[classes], 0.5));
     }
 }
