@@ -9,22 +9,7 @@ use serde_json::Value;
 
 use crate::Folder;
 
-const WALLS: &str = r#"
-variants = 2
-[ground]
-road_width_m = [8, 8]
-[mount]
-height_m = [1.5, 1.5]
-[[sensor]]
-profile = "vlp32c"
-effects = { noise = { sigma_m = 0 } }
-[[object]]
-kind = "wall"
-class = "wall"
-count = [8, 8]
-place = "line"
-distance_m = [4, 30]
-"#;
+const WALLS: &str = include_str!("inputs/walls.toml");
 
 #[test]
 fn a_drive_comes_back_from_its_packets_when_the_sensors_motion_is_undone() {
@@ -81,32 +66,7 @@ fn holds(wall: &Value, at: [f64; 3], margin_m: f64) -> bool {
 
 /// Cars that stand and cars that move, on a street with a slope, past a sensor that is tilted and
 /// sways.
-const CARS: &str = r#"
-variants = 2
-[ground]
-road_width_m = [12, 12]
-slope_deg = [3, 3]
-[mount]
-height_m = [1.8, 1.8]
-tilt_deg = [2, 2]
-sway_deg = [1, 1]
-[[sensor]]
-profile = "vlp32c"
-effects = { noise = { sigma_m = 0 } }
-[[object]]
-kind = "car"
-class = "car"
-count = [10, 10]
-place = "parked"
-distance_m = [4, 30]
-[[object]]
-kind = "car"
-class = "car"
-count = [8, 8]
-place = "road"
-distance_m = [5, 40]
-speed_m_s = [8, 9]
-"#;
+const CARS: &str = include_str!("inputs/cars.toml");
 
 /// The sequence's own poses move each point on a car to the car's box in the truth of the capture of the same
 /// drive, whose first pose they are relative to: the capture and the sequence have the same objects.

@@ -77,27 +77,7 @@ fn datasets_and_tars_keep_their_bytes() {
 fn scans_of_a_scene_keep_their_bytes() {
     let folder = Folder::new();
     folder.write("torus.off", crate::meshes::off(40, 0.3));
-    let scene = r#"
-seed = 7
-attributes = ["range", "intensity", "ring", "object", "triangle"]
-[effects]
-intensity = true
-noise = { sigma_m = 0.02 }
-[[object]]
-mesh = "torus.off"
-position_m = [1, 0.2, 0]
-yaw_deg = 30
-reflectivity = 0.4
-[[object]]
-mesh = "torus.off"
-name = "far"
-position_m = [-2, 1, 0.5]
-scale = [1, 2, 1]
-[[sensor]]
-profile = "vlp32c"
-position_m = [5, 0, 0.2]
-look_at_m = [0, 0, 0]
-"#;
+    let scene = include_str!("inputs/torus.toml");
     folder.write("scene.toml", scene);
     for file in ["out/scan.npz", "out/scan.ply", "out/scan.csv", "out/scan.pcap"] {
         folder.succeeds(&format!("scan scene.toml --adapter cpu --out {file}"));

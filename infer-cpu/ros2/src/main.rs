@@ -14,20 +14,7 @@ use publisher::Publisher;
 /// Publish the objects of `infer-cpu live` as ROS 2 messages
 #[derive(Parser)]
 #[command(version, max_term_width = 100)]
-#[command(after_help = "\
-Examples:
-  infer-cpu live --udp 2368 | edgepuck-ros2
-  infer-cpu live --udp 2368 --mcap /dev/stdout | edgepuck-ros2 --domain 7
-
-Standard input is either the JSON lines of `infer-cpu live` or its recording. Of lines, the objects
-of a turn are published when the first object of the next one comes: as
-vision_msgs/Detection3DArray on /objects and as visualization_msgs/MarkerArray on
-/objects/markers. Of a recording, each message is published on its topic as it comes, the clouds
-of /points and the frames of /tf and /tf_static among them; a recorded file is published as fast
-as it is read.
-
-Exit status: 0 at the end of the input, 1 if the input is not as expected or the network cannot be
-used, 2 if the command line is invalid.")]
+#[command(after_help = include_str!("help.txt"))]
 struct Args {
     /// DDS domain
     #[arg(long, value_name = "N", env = "ROS_DOMAIN_ID", default_value_t = 0)]

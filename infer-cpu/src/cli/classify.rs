@@ -24,31 +24,7 @@ use crate::{Classifier, Options, Precision};
 
 /// Flags of `classify`.
 #[derive(clap::Args)]
-#[command(after_help = "\
-Examples:
-  infer-cpu classify scan.ply more/*.npz
-  infer-cpu classify --sampler cpl --points 64 --precision i8 --threads 4 scan.npz
-  infer-cpu classify --json --drop-invalid scan.pcd
-  producer | infer-cpu classify --input-format ply -
-  find scans -name '*.npz' -print0 | xargs -0 infer-cpu classify --json
-
-Where no model is named, edge-64 classifies; but scans of gen-dataset, which show an
-object from one side, are for shapes-rotational-64 if it knows all classes of the
-data set, and the first other scan has a warning.
-
-One line is printed for each file: its name, the class and the confidence,
-separated by tabs. The class is `unknown` for an object that belongs to no known
-class. With --json, the line is an object with these keys: file, class (a number),
-label, unknown (true, only for such an object; class, label and confidence are then
-those of the most similar class), confidence (0 to 1), logits, points (number of
-valid points), dropped (number of invalid points), used (number of points that the
-network processed), clipped (number of activations, with i8), precision (f32 if the
-chosen one overflowed) and ms (time without reading the file). If the file fails, the
-keys are file and error.
-After a failure, the program continues with the next file, and exits with 1 at the
-end.
-
-Formats, by file extension: PLY, NPZ, NPY, PCD, XYZ, PTS, CSV, KITTI's .bin, LAS.")]
+#[command(after_help = include_str!("classify.txt"))]
 pub struct ClassifyArgs {
     /// Files of clouds; `-` reads one cloud from standard input
     #[arg(value_name = "FILES", required = true)]

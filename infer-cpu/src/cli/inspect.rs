@@ -13,14 +13,7 @@ use super::model;
 
 /// Flags of `inspect`.
 #[derive(clap::Args)]
-#[command(after_help = "\
-Examples:
-  infer-cpu inspect model.safetensors
-  infer-cpu inspect --json
-
-Every tensor is read and checked. A MAC is one multiplication and one addition.
-The MACs of a point are needed for each point that the network sees. The bytes
-include weights, biases and scales, with batch norms folded in.")]
+#[command(after_help = include_str!("inspect.txt"))]
 pub struct InspectArgs {
     /// Model file, or the name of a bundled model [default: $EDGEPUCK_MODEL, else edge-64]
     model: Option<PathBuf>,

@@ -17,15 +17,7 @@ use super::{Outcome, Usage, of_setup};
 
 /// Flags of `sample`.
 #[derive(clap::Args)]
-#[command(after_help = "\
-Examples:
-  infer-cpu sample --sampler fps --points 128 in.ply out.ply
-  infer-cpu sample --sampler random --points 4096 in.las thinned.npz
-  infer-cpu sample --sampler cpl --points 64 --model model.safetensors in.npz out.xyz
-
-The output holds the chosen points with the coordinates of the input. cpl
-normalizes the cloud as in training before it chooses points. The extension of the
-output file determines its format: PLY, NPZ, NPY, PCD, XYZ or CSV.")]
+#[command(after_help = include_str!("sample.txt"))]
 pub struct SampleArgs {
     /// Sampler that chooses the points: all, first, random, fps, cpl
     #[arg(long, value_name = "NAME")]

@@ -14,14 +14,7 @@ use variant::Variant;
 
 /// Flags of `bench`.
 #[derive(clap::Args)]
-#[command(after_help = "\
-Examples:
-  infer-cpu bench --json > pi5.json
-  infer-cpu bench --points 64,1024 --precision f32,i8 --threads 1,4
-  infer-cpu bench --points 64 --precision i8 --threads 1,4 --clouds 30
-
-The latency is that of a whole classification, from coordinates to class. The front
-end of cpl follows its name: `cpl:stn`, `cpl:trunk`.")]
+#[command(after_help = include_str!("help.txt"))]
 pub struct BenchArgs {
     /// Model file [default: the bundled model]
     #[arg(long, value_name = "FILE")]

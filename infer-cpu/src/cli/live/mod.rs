@@ -35,34 +35,7 @@ const SILENCE: Duration = Duration::from_secs(5);
 /// Flags of `live`.
 #[derive(clap::Args)]
 #[group(id = "source", args = ["udp", "pcap"], required = true, multiple = false)]
-#[command(after_help = "\
-Examples:
-  infer-cpu live --udp 2368
-  infer-cpu live --udp 2368 --from 192.168.1.201 --stats
-  infer-cpu live --udp 7502 --metadata os1.json
-  infer-cpu live --pcap drive.pcap --realtime
-  infer-cpu live --pcap drive.pcap --poses drive.tum > objects.jsonl
-  infer-cpu live --udp 2368 --mcap drive.mcap
-
-The sensor is a Velodyne VLP-32C or VLP-16, which the first packet determines, or an Ouster with
---metadata. One line of JSON is printed for each object and turn, as soon as the beams have passed
-the object. The keys are, in this order: version (1), turn, track (a number that stays with the
-object), class (of the track, from all of its clusters, or `unknown`; null while no cluster of it
-had --min-points), resembles (the most similar class, even if class is `unknown`), confidence (the
-probability of `resembles` from this cluster alone, or null), probability (the same from all
-clusters of the track), frame (of position, yaw and velocity: sensor, or world with --poses),
-position_m (the middle of the box around the points), size_m (length, width, height),
-yaw_deg (direction of the length, -90 to 90), velocity_m_s (null at first; relative to the sensor in
-its frame), points, range_m, first_s and last_s (Unix time of the first and the last point: the
-sensor's stamps give the intervals, and the clock of this machine or of the capture gives the
-start), latency_ms (from the arrival of the packet with the last point to this line; null
-without --udp or --realtime), whole_box (the box of the whole object, of which the points show a
-part, from all clusters of the track: its middle centre_m, its size_m, at least the usual one of its
-class, and its yaw_deg, -180 to 180, which is that of the front once the object has moved in the
-world; null where the class has no usual size).
-
-SIGTERM and Ctrl-C end the program after the last objects, with exit status 0. As a service of
-systemd (Type=notify), it reports when it receives packets, and serves the watchdog.")]
+#[command(after_help = include_str!("help.txt"))]
 pub struct LiveArgs {
     /// Receive packets on this UDP port; a Velodyne's is 2368, an Ouster's 7502
     #[arg(long, value_name = "PORT")]

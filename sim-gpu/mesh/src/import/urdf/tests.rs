@@ -6,31 +6,7 @@ use glam::DVec3;
 use std::fs;
 
 /// An arm in a plane: a turn about z, 2 m along x a turn about -z, 1 m along x a slide along x.
-const ARM: &str = r#"<?xml version="1.0"?>
-<robot name="arm">
-  <link name="base"/>
-  <joint name="shoulder" type="revolute">
-    <parent link="base"/><child link="upper"/>
-    <axis xyz="0 0 3"/><limit lower="-1" upper="1"/>
-  </joint>
-  <link name="upper"><visual><geometry><box size="2 0.2 0.2"/></geometry></visual></link>
-  <joint name="elbow" type="continuous">
-    <parent link="upper"/><child link="lower"/>
-    <origin xyz="2 0 0"/><axis xyz="0 0 -1"/>
-    <mimic joint="shoulder" multiplier="0.5" offset="0.1"/>
-  </joint>
-  <link name="lower">
-    <visual name="round"><origin xyz="1 0 0" rpy="0 1.5707963267948966 0"/>
-      <geometry><cylinder radius="0.1" length="2"/></geometry></visual>
-    <visual><geometry><sphere radius="0.2"/></geometry></visual>
-    <collision><geometry><capsule radius="0.1" length="2"/></geometry></collision>
-  </link>
-  <joint name="slide" type="prismatic">
-    <parent link="lower"/><child link="hand"/>
-    <origin xyz="1 0 0" rpy="0.3 0 0"/><axis xyz="1 0 0"/><limit lower="0" upper="0.5"/>
-  </joint>
-  <link name="hand"><visual><geometry><sphere radius="0.2"/></geometry></visual></link>
-</robot>"#;
+const ARM: &str = include_str!("arm.urdf");
 
 fn read_at(text: &str, joints: &[(&str, f64)]) -> Result<Assembly, ParseError> {
     let joints = joints.iter().map(|(name, position)| ((*name).to_owned(), *position)).collect();
