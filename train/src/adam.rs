@@ -69,7 +69,8 @@ mod tests {
         let mut weight = Parameter::new("w".to_owned(), vec![2], vec![0.0, 0.0]);
         weight.gradient = vec![1.0, -50.0];
         (1..=10).for_each(|step| update(&mut weight, step, 1e-3));
-        let near = |found: f32, expected: f64| (f64::from(found) / expected - 1.0).abs() < 1e-5;
+        // 1 - 0.999 in f32 is off by 1.3e-5 of itself.
+        let near = |found: f32, expected: f64| (f64::from(found) / expected - 1.0).abs() < 2e-5;
         assert!(near(weight.value[0], -0.01) && near(weight.value[1], 0.01), "{weight:?}");
         assert!(near(weight.mean[0], 1.0 - 0.9f64.powi(10)), "{weight:?}");
         assert!(near(weight.square[0], 1.0 - 0.999f64.powi(10)), "{weight:?}");

@@ -123,8 +123,8 @@ pub struct UnsentPackets {
 impl UnsentPackets {
     /// Those of a sensor that sends this sector only.
     pub(crate) fn outside(sector: &Sector) -> Self {
-        let from = (sector.start + TURN - sector.unsent) % TURN;
-        let gap = (sector.unsent > 0).then_some((from, sector.start));
+        let gap = (forward(sector.unsent, sector.start), sector.start);
+        let gap = (sector.unsent > 0).then_some(gap);
         Self { gap, ..Self::default() }
     }
 

@@ -31,7 +31,8 @@ fn n_messages(folder: &Folder, name: &str) -> BTreeMap<String, usize> {
 fn a_recording_has_a_cloud_and_the_objects_of_each_turn() {
     let folder = folder();
     let ran = folder.run(&format!("{LIVE} --pcap drive.pcap --mcap run.mcap"));
-    assert_eq!((ran.code, ran.out.as_str(), ran.err.as_str()), (0, "", ""));
+    let said = "run.mcap: 10 turns, 30 boxes of objects\n";
+    assert_eq!((ran.code, ran.out.as_str(), ran.err.as_str()), (0, "", said));
     let per_turn = ["/points", "/objects", "/objects/markers"].map(|topic| (topic.to_owned(), 10));
     let mut expected = BTreeMap::from(per_turn);
     expected.insert("/tf_static".to_owned(), 1);
@@ -91,8 +92,9 @@ fn sigterm_ends_a_recording_with_what_has_come() {
     let folder = model_folder();
     let mut child = recorded(&folder);
     let (code, err) = terminate(&mut child);
-    assert_eq!((code, err.lines().count()), (Some(0), 1), "{err}");
+    assert_eq!((code, err.lines().count()), (Some(0), 2), "{err}");
     assert!(err.starts_with("listening on UDP 127.0.0.1:"), "{err}");
+    assert!(err.contains("run.mcap: 4 turns"), "{err}");
     assert_eq!(n_messages(&folder, "run.mcap")["/points"], 4);
     let bytes = fs::read(folder.path("run.mcap")).unwrap();
     assert!(mcap::Summary::read(&bytes).unwrap().is_some());
