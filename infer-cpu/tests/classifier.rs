@@ -17,10 +17,10 @@ fn ten_million_points_are_classified() {
     let folder = tempfile::tempdir().unwrap();
     let model = model(folder.path(), &ModelCard::default());
     // Weyl sequences of three irrational steps are evenly spread and distinct.
-    let at = |i: usize, step: f64| (i as f64 * step).fract() as f32;
-    // From 1 on, since a point at the origin is a lost return.
+    // None begins at 0: a point at the origin is a lost return.
+    let at = |i: usize, step: f64| ((i as f64 + 0.5) * step).fract() as f32;
     let cloud: Vec<[f32; 3]> =
-        (1..=N).map(|i| [at(i, 0.819_172_5), at(i, 0.671_043_6), at(i, 0.549_700_4)]).collect();
+        (0..N).map(|i| [at(i, 0.819_172_5), at(i, 0.671_043_6), at(i, 0.549_700_4)]).collect();
     let spec = SamplerSpec { kind: SamplerKind::Random, points: 512, ..SamplerSpec::default() };
     let options = Options { sampler: Some(spec), ..Options::default() };
     let mut classifier = Classifier::load(&model, &options).unwrap();
