@@ -9,9 +9,9 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 pub struct EffectFlags {
     /// Standard deviation of the noise of the ranges, metres; gen-dataset then writes noisy scans beside
-    /// the clean ones
-    #[arg(long, default_value_t = 0.0, value_name = "M")]
-    noise: f64,
+    /// the clean ones [default: 0]
+    #[arg(long, value_name = "M")]
+    noise: Option<f64>,
 
     /// Probability that a return is missing
     #[arg(long, default_value_t = 0.0, value_name = "P")]
@@ -37,7 +37,7 @@ impl EffectFlags {
         if let Some(file) = &self.effects {
             return Ok(read_effects(file)?);
         }
-        let effects = noisy(self.noise, self.dropout).map_err(of_flag)?;
+        let effects = noisy(self.noise.unwrap_or(0.0), self.dropout).map_err(of_flag)?;
         let effects = Effects { quantum: self.quantum()?, ..effects };
         effects.validate().map_err(of_flag)?;
         Ok(effects)
@@ -46,7 +46,7 @@ impl EffectFlags {
     /// A flag that was given.
     pub fn given(&self) -> Option<&'static str> {
         first_given(&[
-            (self.noise != 0.0, "--noise"),
+            (self.noise.is_some(), "--noise"),
             (self.dropout != 0.0, "--dropout"),
             (self.quantise.is_some(), "--quantise"),
             (self.effects.is_some(), "--effects"),

@@ -20,15 +20,7 @@ const FARTHEST_CAMERA_M: f64 = 20.0;
 const STEEPEST: f64 = 0.9;
 
 /// The calibration of a camera in the sensor: a focal length and a middle of KITTI's order.
-pub const CALIBRATION: &str = "\
-P0: 720 0 621 0 0 720 187.5 0 0 0 1 0
-P1: 720 0 621 0 0 720 187.5 0 0 0 1 0
-P2: 720 0 621 0 0 720 187.5 0 0 0 1 0
-P3: 720 0 621 0 0 720 187.5 0 0 0 1 0
-R0_rect: 1 0 0 0 1 0 0 0 1
-Tr_velo_to_cam: 0 -1 0 0 0 0 -1 0 1 0 0 0
-Tr_imu_to_velo: 1 0 0 0 0 1 0 0 0 0 1 0
-";
+pub const CALIBRATION: &str = include_str!("calibration.txt");
 
 /// The left colour camera of a frame.
 pub struct Camera {

@@ -52,9 +52,11 @@ pub struct Facts {
     pub azimuth_rad: f64,
     /// The speed of the head, radians per microsecond.
     pub speed_rad_us: f64,
-    /// The packets between the previous one and this that the sensor does not send. Those of a Velodyne
-    /// are known when they are missing again, and are counted twice then.
+    /// The packets between the previous one and this that the sensor does not send.
     pub n_unsent: u64,
+    /// Of packets before, those that seemed lost and that a Velodyne does not send, since they are missing
+    /// again.
+    pub n_unsent_before: u64,
     /// Where the packet goes on behind a sector that the sensor does not send: microseconds after its first
     /// firing, and the azimuth of the head, radians clockwise from x.
     pub resumes: Option<(f64, f64)>,
@@ -99,12 +101,14 @@ impl Decoder {
         match self {
             Self::Velodyne { decoder, unsent } => {
                 let header = decoder.decode(payload, |found| returns.push(*found))?;
+                let [n_unsent, n_unsent_before] = unsent.take(&header);
                 Ok(Facts {
                     stamp_us: f64::from(header.time_us),
                     duration_us: header.duration_us(),
                     azimuth_rad: f64::from(header.azimuth) * UNIT_RAD,
                     speed_rad_us: header.units_per_us * UNIT_RAD,
-                    n_unsent: unsent.take(&header),
+                    n_unsent,
+                    n_unsent_before,
                     resumes: header
                         .resumes()
                         .map(|(us, azimuth)| (us, f64::from(azimuth) * UNIT_RAD)),
@@ -121,6 +125,7 @@ impl Decoder {
                     azimuth_rad: f64::from(header.measurement_id) * column_rad - *yaw_rad,
                     speed_rad_us: f64::from(header.columns) * column_rad / header.duration_us,
                     n_unsent: if is_new_turn { *n_unsent } else { 0 },
+                    n_unsent_before: 0,
                     resumes: None,
                 })
             }

@@ -77,8 +77,8 @@ pub fn read_turns(
             && now.gaps > before.gaps
         {
             let step = (now.time_us - before.time_us) / before.facts.duration_us;
-            lost += (step.round() as u64).saturating_sub(1);
-            lost = lost.saturating_sub(facts.n_unsent);
+            lost += (step.round() as u64).saturating_sub(1 + facts.n_unsent);
+            lost = lost.saturating_sub(facts.n_unsent_before);
         }
         head = Some(now);
         let start = *start.get_or_insert_with(|| {

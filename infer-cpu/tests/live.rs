@@ -201,8 +201,23 @@ fn a_sensor_that_sends_a_sector_sees_what_is_in_it_and_loses_nothing() {
             let expected: Vec<_> = whole.iter().filter(is_inside).collect();
             let n_seen = expected.iter().copied().filter(is_seen).count();
             assert!(n_seen > 20 && 10 * n_seen > 9 * expected.len(), "{name}: {n_seen}");
+            // Packets that are lost in the sector count, and after a restart the sector is known.
+            let again = sent.iter().map(|(at_s, packet)| (at_s + 4.0, &packet[..])).enumerate();
+            let again = again.filter(|(i, _)| !(100..104).contains(i)).map(|(_, sent)| sent);
+            run(&mut pipeline, again);
+            let Counts { lost, restarts, .. } = *pipeline.counts();
+            assert_eq!([lost, restarts], [4, 1], "{name}");
         }
     }
+}
+
+#[test]
+fn what_is_lost_at_one_azimuth_after_many_turns_is_lost() {
+    let sent = packets(&street(), 5_000, 2 * PACKETS_PER_S);
+    let comes = |i: &usize| !(100..105).contains(i) && !(854..859).contains(i);
+    let mut pipeline = pipeline(&all());
+    run(&mut pipeline, on_time(&sent).enumerate().filter(|(i, _)| comes(i)).map(|(_, it)| it));
+    assert_eq!((pipeline.counts().lost, pipeline.stats().n_turns()), (10, 19));
 }
 
 /// A packet covers 4.8 degrees, so that its loss divides a near car. Losing 1 % of the packets

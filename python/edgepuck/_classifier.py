@@ -103,6 +103,7 @@ class Classifier(Remade):
         found = []
         for i, one in enumerate(clouds):
             try:
+                one = Scan.read(one) if isinstance(one, (str, os.PathLike)) else one
                 points = points_of(one.positions if isinstance(one, Scan) else one)
                 found.append(Prediction(**self._classifier.classify(points, ground_z, isinstance(one, Scan))))
             except _edgepuck.Error as error:
@@ -123,10 +124,7 @@ def _is_batch(cloud: Any) -> bool:
 
 
 def points_of(cloud: Any) -> NDArray[np.float32]:
-    """The first three columns of `cloud`: points of shape [n, 3], those of a file in the frame of the
-    sensor, or a cloud of another library."""
-    if isinstance(cloud, (str, os.PathLike)):
-        cloud = Scan.read(cloud).in_sensor_frame()
+    """The first three columns of `cloud`: points of shape [n, 3], or a cloud of another library."""
     points = np.asarray(foreign_points(cloud))
     if points.dtype.names is not None:
         missing = [axis for axis in "xyz" if axis not in points.dtype.names]

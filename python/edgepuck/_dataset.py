@@ -29,8 +29,9 @@ class Dataset:
 
     Args:
         meshes: The folder, with the layout `CLASS/{train,test}/NAME.off`. In any other layout, a hash
-            of the seed, the class and the name puts about one mesh in five into the test set, so that
-            the training and test sets must have the same seed.
+            of the seed, the class and the name puts about one mesh in five into the test set, and of a
+            class of two meshes or more at least one into each, so that the training and test sets must
+            have the same seed.
         sensor: The name or path of a sensor, as in `Sensor`, or a `Sensor`, whose adapter casts.
         split: `train`, `test`, or None for both.
         points: The number of points of each cloud.

@@ -46,7 +46,7 @@ class PointField:
     offset: int = 0
     """The first byte in a point."""
     datatype: int = 0
-    """2 for uint8, 4 for uint16, 6 for uint32, 7 for float32, 8 for float64."""
+    """1 to 8: int8, uint8, int16, uint16, int32, uint32, float32, float64."""
     count: int = 1
     """The number of values."""
 
@@ -94,7 +94,7 @@ def named_columns(columns: dict[str, NDArray[Any] | None]) -> dict[str, NDArray[
 
 def pointcloud2(points: NDArray[np.float32], columns: dict[str, NDArray[Any]], frame_id: str, stamp: float) -> Any:
     """The message of points, [n, 3], and columns, [n]; that of ROS if its packages are installed."""
-    if not 0 <= stamp < 2**32:
+    if not 0 <= stamp < 2**31:
         raise Error(f"stamp: expected seconds since 1970, found {stamp}")
     all_columns = {**{axis: points[:, i] for i, axis in enumerate("xyz")}, **columns}
     layout = np.dtype([(name, of.dtype.newbyteorder("<")) for name, of in all_columns.items()])

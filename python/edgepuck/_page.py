@@ -9,6 +9,7 @@ import html
 import os
 import sys
 import tempfile
+import threading
 import webbrowser
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -73,9 +74,13 @@ new Response(unpacked).text().then((page) => { document.open(); document.write(p
 def page_of(words: Sequence[str], folder: str) -> View:
     """The page that `edgepuck view` writes if it is called with `words`, by way of a temporary `folder`."""
     page = Path(folder, "page.html")
-    with _without_path(page, folder):
+    with _HELD, _without_path(page, folder):
         _arguments.run(["view", *words, "--out", os.fspath(page)], folder)
     return View(page.read_text(encoding="utf-8"))
+
+
+# The standard error is that of the whole process.
+_HELD = threading.Lock()
 
 
 @contextlib.contextmanager

@@ -18,12 +18,12 @@ from ._edgepuck import Error
 _MATRIX, _SEVEN = 16, 7
 
 
-def one(name: str, pose: Any) -> NDArray[np.float64]:
-    """The row of one pose, [1, 16] or [1, 7]."""
+def one(name: str, pose: Any, most_off: float = 1e-6) -> NDArray[np.float64]:
+    """The row of one pose, [1, 16] or [1, 7], whose rotation is off by `most_off` at the most."""
     found = _numbers(name, pose, "[4, 4]", "[7]")
     if found.shape not in [(4, 4), (_SEVEN,)]:
         raise Error(f"{name}: {_expected('[4, 4]', '[7]', list(found.shape))}")
-    return _checked(name, found.reshape(1, -1))
+    return _checked(name, found.reshape(1, -1), most_off)
 
 
 def many(name: str, poses: Any, shape: tuple[int, ...] = ()) -> tuple[int, NDArray[np.float64]]:
@@ -56,9 +56,9 @@ def placed(pose: Any, position: ArrayLike | None) -> NDArray[np.float64]:
     return matrix.reshape(1, _MATRIX)
 
 
-def matrix(name: str, pose: Any) -> NDArray[np.float64]:
+def matrix(name: str, pose: Any, most_off: float = 1e-6) -> NDArray[np.float64]:
     """The matrix of a pose, [4, 4]."""
-    row: NDArray[np.float64] = one(name, pose)[0]
+    row: NDArray[np.float64] = one(name, pose, most_off)[0]
     if len(row) == _MATRIX:
         return row.reshape(4, 4)
     x, y, z, w = row[3:] / np.linalg.norm(row[3:])
@@ -72,7 +72,7 @@ def matrix(name: str, pose: Any) -> NDArray[np.float64]:
     return turned
 
 
-def _checked(name: str, rows: NDArray[np.float64]) -> NDArray[np.float64]:
+def _checked(name: str, rows: NDArray[np.float64], most_off: float = 1e-6) -> NDArray[np.float64]:
     """`rows`, if each is a rotation and a position; errors name the first that is none, or put its number
     into `name`."""
 
@@ -96,7 +96,7 @@ def _checked(name: str, rows: NDArray[np.float64]) -> NDArray[np.float64]:
             "expected a rotation in the first three rows and columns, found one that is off by {}, "
             "with determinant {:.4f}"
         )
-        refuse(~((off <= 1e-6) & (size > 0)), lambda i: rotation.format(_short(off[i]), size[i]))
+        refuse(~((off <= most_off) & (size > 0)), lambda i: rotation.format(_short(off[i]), size[i]))
     place = "expected a position of finite metres, found {}"
     refuse(~np.isfinite(at).all(axis=1), lambda i: place.format(at[i].tolist()))
     return np.ascontiguousarray(rows)

@@ -74,7 +74,8 @@ class Scan:
     _is_at_rest = False
 
     def __post_init__(self) -> None:
-        self.pose = np.eye(4) if self.pose is None else _poses.matrix("pose", self.pose)
+        # As files may have it: poses of f32, multiplied some times.
+        self.pose = np.eye(4) if self.pose is None else _poses.matrix("pose", self.pose, 1e-3)
         positions = np.asarray(self.positions, dtype=np.float32)
         if positions.ndim != 2 or positions.shape[1] != 3:
             raise _edgepuck.Error(f"positions: expected shape [n, 3], found {list(positions.shape)}")

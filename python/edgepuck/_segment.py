@@ -22,7 +22,7 @@ def segment(
     min_points: int | None = None,
 ) -> NDArray[np.int32]:
     """The cluster of each point of a sweep, counted from 0. -1 is ground, -2 is a point in no cluster,
-    and -3 is a point that is not finite.
+    and -3 is a lost return.
 
     Args:
         sweep: A scan, or the path of a file that `Scan.read` reads, or points of shape [n, 3] in the frame

@@ -95,7 +95,7 @@ class Lidar:
         self._model, self._site = model, _site(model, site)
         self._effects: dict[str, Any] = {"noise": noise, "dropout": dropout, "effects": effects}
         self._n_calls = 0
-        # The model, and others that were found to be equal.
+        # The model, and the last one that was found to be equal.
         self._known = [model]
         shapes, left_out, geoms = _Shapes(model, tolerance), _soft(model), []
         for geom in _seen(model, self._site, groups, see_self):
@@ -199,7 +199,8 @@ class Lidar:
         found = _difference(self._model, model)
         if found:
             raise _edgepuck.Error(f"{expected} of this LiDAR's model, found another, {found}: make a Lidar of that model")
-        self._known.append(model)
+        # Of many equal ones, the last alone: each may be that of one episode.
+        self._known = [self._model, model]
 
     def _place(self, data: mujoco.MjData) -> NDArray[np.float64]:
         """Move the instances to where `data` has them. Return the pose of the sensor."""

@@ -69,7 +69,10 @@ impl Classifier {
         });
         let found = found.map_err(raised)?;
         let dropped = (found.n_dropped > 0).then(|| {
-            format!("dropped {} lost returns: points at 0, 0, 0 or not finite", found.n_dropped)
+            format!(
+                "dropped {} points at 0, 0, 0 or not finite, which are lost returns",
+                found.n_dropped
+            )
         });
         warn(py, dropped.as_slice())?;
         let answer = PyDict::new(py);

@@ -192,7 +192,8 @@ fn set(file: &Path, points: &PointsArgs) -> anyhow::Result<Vec<Frame>> {
     Ok((0..shown).map(frame).collect())
 }
 
-/// The sweeps of a sequence or of a folder, the scans of a data set or the meshes in it; or the clusters that `detect --segment-only` wrote, as one frame.
+/// The sweeps of a sequence or of a folder, the scans of a data set, or the meshes in it; or the clusters
+/// that `detect --segment-only` wrote, as one frame.
 fn folder(folder: &Path, points: &PointsArgs) -> anyhow::Result<Vec<Frame>> {
     for inside in ["sweeps", "velodyne"] {
         if folder.join(inside).is_dir() {
@@ -220,11 +221,17 @@ fn folder(folder: &Path, points: &PointsArgs) -> anyhow::Result<Vec<Frame>> {
     keep_commonest_extension(&mut files);
     let cause = "expected a folder of sweeps, scans, meshes or clusters, found none in it";
     ensure!(!files.is_empty(), Usage(format!("{}: {cause}", folder.display())));
+    let is_cloud = |file: &Path| CloudFormat::of_path(file).is_ok() && !has_faces(file);
     let (n_files, mut n_points, mut frames) = (files.len(), 0, Vec::new());
-    for (file, number) in files.into_iter().zip(0..) {
+    // Of a long drive, sweeps from all of it.
+    let n_first = match is_cloud(&files[0]) {
+        true => cloud(&files[0], points).map_or(0, |frame| frame.n_points()),
+        false => 0,
+    };
+    let every = (n_files * n_first).div_ceil(MOST_POINTS).max(1);
+    for (file, number) in files.into_iter().zip(0..).step_by(every) {
         let name = file.strip_prefix(folder).unwrap_or(&file).to_string_lossy().into_owned();
-        let is_cloud = CloudFormat::of_path(&file).is_ok() && !has_faces(&file);
-        match if is_cloud { cloud(&file, points) } else { first(&file, points) } {
+        match if is_cloud(&file) { cloud(&file, points) } else { first(&file, points) } {
             Ok(frame) => {
                 n_points += frame.n_points();
                 frames.push(Frame { name, turn: Some(number), ..frame });
@@ -234,13 +241,11 @@ fn folder(folder: &Path, points: &PointsArgs) -> anyhow::Result<Vec<Frame>> {
         }
         // So many that memory holds them.
         if n_points > 3 * MOST_POINTS || frames.len() >= MOST_FRAMES {
-            program::say!(
-                "{}: the first {} of {n_files} are shown",
-                folder.display(),
-                frames.len()
-            );
             break;
         }
+    }
+    if frames.len() < n_files {
+        program::say!("{}: {} of {n_files} are shown", folder.display(), frames.len());
     }
     Ok(frames)
 }

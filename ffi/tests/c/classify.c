@@ -8,7 +8,7 @@
 
 #include "expect.h"
 
-static const float LONG_IN_Y[] = { 0, 0, 0, 0, 1, 0, 0.1f, 0.5f, 0, 0, 0.5f, 0.1f };
+static const float LONG_IN_Y[] = { 0.05f, 0, 0, 0, 1, 0, 0.1f, 0.5f, 0, 0, 0.5f, 0.1f };
 
 static void loading_fails(const char *model)
 {

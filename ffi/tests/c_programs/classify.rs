@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use formats::model_card::Normalization;
 use infer_cpu::live::{Arrival, LiveOptions, Object, Pipeline};
 use infer_cpu::{Classifier, Options};
 use test_support::need;
@@ -46,7 +47,8 @@ fn the_example_of_packets_gives_what_the_rust_library_gives() {
     let compiler = need!(Compiler::c());
     let example = compiler.compile("examples/live.c", &static_link());
     let model = compiler.folder().join("model.safetensors");
-    model::write_longest_axis_model_of(["car", "person", "truck"], &model);
+    let classes = ["car", "person", "truck"];
+    model::write_longest_axis_model_of(classes, Normalization::Metric, &model);
     let sent = street::packets(&street::street(), 7, street::PACKETS_PER_S);
     let time_us = |i: usize| 1_000_000_000 + (i as f64 * street::PACKET_S * 1e6) as u64;
     let capture = compiler.folder().join("drive.pcap");

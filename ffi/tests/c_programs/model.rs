@@ -9,12 +9,12 @@ use formats::weights::{Tensor, write_weights};
 /// Writes a model of the classes x, y and z: a cloud in the positive octant is of the axis along which
 /// it reaches farthest.
 pub fn write_longest_axis_model(path: &Path) {
-    write_longest_axis_model_of(["x", "y", "z"], path);
+    write_longest_axis_model_of(["x", "y", "z"], Normalization::None, path);
 }
 
-/// As [`write_longest_axis_model`], with other names of the classes. A trunk that passes coordinates
+/// As [`write_longest_axis_model`], with other names of the classes and of other clouds. A trunk that passes coordinates
 /// on, the maximum over points, a head that passes them on.
-pub fn write_longest_axis_model_of(classes: [&str; 3], path: &Path) {
+pub fn write_longest_axis_model_of(classes: [&str; 3], normalization: Normalization, path: &Path) {
     let identity = Tensor { shape: vec![3, 3], values: vec![1., 0., 0., 0., 1., 0., 0., 0., 1.] };
     let zeros = Tensor { shape: vec![3], values: vec![0.0; 3] };
     let layers = ["feat.conv1", "feat.conv2", "fc1"].into_iter().flat_map(|layer| {
@@ -23,7 +23,7 @@ pub fn write_longest_axis_model_of(classes: [&str; 3], path: &Path) {
     });
     let card = ModelCard {
         classes: classes.map(str::to_owned).to_vec(),
-        normalization: Normalization::None,
+        normalization,
         ..ModelCard::default()
     };
     let tensors: BTreeMap<_, _> = layers.collect();

@@ -170,7 +170,7 @@ pub enum Warning {
     OneObject([f64; 3]),
     /// The ground of a sweep is at this height, metres.
     #[error(
-        "the ground is at z = {0:.1} m: expected it 0.2 to 30 m below the sensor; is the origin the \
+        "the ground is at z = {0:.1} m: expected it 0.15 to 30 m below the sensor; is the origin the \
          vehicle's, or that of a map? --origin gives the sensor's position"
     )]
     GroundAt(f64),

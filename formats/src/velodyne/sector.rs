@@ -114,62 +114,69 @@ impl Sector {
 #[derive(Clone, Debug, Default)]
 pub struct UnsentPackets {
     before: Option<Header>,
-    /// Where the latest gap begins and ends.
-    gap: Option<(u16, u16)>,
-    /// Packets of the latest gap that may have been lost.
-    n_doubtful: u64,
+    /// Where the sector that is not sent begins and ends.
+    sector: Option<(u16, u16)>,
+    /// A gap that is such a sector if it comes again, and the number of its packets.
+    doubtful: Option<((u16, u16), u64)>,
 }
 
 impl UnsentPackets {
     /// Those of a sensor that sends this sector only.
     pub(crate) fn outside(sector: &Sector) -> Self {
-        let gap = (forward(sector.unsent, sector.start), sector.start);
-        let gap = (sector.unsent > 0).then_some(gap);
-        Self { gap, ..Self::default() }
+        let unsent = (forward(sector.unsent, sector.start), sector.start);
+        Self { sector: (sector.unsent > 0).then_some(unsent), ..Self::default() }
     }
 
-    /// The number of packets between the one before and this one that were not sent. The first time, they
-    /// seem to be lost; the second time, those of the first are counted with them.
-    pub(crate) fn take(&mut self, header: &Header) -> u64 {
-        let Some(before) = self.before else {
-            (self.before, self.gap) = (Some(*header), header.unsent().or(self.gap));
-            return 0;
-        };
-        if step_us(&before, header) <= 0.0 {
-            return 0;
+    /// The number of packets between the one before and this one that were not sent, and of those before
+    /// that seemed to be lost and were not sent either: a gap is known when it comes again.
+    pub(crate) fn take(&mut self, header: &Header) -> [u64; 2] {
+        let step_us = self.before.map_or(0.0, |before| step_us(&before, header));
+        if self.before.is_some() && (-LONGEST_STEP_US..=0.0).contains(&step_us) {
+            // It is late.
+            return [0; 2];
         }
-        self.before = Some(*header);
-        let gap = (before.end(), header.azimuth);
+        self.sector = header.unsent().or(self.sector);
         let width = |(from, to)| u32::from(forward(from, to));
+        let packet = (header.units_per_us * header.sending_us()) as u32;
         // A sensor may leave out whole packets: its sector then begins and ends with any of those
         // near its ends.
-        let packet = (header.units_per_us * header.sending_us()) as u32;
+        let is_sent = |gap: &(u16, u16)| {
+            let ahead = width((gap.0, header.azimuth));
+            ahead > packet && ahead + 2 * packet < width(*gap)
+        };
+        self.sector = self.sector.filter(|gap| !is_sent(gap));
+        self.doubtful = self.doubtful.filter(|(gap, _)| !is_sent(gap));
+        let before = self.before.replace(*header).filter(|_| packet > 0 && step_us > 0.0);
+        let Some(gap) = before.map(|before| (before.end(), header.azimuth)) else { return [0; 2] };
         // One packet or two are lost now and then, also at the same azimuth in two turns.
-        let is_gap = packet > 0
-            && width(gap) > 2 * packet + u32::from(LEAST_UNSENT)
-            && forward(gap.0, gap.1) <= TURN - LEAST_UNSENT;
+        let least = 2 * packet + u32::from(LEAST_UNSENT);
+        if width(gap) <= least || forward(gap.0, gap.1) > TURN - LEAST_UNSENT {
+            return [0; 2];
+        }
         let within = |known: &(u16, u16)| {
             let ahead = (width((gap.0, known.0)) + packet) % u32::from(TURN);
             ahead + width(*known) <= width(gap) + 2 * packet
         };
         // Both durations are rounded, the one by stamps and this one by azimuths.
         let n_packets = |gap| {
-            (f64::from(width(gap)) / header.units_per_us / header.sending_us() + 0.05).round()
-                as u64
+            let us = f64::from(width(gap)) / header.units_per_us;
+            (us / header.sending_us() + 0.05).round() as u64
         };
-        let n_unsent = match self.gap.filter(within) {
-            _ if !is_gap => 0,
-            Some(known) => {
-                let is_same = width(gap) <= width(known) + 2 * packet;
-                n_packets(if is_same { gap } else { known }) + std::mem::take(&mut self.n_doubtful)
+        if let Some(sector) = self.sector.filter(within) {
+            let is_whole = width(gap) <= width(sector) + 2 * packet;
+            return [n_packets(if is_whole { gap } else { sector }), 0];
+        }
+        let again = self.doubtful.take_if(|(known, _)| within(known));
+        match again {
+            Some((_, n_before)) => {
+                self.sector = Some(gap);
+                [n_packets(gap), n_before]
             }
             None => {
-                (self.gap, self.n_doubtful) = (Some(gap), n_packets(gap));
-                0
+                self.doubtful = Some((gap, n_packets(gap)));
+                [0; 2]
             }
-        };
-        self.gap = header.unsent().or(self.gap);
-        n_unsent
+        }
     }
 }
 

@@ -193,7 +193,8 @@ impl Pipeline {
                 self.tracker.forget();
             }
             Succession::Follows { missing } => {
-                self.counts.lost = (self.counts.lost + missing).saturating_sub(facts.n_unsent);
+                self.counts.lost += missing.saturating_sub(facts.n_unsent);
+                self.counts.lost = self.counts.lost.saturating_sub(facts.n_unsent_before);
                 // Beyond a turn, the azimuth does not determine how far the head has turned.
                 let turned_rad = missing as f64 * facts.duration_us * facts.speed_rad_us;
                 if turned_rad > TAU {

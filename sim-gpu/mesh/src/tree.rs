@@ -83,8 +83,8 @@ pub enum TreeError {
 /// the class is the folder below `root` (CLASS), and the name that of the next folder (ID).
 ///
 /// Of the meshes without a split, 4 of 5 are in the training set. The split is a function of
-/// `seed`, class and name alone, so that a new mesh does not move others; but a class that would have
-/// none in one of the splits has one there, if it has two. Folders above `root` count too: `root` may
+/// `seed`, class and name alone, so that a new mesh does not move others; but a class of two or more
+/// has one in each split, where a new mesh may move another. Folders above `root` count too: `root` may
 /// itself be a class, or a split of one.
 ///
 /// Characters that some platform forbids in file names become `_`. If several meshes have the same

@@ -74,7 +74,9 @@ pub fn play(file: &Path, folder: &Path, mut run: impl FnMut(i32, &str, &[&str]))
 /// # Panics
 /// If a line has no arrow.
 pub fn faults(table: &str) -> impl Iterator<Item = (Vec<u8>, &str)> {
-    table.lines().filter(|line| !line.starts_with('#')).map(|line| {
+    let lines: Vec<_> = table.lines().filter(|line| !line.starts_with('#')).collect();
+    assert!(!lines.is_empty(), "expected faults, found none");
+    lines.into_iter().map(|line| {
         let (file, message) = line.rsplit_once(" -> ").expect("FILE -> MESSAGE");
         (unescaped(&format!("{file}\\c")), message)
     })

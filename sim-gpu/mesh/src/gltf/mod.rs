@@ -285,8 +285,9 @@ impl Reader<'_> {
             })?;
             if colours.len() != n
                 || !matches!(accessor.dimensions(), Dimensions::Vec3 | Dimensions::Vec4)
+                || !colours.as_flattened().iter().all(|part| part.is_finite())
             {
-                return Err(format!("expected {n} colours of 3 or 4 numbers, found others"));
+                return Err(format!("expected {n} colours of 3 or 4 finite numbers, found others"));
             }
         }
         let mut face = |corners: [u32; 3]| {

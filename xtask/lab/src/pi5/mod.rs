@@ -53,7 +53,7 @@ pub fn run(args: &PiModelArgs) -> Result<()> {
     let counter = board.counter(&model).inspect_err(warn).ok();
     let rows = rows::rows(args, &network, &board.kernels, counter.as_ref())?;
     print!("{}", rows::times(&rows));
-    println!("\n{}", rows::LEFT_OUT);
+    print!("\n{}", rows::LEFT_OUT);
     Ok(())
 }
 

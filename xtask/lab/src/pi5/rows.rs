@@ -89,22 +89,7 @@ pub fn count(
     Ok(Counted { other, ..whole })
 }
 
-pub const LEFT_OUT: &str = "\
-What the model leaves out. llvm-mca knows pipes and latencies, but no caches:
-activations and the weights at hand are taken to be in the first-level cache
-whenever a loop wants them. Every layer's weights come from main memory once a
-classification, at the bandwidth given, behind or before its arithmetic,
-whichever is longer; a real board's memory is slower for one core, and slower
-when its refresh or a screen is busy. Work outside inner loops runs at a flat
-number of instructions a cycle, and overlaps with nothing. Threads wake, meet
-and share out in no time, the clock never drops, and nothing else runs. Page
-and TLB misses, mispredicted branches and the first classification after
-loading are not there. Cycles are those of inner loops: a whole tile, with the
-start and the end of its sums, takes some 5 to 10 % more, of which the
-instructions are counted among the others. What depends on the data is that of
-the model file and of the clouds of `infer-cpu bench`: inputs of vector layers
-that are 0, and skipped, and products in fp32 that int8 could not rule out.
-Measure a real board with `infer-cpu bench --json`.";
+pub const LEFT_OUT: &str = include_str!("left_out.txt");
 
 /// The modelled times; what was not counted is empty.
 pub fn times(rows: &[PiRow]) -> Table {
