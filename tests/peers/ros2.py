@@ -114,10 +114,12 @@ def member(kind, typestore, known):
 
 
 def compare_lines(subscriber, lines):
-    """Each turn is a message of its objects, in the order of their lines."""
+    """Each turn is a message of its objects that have a class, in the order of their lines."""
     turns = defaultdict(list)
     for line in lines:
-        turns[line["turn"]].append(str(line["track"]))
+        named = turns[line["turn"]]
+        if line["class"] not in (None, "unknown"):
+            named.append(str(line["track"]))
     live = subprocess.Popen([*LIVE, "--realtime"], stdout=subprocess.PIPE)
     bridge = subprocess.Popen(bridge_command(), stdin=live.stdout)
     received = subscriber.take_all_of(bridge)
