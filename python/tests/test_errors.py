@@ -180,7 +180,7 @@ def test_a_scan_that_cannot_be_made_is_refused(cube: tuple, wanted: dict, messag
     ("wanted", "message"),
     [
         ({"sensor": "vlp99"}, "vlp99"),
-        ({"distance": (5, 2)}, "at least 5"),
+        ({"distance": (5, 2)}, "expected the smaller number first, 2,5"),
         ({"noise": -1}, "noise.sigma_m: expected a number"),
         ({"split": "dev"}, "dev"),
         ({"points": 0}, "points"),
