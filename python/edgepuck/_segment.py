@@ -22,12 +22,11 @@ def segment(
     min_points: int | None = None,
 ) -> NDArray[np.int32]:
     """The cluster of each point of a sweep, counted from 0. -1 is ground, -2 is a point in no cluster,
-    and -3 is a lost return.
+    and -3 is a lost return: a point at 0, 0, 0, unless `radius` is given, or without finite coordinates.
 
     Args:
         sweep: A scan, or the path of a file that `Scan.read` reads, or points of shape [n, 3] in the frame
-            of the sensor, metres, z up, or a cloud of Open3D or trimesh; further columns are ignored, and so
-            are lost returns: points at 0, 0, 0 or without finite coordinates.
+            of the sensor, metres, z up, or a cloud of Open3D or trimesh; further columns are ignored.
         rings: The ring of each point, from below, [n]. A scan has its own.
         radius: If given, clusters are the connected components of points within this distance,
             metres, and there is no ground. This suits clouds that are not sweeps of a sensor.

@@ -62,8 +62,7 @@ impl Components {
     fn sort(&mut self, points: &[[f32; 3]], edge_m: f64, labels: &mut [Label]) {
         self.points.clear();
         for (point, position) in points.iter().enumerate() {
-            // A point at 0, 0, 0 is a lost return.
-            let is_valid = position.iter().all(|x| x.is_finite()) && *position != [0.0; 3];
+            let is_valid = position.iter().all(|x| x.is_finite());
             labels[point] = if is_valid { Label::OBSTACLE } else { Label::Invalid };
             if is_valid {
                 // Adding 0 turns -0 into 0, which is the same cell.

@@ -56,7 +56,7 @@ impl Classifier {
     /// scales its clouds has learnt whole objects, without their sizes.
     #[must_use]
     pub fn unsuited_to_clusters(&self) -> Option<String> {
-        let found = self.card.normalization;
+        let found = self.options.normalization.unwrap_or(self.card.normalization);
         (!found.is_metric()).then(|| {
             format!(
                 "expected a model of clusters in metres (normalization metric or metric-sight), found \

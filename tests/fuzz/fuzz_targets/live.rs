@@ -6,6 +6,7 @@
 
 #![no_main]
 
+use formats::model_card::Normalization;
 use infer_cpu::live::{Arrival, LiveOptions, Object, Pipeline, Pose, Trajectory};
 use infer_cpu::{Classifier, Options};
 use libfuzzer_sys::fuzz_target;
@@ -15,7 +16,8 @@ const COMMAND: usize = 16;
 
 fuzz_target!(|bytes: &[u8]| {
     let Some((&choice, commands)) = bytes.split_first() else { return };
-    let classifier = Classifier::from_bytes(MODEL, &Options::default()).expect("a model");
+    let metric = Options { normalization: Some(Normalization::Metric), ..Options::default() };
+    let classifier = Classifier::from_bytes(MODEL, &metric).expect("a model");
     let mut options = LiveOptions::default();
     if choice & 1 == 1 {
         let turned = Pose::at([30.0, 0.0, 1.0]).turned_deg(f64::from(choice), 5.0, 0.0);
