@@ -132,7 +132,6 @@ impl UnsentPackets {
     pub(crate) fn take(&mut self, header: &Header) -> [u64; 2] {
         let step_us = self.before.map_or(0.0, |before| step_us(&before, header));
         if self.before.is_some() && (-LONGEST_STEP_US..=0.0).contains(&step_us) {
-            // It is late.
             return [0; 2];
         }
         self.sector = header.unsent().or(self.sector);
