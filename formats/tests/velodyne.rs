@@ -530,7 +530,7 @@ fn a_flawed_packet_is_skipped_and_counted() {
 
 /// Frames of a VLP-16 at 1266 rpm that sends `width` degrees clockwise from `from`, and sees a wall 10 m
 /// away with every laser. Packets are filled with the blocks that it sends, as those of the sensor are, so
-/// that some go on behind what is not sent. Also the number of points of each pass.
+/// that some have blocks of two passes. Also the number of points of each pass.
 fn sector(headers: &[u8], from: f64, width: f64, passes: u32) -> (Vec<Vec<u8>>, Vec<usize>) {
     const STEP_DEG: f64 = 0.84;
     let (mut blocks, mut counts) = (Vec::new(), vec![0; passes as usize]);

@@ -145,8 +145,8 @@ fn an_ouster_sees_the_same_street() {
     }
 }
 
-/// The packets of a sensor in the street that sends a sector only, units of 0.01 degree: packets go on
-/// behind what is not sent (`is_filled`), or those outside are left out.
+/// The packets of a sensor in the street that sends a sector only, units of 0.01 degree: a packet is filled
+/// with the blocks of the next pass (`is_filled`), or packets outside are left out.
 fn of_sector([from, to]: [u16; 2], is_filled: bool) -> Vec<(f64, [u8; PACKET])> {
     let sent = packets(&street(), 5_000, 3 * PACKETS_PER_S);
     let after = |azimuth: u16| (u32::from(azimuth) + 36_000 - u32::from(from)) % 36_000;

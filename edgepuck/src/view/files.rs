@@ -51,7 +51,7 @@ pub fn read(file: &Path, points: &PointsArgs) -> anyhow::Result<Content> {
     }))
 }
 
-/// Why a file is none that can be shown, and what to do.
+/// Why `view` cannot show a file, and what to do.
 fn unknown(file: &Path, extension: &str) -> String {
     let found = match extension {
         "tar" => "a tar: unpack it with `tar -xf`, and show a file of it",

@@ -143,8 +143,8 @@ impl Turn {
         step_us.abs() > LONGEST_STEP_US || last.units_per_us * step_us > most
     }
 
-    /// The number of packets that fit into the gaps between the times of the packets. There are none for
-    /// what the sensor does not send.
+    /// The number of packets that fit into the gaps between the times of the packets, without those that
+    /// the sensor does not send.
     fn n_missing(&self) -> u64 {
         let Some((last, ..)) = self.last else { return 0 };
         let in_gap = |((from_us, from), (to_us, to)): (&(u32, u16), &(u32, u16))| {

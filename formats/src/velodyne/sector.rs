@@ -18,11 +18,11 @@ const LEAST_UNSENT: u16 = 300;
 /// The number of azimuths.
 const N: usize = TURN as usize;
 
-/// As many turns are watched for what is not sent.
+/// The number of turns from which the sector is found.
 const WATCHED: f64 = 4.0;
-/// Fewer turns do not tell what is lost from what is not sent.
+/// The fewest turns that tell a sector that is not sent from packets that are lost.
 const FEWEST_WATCHED: f64 = 2.0;
-/// A head that stands still is watched for as many packets.
+/// The most packets that are read for it, since a head may stand still.
 const MOST_PACKETS: u32 = 5000;
 
 /// The sector that a sensor sends in each turn, in azimuth units of 0.01 degree, clockwise. By
@@ -97,7 +97,7 @@ impl Sector {
         }
     }
 
-    /// Whether the head passes what is not sent from one azimuth to a later one of the same turn or
+    /// Whether the head passes the rest of the turn from one azimuth to a later one of the same turn or
     /// the next.
     pub(super) fn is_passed(&self, from: u16, to: u16) -> bool {
         self.unsent > 0 && forward(self.start, to) < forward(self.start, from)
