@@ -224,14 +224,13 @@ fn folder(folder: &Path, points: &PointsArgs) -> anyhow::Result<Vec<Frame>> {
     let is_cloud = |file: &Path| CloudFormat::of_path(file).is_ok() && !has_faces(file);
     let (n_files, mut n_points, mut frames) = (files.len(), 0, Vec::new());
     // Of a long drive, sweeps from all of it.
-    let n_first = match is_cloud(&files[0]) {
-        true => cloud(&files[0], points).map_or(0, |frame| frame.n_points()),
-        false => 0,
-    };
+    let mut begun = is_cloud(&files[0]).then(|| cloud(&files[0], points));
+    let n_first = begun.iter().flatten().map(Frame::n_points).sum::<usize>();
     let every = (n_files * n_first).div_ceil(MOST_POINTS).max(1);
     for (file, number) in files.into_iter().zip(0..).step_by(every) {
         let name = file.strip_prefix(folder).unwrap_or(&file).to_string_lossy().into_owned();
-        match if is_cloud(&file) { cloud(&file, points) } else { first(&file, points) } {
+        let read = || if is_cloud(&file) { cloud(&file, points) } else { first(&file, points) };
+        match begun.take().unwrap_or_else(read) {
             Ok(frame) => {
                 n_points += frame.n_points();
                 frames.push(Frame { name, turn: Some(number), ..frame });
