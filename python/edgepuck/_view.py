@@ -47,6 +47,8 @@ def view(*shown: Any, truth: str | os.PathLike[str] | Sequence[Detection] | None
         raise _edgepuck.Error("expected something to show, found nothing")
     with tempfile.TemporaryDirectory(prefix="edgepuck-") as folder:
         words = [_file(one, Path(folder, f"argument-{number}")) for number, one in enumerate(shown)]
+        if any(isinstance(one, (Scan, DrawnScene)) for one in shown):
+            words = [_for_any_sweep(word, Path(folder)) for word in words]
         if truth is not None:
             words += ["--truth", _file(truth, Path(folder, "truth"))]
         return page_of(words, folder)
@@ -82,6 +84,22 @@ def _file(shown: Any, place: Path) -> str:
             raise _edgepuck.Error(f"points: expected an array of shape [n, 3], found {list(points.shape)}")
         file = place / "points.npy"
         np.save(file, points[:, :3])
+    return os.fspath(file)
+
+
+def _for_any_sweep(word: str, folder: Path) -> str:
+    """The file of boxes of `detect` without the name of their sweep, which a scan in memory does not have; any
+    other file unchanged."""
+    if not word.endswith(".json") or Path(word).stat().st_size > 1e8:
+        return word
+    try:
+        boxes = json.loads(Path(word).read_text(encoding="utf-8"))
+    except ValueError:
+        return word
+    if not isinstance(boxes, dict) or boxes.pop("sweep", None) is None:
+        return word
+    file = folder / Path(word).name
+    file.write_text(json.dumps(boxes), encoding="utf-8")
     return os.fspath(file)
 
 
@@ -136,50 +154,48 @@ def _save_scene(scene: Scene, place: Path) -> str:
             f"{scene._file[0]}: only what was added to the file's scene is shown",
             stacklevel=4,
         )
-    nodes: list[Any] = []
-    meshes: list[Any] = []
-    views: list[Any] = []
-    accessors: list[Any] = []
-    data = b""
+    parts = []
     for number, (mesh, (scale, name, label, *_)) in enumerate(scene._added, first):
         rotation, position = _rigid(scene._moved[number])
-        x, y, z = ((mesh.vertices * scale) @ rotation.T + position).astype(np.float32).T
+        vertices = (mesh.vertices * scale) @ rotation.T + position
+        parts.append((name or f"object {number}", label, vertices.astype(np.float32), mesh.faces.astype(np.uint32)))
+    return _save_gltf(place / "scene.gltf", parts)
+
+
+def _save_gltf(file: Path, parts: list[tuple[str, str | None, NDArray[Any], NDArray[Any]]]) -> str:
+    """A glTF file of parts: a name, perhaps a label, vertices and faces of each."""
+    views: list[Any] = []
+    accessors: list[Any] = []
+    meshes: list[Any] = []
+    data = b""
+
+    def add(array: NDArray[Any], component: int, kind: str, **bounds: Any) -> int:
+        """Appends an array to the buffer and returns the number of its accessor."""
+        nonlocal data
+        views.append({"buffer": 0, "byteOffset": len(data), "byteLength": array.nbytes})
+        of = {"bufferView": len(views) - 1, "componentType": component, "count": len(array), "type": kind}
+        accessors.append(of | bounds)
+        data += np.ascontiguousarray(array).tobytes()
+        return len(accessors) - 1
+
+    for _, label, vertices, faces in parts:
         # The y axis of glTF points up.
-        corners = np.column_stack([x, z, -y])
-        bounds = {
-            "min": corners.min(axis=0).tolist(),
-            "max": corners.max(axis=0).tolist(),
-        }
-        count = len(accessors)
-        arrays = [
-            (corners, 5126, "VEC3", bounds),
-            (mesh.faces.astype(np.uint32).ravel(), 5125, "SCALAR", {}),
-        ]
-        for array, component, kind, extra in arrays:
-            views.append({"buffer": 0, "byteOffset": len(data), "byteLength": array.nbytes})
-            of = {
-                "bufferView": len(views) - 1,
-                "componentType": component,
-                "count": len(array),
-                "type": kind,
-            }
-            accessors.append(of | extra)
-            data += np.ascontiguousarray(array).tobytes()
-        parts = [{"attributes": {"POSITION": count}, "indices": count + 1}]
-        meshes.append({"primitives": parts} | ({"name": label} if label else {}))
-        nodes.append({"mesh": len(meshes) - 1, "name": name or f"object {number}"})
+        corners = vertices[:, [0, 2, 1]] * np.float32([1, 1, -1])
+        low, high = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+        part = {"attributes": {"POSITION": add(corners, 5126, "VEC3", min=low, max=high)}}
+        part["indices"] = add(faces.ravel(), 5125, "SCALAR")
+        meshes.append({"primitives": [part]} | ({"name": label} if label else {}))
     uri = "data:application/octet-stream;base64," + base64.b64encode(data).decode()
     gltf = {
         "asset": {"version": "2.0"},
         "scene": 0,
-        "scenes": [{"nodes": list(range(len(nodes)))}],
-        "nodes": nodes,
+        "scenes": [{"nodes": list(range(len(parts)))}],
+        "nodes": [{"mesh": number, "name": name} for number, (name, *_) in enumerate(parts)],
         "meshes": meshes,
         "bufferViews": views,
         "accessors": accessors,
         "buffers": [{"byteLength": len(data), "uri": uri}],
     }
-    file = place / "scene.gltf"
     file.write_text(json.dumps(gltf), encoding="utf-8")
     return os.fspath(file)
 

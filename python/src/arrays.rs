@@ -4,7 +4,7 @@ use crate::error::{raised, warn};
 use edgepuck_segment::other_axis_up;
 use formats::Scan;
 use formats::hash::Hashing;
-use formats::plausible::judge_sweep;
+use formats::plausible::{judge_surroundings, judge_sweep};
 use formats::points_file::PointsReader;
 use formats::scan::{Attribute, ColumnSlot, OBJECT_TEXTS};
 use formats::scan_file::{ScanFormat, write_scan};
@@ -34,7 +34,8 @@ pub fn sweep(py: Python<'_>, array: &PyReadonlyArray2<'_, f32>) -> PyResult<Vec<
     let remedy = "subtract the sensor's position before rounding to 32 bits, or give metres";
     let warning = judge_sweep(points.iter().map(|point| point.map(f64::from)), remedy)
         .map_err(|(part, cause)| raised(format!("{part}: {cause}")))?;
-    warn(py, warning.or_else(|| other_axis_up(&points)).as_slice())?;
+    let is_around = || judge_surroundings(&points, || other_axis_up(&points));
+    warn(py, warning.or_else(is_around).as_slice())?;
     Ok(points)
 }
 

@@ -52,6 +52,19 @@ def test_cells_print_no_path(capfd: pytest.CaptureFixture[str]) -> None:
     )
 
 
+def test_boxes_of_a_file_belong_to_a_scan_in_memory(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scan = ep.Sensor("vlp16").scan(ep.Mesh(*ep.box((1.0, 1.0, 1.0))), distance=3)
+    box = {"centre_m": [0.0, 0.0, 0.0], "size_m": [1.0, 1.0, 1.0], "yaw_deg": 0.0}
+    boxes = tmp_path / "objects.json"
+    boxes.write_text(json.dumps({"sweep": "000007.npz", "objects": [{"class": "car", "box": box}]}))
+    assert ep.view(scan, boxes).page.count('"class":"car"') == 1
+    assert capfd.readouterr().err == ""
+    # Of the file of another sweep, they are warned of.
+    scan.save(tmp_path / "000001.npz")
+    ep.view(tmp_path / "000001.npz", boxes)
+    assert "expected boxes of 000001.npz, found boxes of 000007.npz" in capfd.readouterr().err
+
+
 def data(page: str) -> list[dict[str, Any]]:
     """The panes of a page."""
     found: list[dict[str, Any]] = json.loads(page.split('id="data">')[1].split("</script>")[0])["panes"]

@@ -130,7 +130,9 @@ def check_unit(root):
 def serve(root):
     """The service's life, as its unit starts it."""
     manager = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-    manager.bind(f"\0edgepuck-{os.getpid()}")
+    (root / "run").mkdir(exist_ok=True)
+    # A name from here: that of a socket has 107 bytes at most.
+    manager.bind(os.path.relpath(root / "run/notify"))
     manager.settimeout(START_S)
     emulator = shutil.which("qemu-aarch64")
     libraries = re.findall(r"(/\S+) \(0x", run("ldd", emulator).stdout)
@@ -148,7 +150,7 @@ def serve(root):
     service = subprocess.Popen(
         [*AS_ROOT, "chroot", str(root), emulator, "-cpu", "cortex-a76", *command],
         stdout=lines.open("w"),
-        env={"PATH": os.environ["PATH"], "NOTIFY_SOCKET": f"@edgepuck-{os.getpid()}",
+        env={"PATH": os.environ["PATH"], "NOTIFY_SOCKET": "/run/notify",
              "WATCHDOG_USEC": "1000000"})
     try:
         assert manager.recv(999).decode().startswith("READY=1\n")
@@ -160,7 +162,7 @@ def serve(root):
         assert service.wait(START_S) == 0
     finally:
         service.kill()
-    while (told := manager.recv(999).decode()) != "STOPPING=1":
+    while (told := manager.recv(999).decode()) != "STOPPING=1\n":
         assert told.startswith("WATCHDOG=1\n"), told
     objects = [json.loads(line) for line in lines.read_text().splitlines()]
     n_named = sum(found["class"] is not None for found in objects)

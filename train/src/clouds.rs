@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use formats::labelled::{LabelledSet, read_labelled};
 use formats::model_card::Normalization;
+use formats::plausible::coarse_object;
 use formats::split::Split;
 use formats::streams::Stream;
 
@@ -124,6 +125,9 @@ impl Clouds {
             if points.len() >= least && points.iter().all(|point| *point == points[0]) {
                 let cause = "expected points of an object, found all in one place";
                 return Err(format!("{}: {cause}, {:?}", name(cloud), points[0]));
+            }
+            if let Some(cause) = coarse_object(points) {
+                return Err(format!("{}: {cause}", name(cloud)));
             }
         }
         let most = set.labels.iter().max().map_or(0, |label| label + 1);

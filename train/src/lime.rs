@@ -13,7 +13,7 @@ use crate::draws::Draws;
 use crate::error::Error;
 
 /// Number of clouds with parts removed, including the whole cloud: LIME's default.
-const SAMPLES: usize = 1000;
+pub const SAMPLES: usize = 1000;
 
 /// Width of the kernel that weights these clouds: the authors' (`lime_3d`).
 const SIGMA: f64 = 0.25;

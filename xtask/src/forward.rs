@@ -14,8 +14,8 @@ pub const EDGEPUCK: &str = "edgepuck";
 const WITHOUT_MODELS: &str = "gen-dataset gen gen-scenes scan \
      corrupt view profile merge-dataset";
 
-/// Commands that read points in any format. The feature that they need beyond the default ones takes long to
-/// build.
+/// Commands that read points in any format. The features that they need beyond those of a first build take
+/// long to build.
 const READS_POINTS: &str = "corrupt view";
 
 /// Runs the program of `package` with `words` in the caller's folder and gives
@@ -33,10 +33,10 @@ pub fn run(package: &str, words: &[OsString]) -> anyhow::Result<u8> {
     become_process(&mut cargo).context("cannot start cargo")
 }
 
-/// The flags for the features that a command line needs beyond the default ones.
+/// The flags for the features that a command line needs beyond those of a first build.
 fn features(package: &str, words: &[OsString]) -> &'static [&'static str] {
     let needs_las = package == EDGEPUCK && is_one_of(words, READS_POINTS);
-    if needs_las { &["--features", "las"] } else { &[] }
+    if needs_las { &["--features", "las,mcap"] } else { &[] }
 }
 
 /// Replaces this process where the system allows it, so that a signal ends what

@@ -77,18 +77,24 @@ function drawMesh(mesh) {
 /** Where a sensor is. */
 export const placeOf = ({ pose }) => [pose[3], pose[7], pose[11]];
 
-/** The ways of the tracks of these boxes in the frames before, oldest first. */
-function drawTrails(boxes, before) {
+/** The ways of the tracks of these boxes of a frame in the frames before, oldest first: in the world, if poses are known. */
+function drawTrails(boxes, { pose }, before) {
+  const matrix = (of) => new THREE.Matrix4().set(...of);
+  const seen = ({ centre }, then) =>
+    pose && then.pose
+      ? new THREE.Vector3(...centre).applyMatrix4(matrix(pose).invert().multiply(matrix(then.pose))).toArray()
+      : centre;
   const [positions, colours] = [[], []];
   for (const box of boxes) {
     const colour = boxColour(box).map((x) => (x / 255) ** 2.2);
     let from = box.centre;
-    for (const { boxes: earlier = [] } of before.toReversed()) {
-      const same = earlier.find(({ track, truth }) => track === box.track && truth === box.truth);
+    for (const then of before.toReversed()) {
+      const same = then.boxes?.find(({ track, truth }) => track === box.track && truth === box.truth);
       if (!same) continue;
-      positions.push(...from, ...same.centre);
+      const to = seen(same, then);
+      positions.push(...from, ...to);
       colours.push(...colour, ...colour);
-      from = same.centre;
+      from = to;
     }
   }
   return drawLines(positions, colours, { linewidth: 2, transparent: true, opacity: 0.7 });
@@ -235,7 +241,7 @@ export class Stage {
     const [truth, found] = [boxes.filter((box) => box.truth), boxes.filter((box) => !box.truth)];
     if (found.length) this.#add("boxes", drawBoxes(found, { linewidth: 2.5 }));
     const tracked = found.filter(({ track }) => Number.isInteger(track));
-    if (tracked.length && before.length) this.#add("trails", drawTrails(tracked, before));
+    if (tracked.length && before.length) this.#add("trails", drawTrails(tracked, frame, before));
     const dashes = { linewidth: 1.5, dashed: true, dashSize: 0.35, gapSize: 0.25, transparent: true };
     if (truth.length) this.#add("truth", drawBoxes(truth, { ...dashes, opacity: 0.9 }));
     for (const sensor of sensors) {

@@ -9,7 +9,7 @@ use std::time::Instant;
 use anyhow::{Context, anyhow, ensure};
 use edgepuck_scenes::{Drive, Packet, Recipe, Sighting, Sightings, Stage};
 use formats::atomic::{Unfinished, UnfinishedFolder};
-use formats::vlp32c::{Capture, SEQUENCES_PER_PACKET, START_S};
+use formats::vlp32c::{Capture, SEQUENCES_PER_PACKET};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::Args;
@@ -98,7 +98,7 @@ pub(super) fn run(args: &Args, seconds: f64) -> anyhow::Result<Outcome> {
         let (revolution, returns) = drive
             .in_packets()
             .map_err(|cause| anyhow!("{}: {cause}; --layout semantickitti writes none", what()))?;
-        let capture = Capture::create(asked.out, revolution.rpm, returns)?;
+        let capture = Capture::create(asked.out, drive.start_s(), revolution.rpm, returns)?;
         write(&mut drive, seconds, capture, asked.out)?
     };
     program::say!(
@@ -191,7 +191,7 @@ fn write_poses(file: &mut Unfinished, drive: &Drive<'_>, seconds: f64) -> anyhow
         let pose = drive.pose(time_s);
         let [x, y, z] = pose.position_m.to_array();
         let [qx, qy, qz, qw] = pose.rotation.to_array();
-        let time_s = f64::from(START_S) + time_s;
+        let time_s = f64::from(drive.start_s()) + time_s;
         file.append(|writer| {
             writeln!(writer, "{time_s:.2} {x:.6} {y:.6} {z:.6} {qx:.9} {qy:.9} {qz:.9} {qw:.9}")
         })?;

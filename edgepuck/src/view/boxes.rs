@@ -106,6 +106,7 @@ impl Object {
             turn: self.turn,
             sweep: None,
             in_world,
+            seen_from: None,
             time_s: self.time_s,
         })
     }

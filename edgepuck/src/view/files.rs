@@ -1,10 +1,11 @@
 //! Files and folders, as frames or boxes.
 
-use super::MOST_POINTS;
 use super::boxes;
 use super::frame::{Frame, Labels, Placed};
+#[cfg(feature = "mcap")]
 use super::recording;
 use super::scene;
+use super::{MOST_FRAMES, MOST_POINTS};
 use crate::points::{PointsArgs, warn_of_packets};
 use crate::{Usage, colours};
 use anyhow::{Context, bail, ensure};
@@ -26,9 +27,6 @@ pub enum Content {
     Boxes(Vec<Placed>),
 }
 
-/// The most clouds of a packed set and turns of a capture that are shown.
-const MOST_FRAMES: usize = 500;
-
 /// Reads a file or a folder of any kind.
 pub fn read(file: &Path, points: &PointsArgs) -> anyhow::Result<Content> {
     let extension = file.extension().unwrap_or_default().to_string_lossy().to_lowercase();
@@ -36,6 +34,7 @@ pub fn read(file: &Path, points: &PointsArgs) -> anyhow::Result<Content> {
         _ if file.is_dir() => folder(file, points)?,
         "json" | "jsonl" => return Ok(Content::Boxes(boxes::read(file)?)),
         _ if points.is_capture(file) => turns(file, points)?,
+        #[cfg(feature = "mcap")]
         "mcap" => recording::read(file)?,
         "ply" if !has_faces(file) => vec![cloud(file, points)?],
         "toml" | "urdf" => vec![scene::read(file)?],
@@ -57,6 +56,7 @@ fn unknown(file: &Path, extension: &str) -> String {
         "tar" => "a tar: unpack it with `tar -xf`, and show a file of it",
         "xml" | "mjcf" => "a model of MuJoCo: show a scan of it, by Python's `ep.view(scan)`",
         "xacro" | "sdf" => "a robot of another format: convert it to a URDF",
+        "mcap" => "a recording: build edgepuck with its feature mcap",
         "safetensors" | "pt" | "pth" | "onnx" => "a network: `eval` and `classify` use it",
         _ => "another file: export it as one of these, or give --input-format",
     };
@@ -221,30 +221,37 @@ fn folder(folder: &Path, points: &PointsArgs) -> anyhow::Result<Vec<Frame>> {
     keep_commonest_extension(&mut files);
     let cause = "expected a folder of sweeps, scans, meshes or clusters, found none in it";
     ensure!(!files.is_empty(), Usage(format!("{}: {cause}", folder.display())));
+    let frames = of_files(folder, &files, points)?;
+    if frames.len() < files.len() {
+        program::say!("{}: {} of {} are shown", folder.display(), frames.len(), files.len());
+    }
+    Ok(frames)
+}
+
+/// A frame for each of the `files`, or of many for so few, evenly, that a page can show their points.
+fn of_files(folder: &Path, files: &[PathBuf], points: &PointsArgs) -> anyhow::Result<Vec<Frame>> {
     let is_cloud = |file: &Path| CloudFormat::of_path(file).is_ok() && !has_faces(file);
-    let (n_files, mut n_points, mut frames) = (files.len(), 0, Vec::new());
-    // Of a long drive, sweeps from all of it.
+    let (mut n_points, mut frames) = (0, Vec::new());
     let mut begun = is_cloud(&files[0]).then(|| cloud(&files[0], points));
     let n_first = begun.iter().flatten().map(Frame::n_points).sum::<usize>();
-    let every = (n_files * n_first).div_ceil(MOST_POINTS).max(1);
-    for (file, number) in files.into_iter().zip(0..).step_by(every) {
-        let name = file.strip_prefix(folder).unwrap_or(&file).to_string_lossy().into_owned();
-        let read = || if is_cloud(&file) { cloud(&file, points) } else { first(&file, points) };
+    let every = (files.len() * n_first).div_ceil(MOST_POINTS).max(1);
+    for (file, number) in files.iter().zip(0..).step_by(every) {
+        let name = file.strip_prefix(folder).unwrap_or(file).to_string_lossy().into_owned();
+        let read = || if is_cloud(file) { cloud(file, points) } else { first(file, points) };
         match begun.take().unwrap_or_else(read) {
             Ok(frame) => {
                 n_points += frame.n_points();
                 frames.push(Frame { name, turn: Some(number), ..frame });
             }
-            Err(error) if number + 1 == n_files as u64 && frames.is_empty() => return Err(error),
+            Err(error) if number + 1 == files.len() as u64 && frames.is_empty() => {
+                return Err(error);
+            }
             Err(error) => program::say!("warning: a file is left out: {error:#}"),
         }
         // So many that memory holds them.
         if n_points > 3 * MOST_POINTS || frames.len() >= MOST_FRAMES {
             break;
         }
-    }
-    if frames.len() < n_files {
-        program::say!("{}: {} of {n_files} are shown", folder.display(), frames.len());
     }
     Ok(frames)
 }

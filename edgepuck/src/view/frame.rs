@@ -2,22 +2,16 @@
 //! assets/view/src/viewer.js).
 
 use anyhow::{Context, ensure};
-use base64::Engine;
 use base64::display::Base64Display;
 use base64::engine::general_purpose::STANDARD;
 use bytemuck::cast_slice;
-use flate2::Compression;
-use flate2::write::ZlibEncoder;
-use formats::geometry::{OrientedBox, Trajectory};
+use formats::geometry::{OrientedBox, Pose, Trajectory};
 use formats::plausible::{bounds, mesh_size, unit_of_scanned};
-use formats::scan::{Attribute, Column};
 use formats::trajectory::check_cover;
 use formats::unit::Unit;
 use formats::{FormatError, Scan};
-use glam::DVec3;
-use serde::ser::{SerializeMap, SerializeStruct};
+use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use crate::Usage;
@@ -45,6 +39,8 @@ pub struct Frame {
     /// The origin of the meshes of a frame without points, metres.
     #[serde(skip)]
     pub origin: [f64; 3],
+    /// The pose in the world from which points and boxes are seen, if it moves and is known.
+    pub pose: Option<[f64; 16]>,
     pub points: Option<Points>,
     pub meshes: Vec<Mesh>,
     pub boxes: Vec<Placed>,
@@ -104,6 +100,9 @@ pub struct Placed {
     /// Whether its frame is the world's, and not the sensor's.
     #[serde(skip)]
     pub in_world: bool,
+    /// The pose of the sensor then, if it was in the world's frame.
+    #[serde(skip)]
+    pub seen_from: Option<Pose>,
     /// When it was there: Unix time in seconds.
     #[serde(skip)]
     pub time_s: Option<f64>,
@@ -247,6 +246,8 @@ impl Pane {
                 placed
             });
             let boxes: Vec<_> = boxes.collect();
+            let seen_from = boxes.iter().find_map(|placed| placed.seen_from);
+            frame.pose = frame.pose.or(seen_from.map(|pose| pose.matrix()));
             frame.boxes.extend(boxes);
         }
         Ok(())
@@ -272,8 +273,8 @@ impl Pane {
             let time_s = placed.time_s.with_context(lack)?;
             check_cover(motion.known_s(), [time_s; 2])
                 .map_err(|cause| FormatError::malformed(&self.poses, "times", cause))?;
-            let place = placed.place.seen_from(&motion.at(time_s));
-            Ok(Placed { place, ..placed })
+            let pose = motion.at(time_s);
+            Ok(Placed { place: placed.place.seen_from(&pose), seen_from: Some(pose), ..placed })
         });
         seen.collect()
     }
@@ -351,134 +352,4 @@ fn block<S: Serializer>(kind: &str, bytes: &[u8], serializer: S) -> Result<S::Ok
     let mut map = serializer.serialize_map(Some(1))?;
     map.serialize_entry(kind, &format_args!("{}", Base64Display::new(bytes, &STANDARD)))?;
     map.end()
-}
-
-/// Numbers as `unpacked` in assets/view/src/main.js takes them: `low + step * z`, in turn for each `low`. Of the
-/// whole numbers `z`, the differences are compressed, the lowest bytes of all first.
-#[derive(Serialize)]
-struct Packed {
-    low: Vec<f64>,
-    step: f64,
-    z: String,
-}
-
-impl Packed {
-    fn of_whole(values: &[u32]) -> Self {
-        let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
-        for byte in 0..4 {
-            let before = std::iter::once(&0).chain(values);
-            let bytes = values.iter().zip(before).map(|(value, before)| {
-                let difference = value.wrapping_sub(*before) as i32;
-                // Those of either sign are small.
-                ((difference << 1) ^ (difference >> 31)).to_le_bytes()[byte]
-            });
-            let bytes: Vec<u8> = bytes.collect();
-            encoder.write_all(&bytes).expect("invariant: memory takes all bytes");
-        }
-        let z = STANDARD.encode(encoder.finish().expect("invariant: memory takes all bytes"));
-        Self { low: vec![0.0], step: 1.0, z }
-    }
-
-    /// The values of each axis, to half of a step: a 65,535th of the largest span, and at most `most`.
-    fn of_real(axes: &[Vec<f64>], most: f64) -> Self {
-        let bounds = axes.iter().map(|values| {
-            values.iter().fold([f64::MAX, f64::MIN], |[low, high], x| [low.min(*x), high.max(*x)])
-        });
-        let bounds: Vec<[f64; 2]> = bounds.collect();
-        let span = bounds.iter().fold(0.0, |span: f64, [low, high]| span.max(high - low));
-        let step = (span / 65_535.0).min(most).max(span / 4e9).max(f64::MIN_POSITIVE);
-        let whole = axes.iter().zip(&bounds).flat_map(|(values, [low, _])| {
-            values.iter().map(move |value| ((value - low) / step).round() as u32)
-        });
-        Self {
-            low: bounds.iter().map(|[low, _]| *low).collect(),
-            step,
-            ..Self::of_whole(&whole.collect::<Vec<_>>())
-        }
-    }
-}
-
-#[derive(Serialize)]
-struct Values<'a> {
-    name: &'a str,
-    unit: &'a str,
-    kind: &'a str,
-    values: Packed,
-    names: Option<&'a [String]>,
-}
-
-impl Serialize for Points {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        /// Points are where they are to half of this, metres.
-        const STEP_M: f64 = 1.0 / 128.0;
-        let scan = &self.scan;
-        // Points of one ring are near to each other.
-        let mut order: Vec<usize> = (0..scan.len()).collect();
-        if let Some(ring) = &scan.ring {
-            order.sort_by_key(|i| ring[*i]);
-        }
-        let at = scan.sensor_position_m();
-        let far_m = |i: usize| {
-            let off = |axis| f64::from(scan.positions[i][axis]) + scan.origin[axis] - at[axis];
-            DVec3::from([0, 1, 2].map(off)).length()
-        };
-        // The viewer computes such ranges.
-        let is_range = |range_m: &[f32]| {
-            (0..scan.len()).all(|i| (f64::from(range_m[i]) - far_m(i)).abs() < 1e-3)
-        };
-        let media = ["surface", "rain", "snow", "fog", "dust"].map(str::to_owned);
-        let of_scan = scan.columns().filter_map(|(attribute, column)| {
-            let (unit, kind) = match attribute {
-                Attribute::Range => ("m", "number"),
-                Attribute::Time => ("s", "number"),
-                Attribute::Object | Attribute::Triangle | Attribute::Return => ("", "id"),
-                Attribute::Medium => ("", "class"),
-                _ => ("", "number"),
-            };
-            let objects = &self.scan.object_texts[0];
-            let (names, kind) = match attribute {
-                Attribute::Medium => (Some(&media[..]), kind),
-                Attribute::Object if !objects.is_empty() => (Some(&objects[..]), "class"),
-                _ => (None, kind),
-            };
-            let in_order =
-                |of: &dyn Fn(usize) -> u32| order.iter().map(|i| of(*i)).collect::<Vec<_>>();
-            let values = match column {
-                Column::F32(values) if attribute == Attribute::Range && is_range(values) => {
-                    return None;
-                }
-                Column::F32(values) if values.iter().all(|value| value.is_finite()) => {
-                    Packed::of_real(&[order.iter().map(|i| values[*i].into()).collect()], f64::MAX)
-                }
-                // Bits of numbers.
-                Column::F32(values) => {
-                    Packed { step: 0.0, ..Packed::of_whole(&in_order(&|i| values[i].to_bits())) }
-                }
-                Column::U8(values) => Packed::of_whole(&in_order(&|i| values[i].into())),
-                Column::U32(values) => Packed::of_whole(&in_order(&|i| values[i])),
-                // Rings give the others their order.
-                Column::U16(values) => {
-                    Packed::of_whole(&values.iter().map(|ring| (*ring).into()).collect::<Vec<_>>())
-                }
-                Column::Vector(_) => return None,
-            };
-            Some(Values { name: attribute.name(), unit, kind, values, names })
-        });
-        let labels = self.labels.iter().map(|Labels { name, values, names }| Values {
-            name,
-            unit: "",
-            kind: if names.is_some() { "class" } else { "id" },
-            values: Packed::of_whole(&order.iter().map(|i| values[*i]).collect::<Vec<_>>()),
-            names: names.as_deref(),
-        });
-        let axes = [0, 1, 2].map(|axis| {
-            order.iter().map(|i| f64::from(scan.positions[*i][axis])).collect::<Vec<_>>()
-        });
-        let mut fields = serializer.serialize_struct("Points", 4)?;
-        fields.serialize_field("count", &scan.len())?;
-        fields.serialize_field("position", &Packed::of_real(&axes, STEP_M))?;
-        fields.serialize_field("origin", &scan.origin)?;
-        fields.serialize_field("columns", &labels.chain(of_scan).collect::<Vec<_>>())?;
-        fields.end()
-    }
 }

@@ -3,9 +3,11 @@
 mod boxes;
 pub mod files;
 pub mod frame;
+mod packed;
 mod page;
 mod picture;
 pub mod preview;
+#[cfg(feature = "mcap")]
 mod recording;
 mod scene;
 
@@ -21,6 +23,9 @@ use std::process::{Command, Stdio};
 
 /// The most points of a page: of a longer drive, every second or third sweep is shown, and so on.
 const MOST_POINTS: usize = 3_000_000;
+
+/// The most clouds of a packed set or a recording, turns of a capture and files of a folder that are shown.
+const MOST_FRAMES: usize = 500;
 
 #[derive(clap::Args)]
 pub struct Args {

@@ -1,5 +1,6 @@
 //! Recordings (MCAP) of point clouds and detections as messages of ROS 2, such as those of `live --mcap`.
 
+use super::MOST_FRAMES;
 use super::frame::{Frame, Placed};
 use anyhow::Context;
 use formats::geometry::{OrientedBox, Pose};
@@ -18,6 +19,10 @@ pub fn read(file: &Path) -> anyhow::Result<Vec<Frame>> {
     for message in stream.with_context(cause)? {
         let message = message.with_context(cause)?;
         let kind = message.channel.schema.as_ref().map_or("", |schema| &schema.name);
+        if frames.len() == MOST_FRAMES && kind == "sensor_msgs/msg/PointCloud2" {
+            program::say!("{}: the first {MOST_FRAMES} clouds are shown", file.display());
+            break;
+        }
         let mut cdr = Cdr { bytes: message.data.get(4..).unwrap_or_default(), at: 0 };
         let is_read = match kind {
             "sensor_msgs/msg/PointCloud2" => cdr.cloud().map(|scan| {
@@ -26,7 +31,10 @@ pub fn read(file: &Path) -> anyhow::Result<Vec<Frame>> {
                 frames.push(Frame { turn: Some(turn), ..frame });
             }),
             "vision_msgs/msg/Detection3DArray" => cdr.boxes(&base).map(|boxes| {
-                frames.last_mut().into_iter().for_each(|frame| frame.boxes.extend(boxes.clone()));
+                if let Some(frame) = frames.last_mut() {
+                    frame.pose = Some(base.matrix());
+                    frame.boxes.extend(boxes);
+                }
             }),
             "tf2_msgs/msg/TFMessage" => cdr.transform(&mut base),
             _ => Some(()),

@@ -19,7 +19,7 @@ pub use foreign::{foreign, read_text};
 pub use mesh_size::{bounds, effect_on_mesh, mesh_in_scene, mesh_size, unit_of_scanned};
 #[cfg(feature = "poses")]
 pub use motion::{motion_of, sensor_motion, upside_down};
-pub use object::{Unlike, judge_object};
+pub use object::{Unlike, coarse_object, judge_object};
 #[cfg(feature = "poses")]
 pub use sweep::judge_surroundings;
 pub use sweep::{check_sweep, coarse_coordinates, is_lost, judge_sweep};

@@ -1,6 +1,7 @@
 //! Whether points are those of one whole object.
 
 use super::sweep::{coarser_than, is_lost, length};
+use super::{Warning, bounds};
 
 /// The largest distance from a line, as a share of its length, of points that are on it: f32 rounds
 /// to 6e-8.
@@ -74,6 +75,16 @@ pub fn judge_object(points: &[[f64; 3]], sensor: [f64; 3]) -> Result<Option<Unli
     let near = counted().filter(|point| length(*point) < 0.3 * farthest).count();
     let is_sweep = n >= 10_000 && 2 * near > n && (20.0..2e3).contains(&farthest);
     Ok((is_sweep || n >= FEWEST_OF_RINGS && are_in_rings(counted())).then_some(Unlike::Sweep))
+}
+
+/// Why the coordinates of an object's `points` have probably lost their digits, as those of a map's frame in
+/// 32 bits.
+#[must_use]
+pub fn coarse_object(points: &[[f32; 3]]) -> Option<Warning> {
+    let wide = points.iter().map(|point| point.map(f64::from));
+    let [low, high] = bounds(wide.clone());
+    let size = length([0, 1, 2].map(|i| high[i] - low[i])) as f32;
+    (size > 0.0).then(|| coarser_than(size / COARSEST, wide)).flatten()
 }
 
 /// Whether all points lie on the line through the first point and the one farthest from it.

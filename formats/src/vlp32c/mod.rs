@@ -85,8 +85,8 @@ const UNITS_PER_TURN: f64 = 360.0 / AZIMUTH_UNIT_DEG;
 /// its points by it.
 pub const BEAM_CROSSING_M: f64 = 0.0424;
 
-/// The start of every revolution and capture, so that the same scan gives the same bytes:
-/// 2000-01-01, 00:00:00 UTC, in Unix time.
+/// The start of every revolution, so that the same scan gives the same bytes: 2000-01-01, 00:00:00 UTC, in
+/// Unix time.
 pub const START_S: u32 = 946_684_800;
 
 /// The reflectivity of every return of a scan without intensity: a white
@@ -184,7 +184,7 @@ pub fn write(
         pcap::write_header(writer)?;
         for (number, fired) in (0..).zip(fired.chunks(sequences_per_packet)) {
             let first = number * sequences_per_packet as u32;
-            write_packet(writer, revolution, returns, first, fired)?;
+            write_packet(writer, START_S, revolution, returns, first, fired)?;
         }
         writer.flush()
     })
@@ -192,6 +192,7 @@ pub fn write(
 
 fn write_packet(
     writer: &mut impl Write,
+    start_s: u32,
     revolution: &Revolution,
     returns: Returns,
     first: u32,
@@ -199,9 +200,9 @@ fn write_packet(
 ) -> io::Result<()> {
     let time_us = (f64::from(first) * SEQUENCE_US).round() as u64;
     let azimuth = |i: usize| revolution.azimuth(first + i as u32);
-    // START_S is a whole hour.
+    // The start is a whole hour.
     let payload = packet::payload(returns, (time_us % HOUR_US) as u32, azimuth, fired);
-    let stamp = [START_S + (time_us / 1_000_000) as u32, (time_us % 1_000_000) as u32];
+    let stamp = [start_s + (time_us / 1_000_000) as u32, (time_us % 1_000_000) as u32];
     pcap::write_packet(writer, &SENSOR, stamp, &payload)
 }
 
@@ -210,6 +211,7 @@ fn write_packet(
 pub struct Capture {
     file: Unfinished,
     path: PathBuf,
+    start_s: u32,
     piece: Revolution,
     returns: Returns,
     sequences: u32,
@@ -217,15 +219,20 @@ pub struct Capture {
 
 impl Capture {
     /// Begins the capture at `path` of a sensor that turns `rpm` times per minute and sends these
-    /// `returns`.
+    /// `returns`, from `start_s` in Unix time, a whole hour.
     ///
     /// # Errors
     /// Errors of the system.
-    pub fn create(path: &Path, rpm: f64, returns: Returns) -> Result<Self, FormatError> {
+    pub fn create(
+        path: &Path,
+        start_s: u32,
+        rpm: f64,
+        returns: Returns,
+    ) -> Result<Self, FormatError> {
         let mut file = Unfinished::create(path)?;
         file.append(pcap::write_header)?;
         let piece = Revolution { rpm, n_beams: SEQUENCES_PER_PACKET * LASERS as u32 };
-        Ok(Self { file, path: path.to_path_buf(), piece, returns, sequences: 0 })
+        Ok(Self { file, path: path.to_path_buf(), start_s, piece, returns, sequences: 0 })
     }
 
     /// Appends the next [`SEQUENCES_PER_PACKET`] firing sequences, as `write` does: beam b of `scan`
@@ -234,11 +241,12 @@ impl Capture {
     /// # Errors
     /// As `write`.
     pub fn push(&mut self, scan: &Scan) -> Result<(), FormatError> {
-        let Self { piece, returns, .. } = *self;
+        let Self { start_s, piece, returns, .. } = *self;
         let sequences_per_packet = BLOCKS / returns.blocks_per_sequence();
         for fired in measurements(&self.path, &piece, returns, scan)?.chunks(sequences_per_packet) {
             let first = self.sequences;
-            self.file.append(|writer| write_packet(writer, &piece, returns, first, fired))?;
+            self.file
+                .append(|writer| write_packet(writer, start_s, &piece, returns, first, fired))?;
             self.sequences += fired.len() as u32;
         }
         Ok(())

@@ -11,7 +11,7 @@ use edgepuck_shapes::Sampler;
 use formats::Scan;
 use formats::scan::Attribute;
 use formats::streams::Stream;
-use formats::vlp32c::{AZIMUTH_UNIT_DEG, Returns, Revolution, SEQUENCES_PER_PACKET};
+use formats::vlp32c::{AZIMUTH_UNIT_DEG, Returns, Revolution, SEQUENCES_PER_PACKET, START_S};
 use glam::DVec3;
 use rayon::prelude::*;
 use sim_gpu::errors::InvalidValue;
@@ -112,6 +112,15 @@ impl<'a> Drive<'a> {
     pub fn in_packets(&self) -> Result<(Revolution, Returns), SceneError> {
         let effects = self.street.stage.sensors[0].caster.effects();
         Ok((packets::revolution(&self.sensor)?, packets::returns(effects, None)?))
+    }
+
+    /// The start of the drive in Unix time, a whole hour: another for each seed, so that the poses of one
+    /// drive do not fit another.
+    #[must_use]
+    pub fn start_s(&self) -> u32 {
+        /// Hours up to the year 2099.
+        const MOST: u64 = 870_000;
+        START_S + 3600 * (self.street.stage.seed() % MOST) as u32
     }
 
     /// The time between two turns of the head, seconds.

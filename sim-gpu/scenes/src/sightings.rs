@@ -1,6 +1,5 @@
 //! The ground truth of a drive: the objects that the sensor saw in each revolution.
 
-use formats::vlp32c::START_S;
 use serde::Serialize;
 
 use crate::drive::{Drive, ObjectPoints, Packet, PointSum};
@@ -60,7 +59,7 @@ fn sighting(drive: &Drive, (turn, object): (u32, u32), points: PointSum) -> Sigh
     let entry = &drive.street.stage.recipe().object[seen.placed.entry];
     Sighting {
         turn,
-        time_s: f64::from(START_S) + time_s,
+        time_s: f64::from(drive.start_s()) + time_s,
         object,
         class: entry.class.clone(),
         points: points.count,

@@ -207,7 +207,7 @@ impl<Triangles: Fn(usize) -> LeafTriangle> Collapse<'_, Triangles> {
     }
 
     /// The cost of `subtree` as at most 1, 2, ... children. A visit of a leaf costs as much as a
-    /// visit of a node (`bench sim`).
+    /// visit of a node (`bench embree`).
     fn costs(&self, subtree: &Subtree) -> [f32; WIDTH] {
         match subtree.node {
             Some(node) => self.costs[node as usize].as_children,

@@ -13,7 +13,7 @@ use bytemuck::Zeroable;
 use std::iter::repeat_with;
 
 /// The size in bytes up to which a tree stays in the cache, where tracing one ray after another
-/// is faster: measured with 1,000 to 100,000 triangles (`bench sim`).
+/// is faster: measured with 1,000 to 100,000 triangles (`bench embree`).
 const CACHED: usize = 2 << 20;
 
 /// The number of rays in flight in larger trees: more do not raise the speed.

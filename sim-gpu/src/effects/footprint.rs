@@ -7,13 +7,17 @@ use crate::sensor::{BeamShape, LARGEST_M, SensorProfile};
 
 /// Beams with a width: each is cast as several rays of equal power, and surfaces that the receiver
 /// cannot resolve become one return between them.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Footprint {
     /// Rays of each beam: [`Footprint::SAMPLES`].
+    #[serde(default = "usual_samples")]
     pub samples: u32,
     /// The beam's full angles as in [`BeamShape`]; `None` are the sensor's own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub divergence_deg: Option<[f64; 2]>,
     /// The distance as in [`BeamShape`]; `None` is the sensor's own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub separation_m: Option<f64>,
 }
 
@@ -40,8 +44,6 @@ formats::named! {
 impl Footprint {
     /// The possible numbers of rays per beam: a centre and up to three rings around it.
     pub const SAMPLES: [u32; 4] = [1, 7, 19, 37];
-
-    const USUAL_SAMPLES: u32 = 19;
 
     /// The same footprint with missing values taken from `sensor`.
     pub(super) fn for_sensor(&self, sensor: &SensorProfile) -> Result<Self, InvalidValue> {
@@ -81,44 +83,29 @@ impl Footprint {
 )]
 pub(super) enum Table {
     Switch(bool),
-    Numbers(Numbers),
-}
-
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Numbers {
-    /// Rays of each beam: 1, 7, 19 or 37.
-    #[serde(default = "usual_samples")]
-    samples: u32,
-    /// The beam's full angles, horizontal and vertical; the sensor's own if absent.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    divergence_deg: Option<[f64; 2]>,
-    /// Surfaces whose ranges differ by less than this give one return; the sensor's own if absent.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    separation_m: Option<f64>,
+    Numbers(Footprint),
 }
 
 fn usual_samples() -> u32 {
-    Footprint::USUAL_SAMPLES
+    19
 }
 
 impl From<Table> for Option<Footprint> {
     fn from(table: Table) -> Self {
-        let numbers = match table {
-            Table::Switch(false) => return None,
-            Table::Switch(true) => {
-                Numbers { samples: usual_samples(), divergence_deg: None, separation_m: None }
-            }
-            Table::Numbers(numbers) => numbers,
-        };
-        let Numbers { samples, divergence_deg, separation_m } = numbers;
-        Some(Footprint { samples, divergence_deg, separation_m })
+        match table {
+            Table::Switch(false) => None,
+            Table::Switch(true) => Some(Footprint {
+                samples: usual_samples(),
+                divergence_deg: None,
+                separation_m: None,
+            }),
+            Table::Numbers(footprint) => Some(footprint),
+        }
     }
 }
 
 impl From<Footprint> for Table {
     fn from(footprint: Footprint) -> Self {
-        let Footprint { samples, divergence_deg, separation_m } = footprint;
-        Self::Numbers(Numbers { samples, divergence_deg, separation_m })
+        Self::Numbers(footprint)
     }
 }

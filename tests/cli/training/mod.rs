@@ -125,6 +125,9 @@ fn unsuited_data_and_recipes_are_errors_that_name_them() {
     let mut in_one_place = clouds(12);
     in_one_place[8].0 = vec![[1.0, 2.0, 3.0]; 32];
     npz("place.npz", &in_one_place, &CLASSES);
+    let mut on_a_map = clouds(12);
+    on_a_map[3].0.iter_mut().for_each(|point| point[1] += 4.4e6);
+    npz("map.npz", &on_a_map, &CLASSES);
     let of_one = clouds(12).into_iter().map(|(points, _)| (points, 0)).collect::<Vec<_>>();
     npz("missing.npz", &of_one, &CLASSES);
     npz("one.npz", &of_one, &CLASSES[..1]);

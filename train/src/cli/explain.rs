@@ -1,4 +1,5 @@
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use anyhow::{Context, Error, ensure};
 use clap::value_parser;
@@ -12,7 +13,7 @@ use program::outputs::{Overwrite, need_extension};
 
 use super::print;
 use crate::explanation_drawing;
-use crate::lime::explain;
+use crate::lime::{SAMPLES, explain};
 
 /// Flags of `explain`.
 #[derive(clap::Args, Debug)]
@@ -65,12 +66,19 @@ pub fn run(args: &ExplainArgs) -> anyhow::Result<()> {
     let critical: Vec<usize> = load(cpl)?.sample(&wide)?.iter().map(|&i| i as usize).collect();
     // The network sees all points; the sampler only finds the critical points.
     let mut classifier = load(SamplerSpec { kind: SamplerKind::All, ..SamplerSpec::default() })?;
+    let started = Instant::now();
     let class = classifier.classify(&points)?;
+    // On average, half of the points remain.
+    let about_s = 0.5 * SAMPLES as f64 * started.elapsed().as_secs_f64();
     let like = match class.answer() {
         answer if answer != &*class.label => format!("{answer}, most like "),
         _ => String::new(),
     };
     print(&format!("{like}{}: {:.1} %", class.label, 100.0 * class.confidence()))?;
+    if about_s > 5.0 {
+        let n = cloud.len();
+        say(format!("LIME-3D classifies {SAMPLES} parts of {n} points: about {about_s:.0} s"));
+    }
     let found = explain(&mut classifier, &points, args.clusters as usize)?;
     let (n_parts, r_squared) = (found.attribution.len(), found.r_squared);
     print(&format!("LIME-3D: {n_parts} parts, R² of its linear model {r_squared:.3}"))?;

@@ -1,8 +1,7 @@
 //! `cargo xtask bench`: measures, and writes the figures and the machine to a record.
 //!
-//! [`speed`] is about building and tracing, [`to_disk`] about the time of a dataset, [`embree`]
-//! compares with Embree; [`pi5`] is about a Raspberry Pi, [`gpu`] about adapters, [`frames`] about
-//! detection in real sweeps.
+//! [`embree`] compares with Embree; [`pi5`] is about a Raspberry Pi, [`gpu`] about adapters and the time of a
+//! dataset, [`frames`] about detection in real sweeps.
 
 use crate::measure::backends;
 use crate::measure::bench_mesh::{self, BenchMesh};
@@ -10,7 +9,6 @@ use crate::measure::machine::{self, Machine};
 use crate::pi5;
 use crate::rivals as embree;
 use crate::study::{frames, gpu};
-use crate::study::{speed, to_disk};
 use crate::table::write_json;
 use anyhow::Result;
 use clap::{Args, Subcommand};
@@ -22,10 +20,8 @@ use std::path::PathBuf;
 
 #[derive(Subcommand, Debug)]
 pub enum Benchmark {
-    /// Measure the simulator: building BVHs, casting rays, writing a dataset to disk.
-    Sim(SimArgs),
     /// Compare casting with Embree, which is installed from PyPI under `target/peers`.
-    Embree(SimArgs),
+    Embree(EmbreeArgs),
     /// Model the run time of the classifier on a Raspberry Pi 5; no board is needed.
     ///
     /// llvm-mca analyses the compiled inner loops, QEMU counts the instructions outside them, and a
@@ -44,7 +40,7 @@ pub enum Benchmark {
 
 /// Meshes to cast at, and casters.
 #[derive(Args, Debug)]
-pub struct SimArgs {
+pub struct EmbreeArgs {
     /// Meshes to measure in addition to the generated ones: a file or a folder.
     meshes: Option<PathBuf>,
     /// Measure this adapter only: `auto`, `cpu` or part of a name [default: all].
@@ -72,18 +68,9 @@ struct Report<T> {
     peak_memory_bytes: Option<u64>,
 }
 
-#[derive(Serialize)]
-struct Speeds {
-    speed: speed::Speed,
-    /// Empty unless meshes were given.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    datasets: Vec<to_disk::Dataset>,
-}
-
 pub fn run(benchmark: &Benchmark) -> Result<Outcome> {
     match benchmark {
         Benchmark::Gpu(args) => return gpu::run(args),
-        Benchmark::Sim(args) => args.sim(),
         Benchmark::Embree(args) => args.embree(),
         Benchmark::PiModel(args) => pi5::run(args),
         Benchmark::Frames(args) => frames::run(args),
@@ -91,20 +78,7 @@ pub fn run(benchmark: &Benchmark) -> Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-impl SimArgs {
-    fn sim(&self) -> Result<()> {
-        let (machine, backends) = (Machine::here(), backends::open(self.adapter.as_ref())?);
-        let rounds = self.rounds.into();
-        let speed = speed::measure(&self.bench_meshes()?, &backends, rounds)?;
-        speed.tables().iter().for_each(|table| print!("{table}"));
-        let mut datasets = Vec::new();
-        if let Some(given) = &self.meshes {
-            datasets = to_disk::measure(given, self.limit, &backends, rounds)?;
-            print!("{}", to_disk::table(&datasets));
-        }
-        self.write(machine, Speeds { speed, datasets })
-    }
-
+impl EmbreeArgs {
     fn embree(&self) -> Result<()> {
         let (machine, backends) = (Machine::here(), backends::open(self.adapter.as_ref())?);
         let peers = embree::measure(&self.bench_meshes()?, &backends, self.rounds.into())?;

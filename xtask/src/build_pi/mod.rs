@@ -1,12 +1,10 @@
 //! `cargo xtask build-pi`: infer-cpu as one file to copy to a Raspberry Pi.
 
-mod elf;
-
 use crate::{pi_target, workspace};
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Stdio;
+use std::process::{Command, Stdio};
 
 /// The largest size of the binary, which suits the smallest boards: 4.1 MiB of it are models.
 const MOST_BYTES: u64 = 10 << 20;
@@ -29,7 +27,7 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     };
     let shown = binary.display();
     let file = fs::read(binary).with_context(|| format!("cannot read {shown}"))?;
-    elf::check_static_stripped_aarch64(&file).with_context(|| shown.to_string())?;
+    check_static_stripped_aarch64(binary)?;
     let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
     let (size, limit) = (mebibytes(file.len() as u64), mebibytes(MOST_BYTES));
     if file.len() as u64 > MOST_BYTES {
@@ -47,6 +45,22 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
     println!("Copy it to a Raspberry Pi (64-bit system) and measure there:");
     println!("    scp {shown} pi@raspberrypi.local:infer-cpu");
     println!("    ssh pi@raspberrypi.local ./infer-cpu bench");
+    Ok(())
+}
+
+/// Checks by binutils' `readelf` that `file` is a program for 64-bit Arm which needs no library of the system
+/// it runs on and carries no symbols.
+fn check_static_stripped_aarch64(file: &Path) -> anyhow::Result<()> {
+    let mut readelf = Command::new("readelf");
+    let headers = workspace::output(readelf.args(["--wide", "--headers"]).arg(file))?;
+    for (part, is_expected, expected) in [
+        ("AArch64", true, "a program for aarch64, found another machine's"),
+        (" INTERP ", false, "a static program, found one that is linked dynamically"),
+        (" .symtab ", false, "a stripped program, found a table of symbols"),
+    ] {
+        let cause = || format!("{}: expected {expected}", file.display());
+        ensure!(headers.contains(part) == is_expected, cause());
+    }
     Ok(())
 }
 

@@ -173,4 +173,27 @@ mod tests {
             assert!(room.iter().all(|room| room.min_element() >= MARGIN - 1.0), "{pixel}");
         }
     }
+
+    #[test]
+    fn a_sweep_is_seen_from_behind_and_an_object_from_where_its_sensor_was() {
+        let mut scan = plate(3.0);
+        let places: Vec<_> = points(&scan).collect();
+        let view = View::of(&places, &scan, true);
+        // From behind along y, 55 degrees above: right, down and near in pixels and metres.
+        let (sin, cos) = libm::sincos(55_f64.to_radians());
+        let middle = view.pixel(DVec3::ZERO);
+        for (axis, [right, down, near]) in [
+            (DVec3::X, [1.0, 0.0, 0.0]),
+            (DVec3::Y, [0.0, -sin, -cos]),
+            (DVec3::Z, [0.0, -cos, sin]),
+        ] {
+            let pixels = DVec3::new(right * view.pixels_per_m, down * view.pixels_per_m, near);
+            assert!((view.pixel(axis) - middle).distance(pixels) < 1e-9, "{axis}");
+        }
+        let at_m = DVec3::new(-20.0, 5.0, 2.0);
+        scan.pose = Some(formats::geometry::Pose::at(at_m.to_array()).matrix());
+        let view = View::of(&places, &scan, false);
+        let nearest = places.iter().map(|at| view.pixel(*at).z).fold(f64::MIN, f64::max);
+        assert!(view.pixel(at_m).z > nearest);
+    }
 }

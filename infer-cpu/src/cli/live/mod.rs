@@ -125,7 +125,7 @@ pub fn run(args: &LiveArgs) -> anyhow::Result<Outcome> {
     for signal in [SIGTERM, SIGINT] {
         signal_hook::flag::register(signal, Arc::clone(&is_over))?;
     }
-    let mut notifier = Notifier::of_environment()?;
+    let mut notifier = Notifier::of_environment();
     let source = args.source(&options, &is_over)?;
     let mut outputs = args.outputs()?;
     notifier.ready()?;

@@ -260,36 +260,8 @@ impl Reader<'_> {
             vertices.push(DVec3::new(at[0], at[1], at[2]));
         })?;
         let n = vertices.len() - first;
-        let mut indices = Vec::new();
-        match primitive.indices() {
-            Some(accessor) if !is_index(accessor.data_type()) || accessor.normalized() => {
-                return Err(
-                    "expected indices of whole numbers without sign, found others".to_owned()
-                );
-            }
-            Some(accessor) => {
-                self.buffers.each(&accessor, Dimensions::Scalar, |number| {
-                    indices.push(number[0] as u32);
-                })?;
-            }
-            None => indices.extend(0..n as u32),
-        }
-        if let Some(outside) = indices.iter().find(|index| **index as usize >= n) {
-            return Err(format!("expected indices of {n} vertices, found {outside}"));
-        }
-        let base = base_colour(&primitive.material()).0;
-        let mut colours = vec![base; if primitive.get(&COLOUR).is_some() { 0 } else { n }];
-        if let Some(accessor) = primitive.get(&COLOUR) {
-            self.buffers.each(&accessor, accessor.dimensions(), |rgb| {
-                colours.push([0, 1, 2].map(|i| base[i] * rgb[i].clamp(0.0, 1.0)));
-            })?;
-            if colours.len() != n
-                || !matches!(accessor.dimensions(), Dimensions::Vec3 | Dimensions::Vec4)
-                || !colours.as_flattened().iter().all(|part| part.is_finite())
-            {
-                return Err(format!("expected {n} colours of 3 or 4 finite numbers, found others"));
-            }
-        }
+        let indices = self.indices(primitive, n)?;
+        let colours = self.vertex_colours(primitive, n)?;
         let mut face = |corners: [u32; 3]| {
             triangles.push(corners.map(|corner| first as u32 + corner));
             let [a, b, c] = corners.map(|corner| luminance(colours[corner as usize]));
@@ -310,6 +282,38 @@ impl Reader<'_> {
             _ => indices.as_chunks::<3>().0.iter().for_each(|corners| face(*corners)),
         }
         Ok(())
+    }
+
+    /// The indices of the corners of a primitive with `n` vertices.
+    fn indices(&self, primitive: &Primitive<'_>, n: usize) -> Result<Vec<u32>, String> {
+        let Some(accessor) = primitive.indices() else { return Ok((0..n as u32).collect()) };
+        if !is_index(accessor.data_type()) || accessor.normalized() {
+            return Err("expected indices of whole numbers without sign, found others".to_owned());
+        }
+        let mut indices = Vec::new();
+        self.buffers
+            .each(&accessor, Dimensions::Scalar, |number| indices.push(number[0] as u32))?;
+        match indices.iter().find(|index| **index as usize >= n) {
+            Some(outside) => Err(format!("expected indices of {n} vertices, found {outside}")),
+            None => Ok(indices),
+        }
+    }
+
+    /// The base colours of `n` vertices.
+    fn vertex_colours(&self, primitive: &Primitive<'_>, n: usize) -> Result<Vec<[f64; 3]>, String> {
+        let base = base_colour(&primitive.material()).0;
+        let Some(accessor) = primitive.get(&COLOUR) else { return Ok(vec![base; n]) };
+        let mut colours = Vec::new();
+        self.buffers.each(&accessor, accessor.dimensions(), |rgb| {
+            colours.push([0, 1, 2].map(|i| base[i] * rgb[i].clamp(0.0, 1.0)));
+        })?;
+        let is_sound = colours.len() == n
+            && matches!(accessor.dimensions(), Dimensions::Vec3 | Dimensions::Vec4)
+            && colours.as_flattened().iter().all(|part| part.is_finite());
+        match is_sound {
+            true => Ok(colours),
+            false => Err(format!("expected {n} colours of 3 or 4 finite numbers, found others")),
+        }
     }
 }
 

@@ -119,7 +119,7 @@ pub fn run(args: &GpuArgs) -> Result<Outcome> {
     report.part("effects", &backends, || effects(&meshes, others))?;
     report.part("speed", &backends, || {
         let measured = speed::tracing(&bench_mesh::tori(size.triangles), &backends, size.rounds)?;
-        Ok((serde_json::to_value(&measured)?, measured.tables(), vec![]))
+        Ok((serde_json::to_value(&measured)?, vec![measured.table()], vec![]))
     })?;
     report.part("batches", &backends, || batches(&size, &backends))?;
     report.part("datasets", &backends, || datasets(args, &size, &backends))?;

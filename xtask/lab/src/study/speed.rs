@@ -1,27 +1,16 @@
-//! How fast hierarchies are built and rays are traced.
+//! How fast rays are traced.
 
 use crate::measure::backends::{Backend, short};
 use crate::measure::bench_mesh::{BenchMesh, in_a_room, target};
-use crate::measure::clock::{Costs, Spread, Workload, interleave, measured, workload};
+use crate::measure::clock::{Costs, Spread, Workload, interleave, workload};
 use crate::measure::ray_set::{RaySet, sweep_pose, vlp32c};
-use crate::table::{Column, Table, digits, millions_per_s, milliseconds};
+use crate::table::{Column, Table, digits, millions_per_s};
 use anyhow::Result;
 use serde::Serialize;
 use sim_gpu::effects::Effects;
-use sim_gpu::internals::bvh::Builder;
 use sim_gpu::internals::caster::OpenCaster;
 use sim_gpu::internals::job::{CastJob, Culling};
 use sim_gpu::internals::ray::MISS;
-use sim_gpu::internals::target::{Surface, Target};
-use std::hint::black_box;
-
-#[derive(Serialize)]
-pub struct Build {
-    mesh: String,
-    triangles: usize,
-    builder: String,
-    costs: Costs,
-}
 
 #[derive(Serialize)]
 pub struct Trace {
@@ -42,16 +31,7 @@ pub struct Trace {
 
 #[derive(Serialize, Default)]
 pub struct Speed {
-    builds: Vec<Build>,
     traces: Vec<Trace>,
-}
-
-pub fn measure(bench_meshes: &[BenchMesh], backends: &[Backend], rounds: usize) -> Result<Speed> {
-    let mut speed = tracing(bench_meshes, backends, rounds)?;
-    for bench_mesh in bench_meshes {
-        speed.builds.extend(builds(bench_mesh, rounds)?);
-    }
-    Ok(speed)
 }
 
 pub fn tracing(bench_meshes: &[BenchMesh], backends: &[Backend], rounds: usize) -> Result<Speed> {
@@ -72,19 +52,6 @@ pub fn tracing(bench_meshes: &[BenchMesh], backends: &[Backend], rounds: usize) 
         }
     }
     Ok(speed)
-}
-
-fn builds(bench_mesh: &BenchMesh, rounds: usize) -> Result<Vec<Build>> {
-    let surface = Surface::of_mesh(bench_mesh.mesh.clone());
-    let builders = [Builder::Sah, Builder::Morton];
-    let costs = interleave(rounds, &mut builders.map(|builder| building(&surface, builder)))?;
-    let build = |(builder, costs)| Build {
-        mesh: bench_mesh.name.clone(),
-        triangles: surface.len(),
-        builder: format!("{builder:?}"),
-        costs,
-    };
-    Ok(builders.into_iter().zip(costs).map(build).collect())
 }
 
 fn traces(
@@ -134,31 +101,12 @@ fn kernel_seconds(backend: &Backend, jobs: &[CastJob], repeats: usize) -> Result
     (0..repeats).map(|_| Ok(gpu.cast_timed(jobs)?.1)).collect()
 }
 
-pub fn building(surface: &Surface, builder: Builder) -> Workload<'_> {
-    Box::new(move || {
-        let surface = surface.clone();
-        let (built, cost) = measured(|| Target::new(surface, builder));
-        black_box(built);
-        Ok(cost)
-    })
-}
-
 pub fn casting(backend: &Backend, jobs: Vec<CastJob>) -> Workload<'_> {
     workload(move || Ok(backend.caster.cast(&jobs)?))
 }
 
 impl Speed {
-    pub fn tables(&self) -> Vec<Table> {
-        let of_build: [Column<Build>; 8] = [
-            ("mesh", &|build| build.mesh.clone()),
-            ("triangles", &|build| build.triangles.to_string()),
-            ("builder", &|build| build.builder.clone()),
-            ("CPU ms", &|build| milliseconds(build.costs.cpu_s().median)),
-            ("min", &|build| milliseconds(build.costs.cpu_s().min)),
-            ("max", &|build| milliseconds(build.costs.cpu_s().max)),
-            ("wall ms", &|build| milliseconds(build.costs.wall_s().median)),
-            ("M tri/CPU-s", &|build| millions_per_s(build.triangles, build.costs.cpu_s().median)),
-        ];
+    pub fn table(&self) -> Table {
         let kernel = |trace: &Trace| {
             let seconds = trace.kernel_s.as_ref()?.iter().copied();
             Some(millions_per_s(trace.rays, Spread::of(seconds).median))
@@ -178,8 +126,6 @@ impl Speed {
         ];
         let tracing = "Tracing, million rays a second (upload and read-back included; beams \
                        count those that culling spared)";
-        let builds = Table::of("Building the hierarchy", &self.builds, &of_build);
-        let traces = Table::of(tracing, &self.traces, &of_trace);
-        [builds, traces].into_iter().filter(|table| !table.rows.is_empty()).collect()
+        Table::of(tracing, &self.traces, &of_trace)
     }
 }
