@@ -49,17 +49,16 @@ fn stand_ins_of_files_are_named() {
         ([b"\x1F\x8B\x08\0", &[0x7f; 300][..]].concat(), "a compressed file: unpack it"),
         ([b"PK\x03\x04\x14\0", &[0x7f; 300][..]].concat(), "a compressed file: unpack it"),
         ([b"PK\x03\x04\x14\0", &[0; 24][..], b"points.npy"].concat(), "a NumPy archive (NPZ)"),
-        (b"ply\nformat ascii 1.0\nelement\n\n".to_vec(), "a mesh or a cloud (PLY)"),
-        (b"\x93NUMPY\x09\0\0\0".to_vec(), "a NumPy array (NPY)"),
         (b"<!DOCTYPE html>\n<html><head></head></html>\n".to_vec(), "a web page"),
     ] {
         for (name, expected, read) in &readers {
             let path = folder.path().join(name);
             fs::write(&path, &bytes).unwrap();
             let error = read(&path).unwrap_err().to_string();
-            let is_known = bytes.starts_with(b"PK") && ["npz", "safetensors"].contains(expected)
-                || found.to_lowercase().ends_with(&format!("({expected})"));
-            let names_it = error.contains(found) && error.contains(name);
+            let is_known = bytes.starts_with(b"PK") && ["npz", "safetensors"].contains(expected);
+            // Readers of clouds recognise NPZ themselves.
+            let is_npz = found.contains("NPZ") && error.contains("npz");
+            let names_it = error.contains(found) && error.contains(name) || is_npz;
             assert!(names_it || is_known, "{name}: {error}");
         }
     }

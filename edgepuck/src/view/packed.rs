@@ -181,7 +181,7 @@ mod tests {
         });
         let (low, step) = (packed["low"].as_array().unwrap(), packed["step"].as_f64().unwrap());
         let each = n / low.len();
-        let value = |(i, z)| match step {
+        let value = |(i, z): (usize, u32)| match step {
             0.0 => f64::from(f32::from_bits(z)),
             _ => low[i / each].as_f64().unwrap() + step * f64::from(z),
         };

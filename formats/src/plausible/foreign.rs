@@ -7,14 +7,12 @@ use std::path::Path;
 use crate::error::FormatError;
 
 /// The beginnings of files that occur in place of others, and what they are.
-const KINDS: [(&[u8], &str); 9] = [
+const KINDS: [(&[u8], &str); 7] = [
     (b"version https://git-lfs", "a Git LFS pointer: fetch the file by `git lfs pull`"),
     (b"\xFF\xFE", UTF_16),
     (b"\xFE\xFF", UTF_16),
     (b"\x1F\x8B", COMPRESSED),
     (ZIP, COMPRESSED),
-    (b"\x93NUMPY", "a NumPy array (NPY)"),
-    (b"ply\n", "a mesh or a cloud (PLY)"),
     (b"<!DOCTYPE", "a web page"),
     (b"<html", "a web page"),
 ];
@@ -65,8 +63,8 @@ pub fn read_text(path: &Path, longest: u64) -> io::Result<String> {
     Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
 }
 
-/// `error`, or what was found in `content` in place of what was `expected`. Files of the expected format keep
-/// their error, and so do zip archives where NPZ files or PyTorch's checkpoints are expected.
+/// `error`, or what was found in `content` in place of what was `expected`. Zip archives keep their
+/// error where NPZ files or PyTorch's checkpoints are expected.
 pub(crate) fn or_foreign(
     path: &Path,
     content: impl Read,
@@ -76,8 +74,7 @@ pub(crate) fn or_foreign(
     let mut start = Vec::new();
     let read = content.take(EXAMINED).read_to_end(&mut start);
     let keeps = start.starts_with(ZIP) && ["npz", "safetensors"].contains(&expected);
-    let is_it = |found: &str| found.ends_with(&format!("({})", expected.to_uppercase()));
-    match foreign(&start).filter(|found| read.is_ok() && !keeps && !is_it(found)) {
+    match foreign(&start).filter(|_| read.is_ok() && !keeps) {
         Some(found) => {
             FormatError::malformed(path, "format", format!("expected {expected}, found {found}"))
         }

@@ -370,7 +370,7 @@ fn sightings_count_every_point_once_in_its_revolution() {
     // 452 packets of 0.66 ms at 10 turns a second.
     assert_eq!(keys.last().unwrap().0, 2);
     for sighting in &found {
-        let since_s = sighting.time_s - 946_684_800.0;
+        let since_s = sighting.time_s - f64::from(drive.start_s());
         let turn = f64::from(sighting.turn);
         assert!((turn..turn + 1.0).contains(&(since_s * 10.0)), "{sighting:?}");
         let seen = drive.object(sighting.object).unwrap();
