@@ -155,7 +155,7 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         program::say!("{sensor}: {}: {}", summary(&scene, scan), file.display());
     }
     if scans.iter().all(|scan| scan.is_empty()) {
-        let too_far = scene.sensors.iter().find_map(|mounted| too_far(&scene, mounted));
+        let too_far = scene.sensors.iter().find_map(|mounted| out_of_reach(&scene, mounted));
         let why = too_far.unwrap_or_else(|| {
             "expected an object in the sensor's range and view, larger than the gaps between beams, \
              and not seen edge-on"
@@ -297,15 +297,20 @@ fn tell_objects(scene: &Scene) {
     }
 }
 
-/// Why a sensor sees nothing, if all objects are beyond its range.
-fn too_far(scene: &Scene, mounted: &MountedSensor) -> Option<String> {
+/// Why a sensor sees nothing, if all objects are beyond its range or nearer.
+fn out_of_reach(scene: &Scene, mounted: &MountedSensor) -> Option<String> {
     let at_m = mounted.motion.as_ref().map_or(mounted.pose, |it| it.at(mounted.start_s)).position_m;
     let nearest = scene.instances().iter().map(|it| it.extent().distance_m(at_m));
     let (nearest_m, most_m) = (nearest.reduce(f64::min)?, mounted.sensor.profile().range.max_m);
     let name = &mounted.name;
-    (nearest_m > most_m).then(|| {
-        format!("the nearest object is {nearest_m:.1} m from {name}, which sees {most_m} m far")
-    })
+    let least_m = mounted.sensor.profile().range.min_m;
+    let limit = match nearest_m {
+        ..=0.0 => return None,
+        _ if nearest_m > most_m => format!("{most_m} m far"),
+        _ if nearest_m < least_m => format!("from {least_m} m"),
+        _ => return None,
+    };
+    Some(format!("the nearest object is {nearest_m:.1} m from {name}, which sees {limit}"))
 }
 
 /// The number of points of `scan`, and what became of the other returns.

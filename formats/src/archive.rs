@@ -129,7 +129,14 @@ impl<R: Read + Seek> NpzReader<R> {
         let file_size =
             reader.seek(SeekFrom::End(0)).map_err(|source| FormatError::io(path, source))?;
         let zip = ZipArchive::new(reader).map_err(|cause| {
-            let cause = format!("expected a whole NPZ file, found {file_size} bytes: {cause}");
+            let mut start = [0; 2];
+            let read = File::open(path).and_then(|mut file| file.read_exact(&mut start));
+            let found = match file_size {
+                0 => "an empty file".to_owned(),
+                _ if read.is_ok() && start != *b"PK" => "a file of another format".to_owned(),
+                _ => format!("{file_size} bytes: {cause}"),
+            };
+            let cause = format!("expected a whole NPZ file, found {found}");
             FormatError::malformed(path, "archive", cause)
         })?;
         Ok(Self { path: path.to_path_buf(), file_size, zip })

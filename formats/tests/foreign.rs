@@ -48,7 +48,7 @@ fn stand_ins_of_files_are_named() {
         ([&[0xFF, 0xFE][..], &wide(&table)].concat(), "text in UTF-16: save it as UTF-8"),
         ([b"\x1F\x8B\x08\0", &[0x7f; 300][..]].concat(), "a compressed file: unpack it"),
         ([b"PK\x03\x04\x14\0", &[0x7f; 300][..]].concat(), "a compressed file: unpack it"),
-        ([b"PK\x03\x04\x14\0", &[0; 24][..], b"points.npy"].concat(), "a NumPy archive (NPZ)"),
+        ([b"PK\x03\x04\x14\0", &[0; 25][..], b"points.npy"].concat(), "a NumPy archive (NPZ)"),
         (b"<!DOCTYPE html>\n<html><head></head></html>\n".to_vec(), "a web page"),
     ] {
         for (name, expected, read) in &readers {

@@ -506,6 +506,27 @@ fn a_capture_without_a_whole_frame_is_named() {
     assert_eq!(read(&fragments, &metadata).unwrap_err(), expected);
 }
 
+#[test]
+fn columns_outside_of_the_window_are_not_missing() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("window.pcap");
+    let mut metadata = flat(Profile::Dual);
+    metadata["data_format"]["column_window"] = json!([4, 15]);
+    let metadata = parse(&metadata).unwrap();
+    let sent: Vec<_> = (0..3).flat_map(|frame| [4, 8, 12].map(|at| (frame, at))).collect();
+    for (lost, missing) in [(None, 0), (Some(4), 1)] {
+        let kept = sent.iter().enumerate().filter(|(i, _)| Some(*i) != lost);
+        let packets: Vec<_> = kept
+            .flat_map(|(_, &(frame, at))| frames(&packet(Profile::Dual, frame, at), at as u8, 1480))
+            .collect();
+        fs::write(&file, pcapng(&packets)).unwrap();
+        let read = read_turns(&file, Some(&metadata), &mut Senders::default(), |_| {
+            std::ops::ControlFlow::Continue(())
+        });
+        assert_eq!(read.unwrap().1.missing, missing, "{lost:?}");
+    }
+}
+
 /// Turns are those of the returns' own azimuths, over frames and a gap of two turns and two packets.
 #[test]
 fn all_turns_of_a_capture_are_read() {

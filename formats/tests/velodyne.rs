@@ -3,7 +3,9 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use formats::hash::Hashing;
+use formats::packets;
 use formats::pcap;
+use formats::points_file::PointsReader;
 use formats::turns::read_turns;
 use formats::velodyne::{Decoder, Header, Model, count_returns, read_turn};
 use formats::vlp32c::{Returns, Revolution, write};
@@ -525,6 +527,8 @@ fn a_flawed_packet_is_skipped_and_counted() {
         })
         .unwrap();
         assert_eq!((counts.flawed, n), (1, expected.len()), "{flaw}");
+        let (_, warnings) = PointsReader::default().read(&path).unwrap();
+        assert!(warnings.iter().any(|warning| warning.contains(flaw)), "{warnings:?}");
     }
 }
 
@@ -600,6 +604,32 @@ fn a_turn_of_a_sector_is_one_pass_over_it() {
         write(&late);
         let (scan, found) = read_turn(&path, &mut Senders::default()).unwrap();
         assert_eq!((scan.len(), found.missing), (counts[1] - 12 * 32, 1), "{from} {width}");
+        let mut gaps = 0;
+        let (_, found) = read_turns(&path, None, &mut Senders::default(), |turned| {
+            gaps = turned.gaps;
+            ControlFlow::Continue(())
+        })
+        .unwrap();
+        assert!(found.missing == 1 && gaps > 0, "{from} {width}: {gaps}");
+        // As packets come, the first gap is known to be of the sector when it comes again: here of a
+        // sensor that sends no packet with blocks of two passes.
+        let azimuth = |frame: &[u8], block: usize| {
+            let at = PROTOCOLS + 100 * block + 2;
+            i32::from(u16::from_le_bytes([frame[at], frame[at + 1]]))
+        };
+        let is_of_one =
+            |frame: &&Vec<u8>| (azimuth(frame, 11) - azimuth(frame, 0)).rem_euclid(36_000) < 1000;
+        let mut decoder = packets::Decoder::new(None, &frames[0][PROTOCOLS..]).unwrap();
+        let mut gaps = [vec![], vec![]];
+        for frame in frames.iter().filter(is_of_one) {
+            let facts = decoder.decode(&frame[PROTOCOLS..], &mut Vec::new()).unwrap();
+            for (gaps, n) in gaps.iter_mut().zip([facts.n_unsent, facts.n_unsent_before]) {
+                gaps.extend(Some(n).filter(|n| *n > 0));
+            }
+        }
+        let [unsent, before] = gaps;
+        assert_eq!([unsent.len(), before.len()], [3, 1], "{from} {width}: {unsent:?} {before:?}");
+        assert!(before[0].abs_diff(unsent[0]) <= 1, "{from} {width}: {unsent:?} {before:?}");
     }
 }
 

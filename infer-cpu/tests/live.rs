@@ -273,6 +273,13 @@ fn a_sensor_that_restarts_and_clocks_that_jump_begin_a_new_stream() {
         // There are objects of both halves.
         let n_late = objects.iter().filter(|object| object.first_s > START_S + 0.9 + pause_s);
         assert!(n_late.count() >= 20, "{pause_s}");
+        // They are other tracks.
+        let is_late = |object: &Object| object.last_s >= START_S + 1.0 + pause_s.max(0.0);
+        let tracks = |late| {
+            let of_half = objects.iter().filter(move |object| is_late(object) == late);
+            of_half.map(|object| object.track).collect::<BTreeSet<_>>()
+        };
+        assert!(pause_s < 0.0 || tracks(true).is_disjoint(&tracks(false)), "{pause_s}");
     }
 }
 

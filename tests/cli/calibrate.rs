@@ -168,7 +168,10 @@ fn a_capture_is_calibrated_to_its_profile_and_motion_is_refused() {
         1,
         &[
             ("calibrate moves.pcap --out x.toml", "expected a sensor and a scene at rest"),
-            ("calibrate rest.pcap moves.pcap --out x.toml", "error: moves.pcap: expected a sensor"),
+            (
+                "calibrate rest.pcap short.pcap moves.pcap --out x.toml",
+                "error: moves.pcap: expected a sensor",
+            ),
             (
                 "calibrate short.pcap --out x.toml",
                 "expected 5 complete turns or more, found 3: record for longer",

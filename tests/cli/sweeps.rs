@@ -92,6 +92,14 @@ fn a_sweep_is_cut_and_its_clusters_are_named() {
         assert!((0..2).all(|i| whole[i] >= usual[i] - 1e-6), "{object}");
         assert!(whole[0] >= size[1] && whole[0] * whole[1] >= size[0] * size[1], "{object}");
     }
+    // Whole boxes stand on the ground, which is below the lowest points of most objects.
+    let bottom_m = |object: &Value, key: &str| {
+        let of = |part: &str| object[key][part][2].as_f64().unwrap();
+        of("centre_m") - 0.5 * of("size_m")
+    };
+    let is_lower = |one: &&Value| bottom_m(one, "whole_box") < bottom_m(one, "box") - 0.1;
+    assert!(objects.iter().filter(is_lower).count() > 0, "{objects:?}");
+    assert!(!objects.iter().any(|one| bottom_m(one, "whole_box") > bottom_m(one, "box") + 0.1));
     assert!(!folder.at("objects.png").exists(), "nothing is written that was not named");
     // Each object has the points of the cluster that it names, whatever unknown ones stand before it.
     let (scan, model) =

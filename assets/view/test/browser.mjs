@@ -323,6 +323,17 @@ try {
       assertNear((await pointsOf(page, n)).position, numbers, 0.004, `frame ${n}`);
     }
   });
+  // Facts of a point are those of its file, also in a map's frame.
+  write("map.xyz", "691000.5 5336000.25 515\n691001.5 5336000.25 515\n691000.5 5336001.25 516\n");
+  await check("map", "map.xyz", async (page) => {
+    const at = await page.evaluate(() => {
+      const { position } = viewer.panes[0].frame.points;
+      const { x, y } = viewer.camera.position.clone().fromArray(position).project(viewer.camera);
+      return [((x + 1) / 2) * viewer.size[0], ((1 - y) / 2) * viewer.size[1]];
+    });
+    await page.mouse.click(at[0], at[1]);
+    assert.match(await page.textContent(".facts"), /x \(m\)691000\.50?.*y \(m\)5336000\.25.*z \(m\)515/s);
+  });
   run("gen-scenes --drive 0.5 --seed 3 --out drive.pcap");
   write("live.jsonl", run("live --pcap drive.pcap --poses drive.tum --json --mcap drive.mcap").out);
   await check("live", "drive.pcap live.jsonl", async (page) => {
@@ -338,7 +349,9 @@ try {
       ).sort((a, b) => a - b);
     });
     assert.ok(steps.length > 3 && steps[Math.floor(steps.length / 2)] < 0.25, steps.join());
-    assert.match(await legend(page), /^ring/);
+    assert.match(await legend(page), /^ring[^≤]*≥ \d/, "a few of the highest rings have the last colour");
+    const columns = await pointsOf(page, 1);
+    for (const name of ["reflectivity", "ring", "time"]) assert.ok(new Set(columns[name]).size > 9, name);
   });
   const bytes = text("live.html").length;
   assert.ok(bytes < 0.7e6 + 14e6 / 10, `5 s of a drive take 15 MB at most: 0.5 s takes ${bytes}`);
@@ -352,11 +365,12 @@ try {
     const countOf = (frame) => frame.points.columns[0] && frame.boxes.length;
     const sums = [of("mcap"), of("live")].map((frames) => frames.reduce((sum, frame) => sum + countOf(frame), 0));
     assert.equal(sums[0], sums[1]);
-    const boxes = ["mcap", "live"].map((name) =>
-      of(name).flatMap((frame) => frame.boxes.map((box) => [box.track, box.centre])),
-    );
-    const [here, there] = boxes.map((list) => new Map(list.map(([track, centre]) => [track, centre])));
-    for (const [track, centre] of here) assertNear(centre, there.get(track), 0.6, `track ${track}`);
+    const boxes = ["mcap", "live"].map((name) => of(name).flatMap((frame) => frame.boxes));
+    const [here, there] = boxes.map((list) => new Map(list.map((box) => [box.track, box])));
+    for (const [track, { centre, yaw }] of here) {
+      assertNear(centre, there.get(track).centre, 0.6, `track ${track}`);
+      assert.ok(Math.abs(Math.sin(yaw - there.get(track).yaw)) < 0.05, `track ${track}`);
+    }
     const column = (await pointsOf(page, 1)).ring;
     assert.ok(new Set(column).size > 20);
   });

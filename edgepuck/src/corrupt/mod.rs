@@ -9,6 +9,7 @@ use crate::flags::first_given;
 use crate::points::{PlaceArgs, SweepArgs};
 use crate::{Outcome, Usage};
 use anyhow::Context;
+use formats::cloud_file::CloudFormat;
 use plan::{Entry, Plan};
 use program::outputs::Overwrite;
 use sim_gpu::Sensor;
@@ -81,6 +82,11 @@ pub fn run(args: &CorruptArgs) -> anyhow::Result<Outcome> {
     }
     let input = sweep_of(args)?;
     let out = args.out.as_deref().unwrap_or(Path::new(OUT));
+    if CloudFormat::of_path(out).is_ok() {
+        let cause = "expected a folder for the corrupted sweeps, found the name of a file: name a folder, or \
+                     weather, such as --rain 25, for one sweep";
+        return Err(usage(format!("--out {}: {cause}", out.display())).into());
+    }
     args.overwrite.check_folder(out)?;
     let sensor = Sensor::resolve(&args.sensor)?;
     sweep::run(args, &input, out, &plan, sensor.profile())

@@ -182,10 +182,14 @@ impl Pane {
             .all(|frame| frame.n_points() + frame.meshes.len() + frame.boxes.len() == 0)
     }
 
-    /// Keeps the first frame that has boxes and a half of the most points, or else points.
+    /// Keeps the first frame that has boxes and points, or else points; of turns, of which the first and the
+    /// last may be parts, those with a half of the most points.
     pub fn keep_one(&mut self) {
         let most = self.frames.iter().map(Frame::n_points).max().unwrap_or(0);
-        let is_full = |frame: &Frame| frame.n_points() > 0 && 2 * frame.n_points() >= most;
+        let is_full = |frame: &Frame| {
+            let is_part = frame.name.starts_with("turn ") && 2 * frame.n_points() < most;
+            frame.n_points() > 0 && !is_part
+        };
         let with_boxes = |frame: &Frame| is_full(frame) && !frame.boxes.is_empty();
         let found = self.frames.iter().position(with_boxes);
         let first = found.or_else(|| self.frames.iter().position(is_full)).unwrap_or(0);
@@ -352,4 +356,31 @@ fn block<S: Serializer>(kind: &str, bytes: &[u8], serializer: S) -> Result<S::Ok
     let mut map = serializer.serialize_map(Some(1))?;
     map.serialize_entry(kind, &format_args!("{}", Base64Display::new(bytes, &STANDARD)))?;
     map.end()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn boxes_of_a_sweep_stand_where_its_sensor_saw_them() {
+        let pose = Pose::at([103.0, 4.0, 1.0]).matrix();
+        let scan = Scan {
+            origin: [100.0, 0.0, 0.0],
+            pose: Some(pose),
+            positions: vec![[3.0, 4.0, 0.0]],
+            ..Scan::default()
+        };
+        let frame = Frame::of_scan("turn 7".to_owned(), scan, Vec::new());
+        let mut pane = Pane::new(0, Path::new("a.npz"), vec![Frame { turn: Some(7), ..frame }]);
+        let at = |centre_m, turn| Placed {
+            place: OrientedBox { centre_m, ..OrientedBox::default() },
+            turn,
+            ..Placed::default()
+        };
+        let found = vec![at([1.0, 2.0, 0.5], Some(7)), at([9.0; 3], Some(6)), at([0.0; 3], None)];
+        pane.add(found, Path::new("b.json")).unwrap();
+        let centres: Vec<_> = pane.frames[0].boxes.iter().map(|it| it.place.centre_m).collect();
+        assert_eq!(centres, [[4.0, 6.0, 1.5], [3.0, 4.0, 1.0]]);
+    }
 }

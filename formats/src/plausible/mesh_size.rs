@@ -42,23 +42,28 @@ pub fn mesh_in_scene(size_m: [f64; 3], unit: Option<Unit>, is_around: bool) -> V
     size.into_iter().chain(inside).collect()
 }
 
-/// The unit of a mesh with these bounds whose scan `points`, metres, are: a fifth of them or more are in its
-/// bounding box, with a tenth of its size around it, and span 0.4 of the size. `None` of something else's.
+/// The unit of a mesh with these bounds whose scan `points`, metres, are: that with most of them in the mesh's
+/// bounding box, with a tenth of its size around it; a fifth or more, which span 0.4 of the size. `None` of
+/// something else's.
 #[must_use]
 pub fn unit_of_scanned(
     mesh: [[f64; 3]; 2],
     points: impl Iterator<Item = [f64; 3]> + Clone,
 ) -> Option<Unit> {
     let size = |[low, high]: [[f64; 3]; 2]| largest([0, 1, 2].map(|axis| high[axis] - low[axis]));
-    Unit::ALL.into_iter().find(|unit| {
+    let fit = |unit: Unit| {
         let [low, high] = mesh.map(|at| at.map(|x| x * unit.metres()));
         let room = 0.1 * size([low, high]);
         let is_in =
             |at: &[f64; 3], axis| (low[axis] - room..=high[axis] + room).contains(&at[axis]);
         let on = points.clone().filter(|at| (0..3).all(|axis| is_in(at, axis)));
-        let spans = size(bounds(on.clone())) >= 0.4 * size([low, high]);
-        spans && 5 * on.count() >= points.clone().count()
-    })
+        let spanned = size(bounds(on.clone())) / size([low, high]);
+        let n_on = on.count();
+        (spanned >= 0.4 && 5 * n_on >= points.clone().count()).then_some((n_on, spanned, unit))
+    };
+    let fits = Unit::ALL.into_iter().filter_map(fit);
+    let best = fits.max_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    best.map(|(.., unit)| unit)
 }
 
 /// The least and the largest coordinates of places.
@@ -128,6 +133,25 @@ mod tests {
         assert_eq!(solids(Some(Unit::Metre), true), [2, 0, 0, 0, 2]);
         assert_eq!(solids(None, true), [2, 0, 1, 2, 2]);
         assert_eq!(n([900.0, 900.0, 30.0], None, true), 0);
+    }
+
+    /// A bracket: of its base and its wall, a sensor sees the insides.
+    #[test]
+    fn the_unit_of_a_scanned_mesh_is_that_in_which_all_points_are_on_it() {
+        let bracket = [[0.0; 3], [200.0, 80.0, 120.0]];
+        let steps = || (0..40).map(f64::from);
+        let seen = |unit: Unit, away_m: [f64; 3]| {
+            let base = steps().flat_map(|x| steps().map(move |y| [5.0 * x, 2.0 * y, 8.0]));
+            let wall = steps().flat_map(|y| steps().map(move |z| [8.0, 2.0 * y, 3.0 * z]));
+            let of = |at: [f64; 3]| [0, 1, 2].map(|i| unit.metres() * at[i] + away_m[i]);
+            base.chain(wall).map(of).collect::<Vec<_>>()
+        };
+        for unit in Unit::ALL {
+            let found = unit_of_scanned(bracket, seen(unit, [0.0; 3]).into_iter());
+            assert_eq!(found, Some(unit));
+            let away_m = [1e3 * unit.metres(); 3];
+            assert_eq!(unit_of_scanned(bracket, seen(unit, away_m).into_iter()), None, "{unit}");
+        }
     }
 
     #[test]

@@ -276,7 +276,13 @@ mod tests {
         let on_its_head: Vec<_> = street(-1.73).map(|[x, y, z]| [x, -y, -z]).collect();
         assert_eq!(judge(&on_its_head), Some(Warning::OnePose), "no ground was found");
         let chair: Vec<_> = (0..500u16).map(|n| [3.0, 1e-3 * f32::from(n), 0.0]).collect();
-        assert!(matches!(judge(&chair), Some(Warning::OneObject(_))));
+        // On each side of the sensor.
+        for [cos, sin] in [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]] {
+            let at =
+                |[x, y, z]: [f32; 3]| [cos * x - sin * (y - 0.2), sin * x + cos * (y - 0.2), z];
+            let chair: Vec<_> = chair.iter().map(|point| at(*point)).collect();
+            assert!(matches!(judge(&chair), Some(Warning::OneObject(_))));
+        }
         assert_eq!(judge(&chair[..1]), Some(Warning::FewPoints(1)));
     }
 

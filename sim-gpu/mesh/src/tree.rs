@@ -524,6 +524,14 @@ mod tests {
             let found: HashSet<_> = entries.iter().map(|it| (&it.class, it.split)).collect();
             assert_eq!(found.len(), 6, "{seed}");
         }
+        // Files of one name are of one object, and in one split.
+        let (_folder, root) = tree(&["cup/1.off", "cup/1.obj", "cup/2.off"]);
+        for seed in 0..40 {
+            let entries = discover(&root, seed).unwrap();
+            let is_of_1 = |it: &&MeshEntry| it.relative.starts_with("cup/1");
+            let splits: HashSet<_> = entries.iter().filter(is_of_1).map(|it| it.split).collect();
+            assert_eq!(splits.len(), 1, "{seed}");
+        }
         for [first, second] in [["CON", "_CON"], ["a b ", "a b_"], ["x?", "x:"]] {
             let (_folder, root) = tree(&[&format!("{first}/1.off"), &format!("{second}/2.off")]);
             let message = discover(&root, 1).unwrap_err().to_string();

@@ -43,10 +43,15 @@ pub fn picture(
     let boxes: Vec<_> =
         boxes.iter().filter(|placed| whole.holds(placed.place.centre_m.into())).collect();
     let seen = Region::around(points(scan), whole);
-    // Of a mesh around the points, such as a road, only a part was scanned.
-    let near = seen.map_or(Region::ALL, Region::grown);
     let vertices = meshes.iter().flat_map(|mesh| &mesh.position);
-    let vertices = vertices.map(|at| DVec3::from(at.map(f64::from))).filter(|at| near.holds(*at));
+    let vertices = vertices.map(|at| DVec3::from(at.map(f64::from)));
+    // Of a much larger mesh around the points, such as a road, only a part was scanned.
+    let of_meshes = Region::around(vertices.clone(), Region::ALL);
+    let near = match (seen, of_meshes) {
+        (Some(seen), Some(all)) if all.span() > 4.0 * seen.span() => seen.grown(),
+        _ => Region::ALL,
+    };
+    let vertices = vertices.filter(|at| near.holds(*at));
     let corners = boxes.iter().flat_map(|placed| placed.place.corners()).filter(|_| seen.is_none());
     let points = points(scan).filter(|at| seen.is_some_and(|seen| seen.holds(*at)));
     let places: Vec<_> = vertices.chain(corners).chain(points).collect();
@@ -120,5 +125,17 @@ fn draw_box(canvas: &mut Canvas, view: &View, placed: &Placed) {
         for [from, to] in [[i, next], [i + 4, next + 4], [i, i + 4]] {
             canvas.line(at[from], at[to], tint);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_without_ranges_have_the_colours_of_their_heights() {
+        let positions = vec![[0.0; 3], [0.0, 9.0, 0.0], [9.0, 0.0, 0.0], [0.0, 0.0, 9.0]];
+        let tints = tints_by_value(&Scan { positions, ..Scan::default() });
+        assert!(tints[0] == tints[1] && tints[0] == tints[2] && tints[0] != tints[3]);
     }
 }

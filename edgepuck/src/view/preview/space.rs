@@ -44,9 +44,14 @@ impl Region {
         held.reduce(|all, at| Self { low: all.low.min(at.low), high: all.high.max(at.high) })
     }
 
+    /// Its longest side, metres.
+    pub fn span(&self) -> f64 {
+        (self.high - self.low).max_element()
+    }
+
     /// With half of its size on each side.
     pub fn grown(self) -> Self {
-        let room = 0.5 * (self.high - self.low).max_element();
+        let room = 0.5 * self.span();
         Self { low: self.low - room, high: self.high + room }
     }
 

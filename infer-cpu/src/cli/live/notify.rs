@@ -71,3 +71,24 @@ fn send(_: &str) -> io::Result<()> {
 fn watchdog() -> Option<Duration> {
     None
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keep_alive_messages_are_due_after_half_of_the_watchdogs_time_until_the_end() {
+        let now = Instant::now();
+        let second = Duration::from_secs(1);
+        for (watchdog, step) in [(Some(3 * second), 3 * second / 2), (None, STATUS_PERIOD)] {
+            let mut notifier = Notifier { watchdog, due: Some(now) };
+            for at in [now, now + second] {
+                notifier.alive(&Counts::default(), at);
+                assert_eq!(notifier.due, Some(now + step));
+            }
+            notifier.stopping();
+            notifier.alive(&Counts::default(), now + 9 * second);
+            assert_eq!(notifier.due, None);
+        }
+    }
+}
