@@ -180,10 +180,10 @@ def _save_gltf(file: Path, parts: list[tuple[str, str | None, NDArray[Any], NDAr
 
     for _, label, vertices, faces in parts:
         # The y axis of glTF points up.
-        corners = vertices[:, [0, 2, 1]] * np.float32([1, 1, -1])
+        corners = vertices[:, [0, 2, 1]] * np.array([1, 1, -1], dtype=np.float32)
         low, high = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
-        part = {"attributes": {"POSITION": add(corners, 5126, "VEC3", min=low, max=high)}}
-        part["indices"] = add(faces.ravel(), 5125, "SCALAR")
+        position = add(corners, 5126, "VEC3", min=low, max=high)
+        part = {"attributes": {"POSITION": position}, "indices": add(faces.ravel(), 5125, "SCALAR")}
         meshes.append({"primitives": [part]} | ({"name": label} if label else {}))
     uri = "data:application/octet-stream;base64," + base64.b64encode(data).decode()
     gltf = {

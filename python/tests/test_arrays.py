@@ -278,6 +278,10 @@ def test_objects_of_a_street_are_detected_where_they_stand() -> None:
 def test_scans_know_where_their_sensor_stood(cube: tuple) -> None:
     scan = ep.Sensor("vlp32c").scan(ep.Mesh(*cube), distance=4, elevation=0)
     np.testing.assert_allclose(scan.sensor_position[0], [4, 0, 0], atol=1e-6)
+    away = np.eye(4)
+    away[:3, 3] = [501, 2, 3]
+    far = ep.Scan(positions=np.zeros((2, 3), np.float32), origin=np.array([500.0, 0, 0]), pose=away)
+    np.testing.assert_array_equal(far.sensor_position, [[1, 2, 3]] * 2)
     drawn = ep.Scenes("street", seed=1)[0].scan
     np.testing.assert_array_equal(drawn.pose, np.eye(4))
     np.testing.assert_array_equal(drawn.sensor_position[-1], [0, 0, 0])

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 import edgepuck as ep
+from edgepuck._poses import matrix
+from edgepuck._view import _rigid
 
 
 def test_scans_arrays_meshes_and_detections_become_a_page(tmp_path: Path) -> None:
@@ -75,6 +77,11 @@ def test_scenes_and_batches_become_a_page() -> None:
     scene, cube = ep.Scene(), ep.Mesh(*ep.box((1.0, 1.0, 1.0)), normalize="none")
     scene.add(cube, position=(3, 0, 0), name="near", label="box")
     far = scene.add(cube, scale=2.0)
+    # Seven numbers of a pose turn as its matrix does.
+    turned = [1.0, 2.0, 3.0, 0.1, -0.5, 0.3, 0.8062257748298549]
+    rotation, position = _rigid(turned)
+    np.testing.assert_allclose(rotation, matrix("pose", turned)[:3, :3], atol=1e-12)
+    np.testing.assert_array_equal(position, turned[:3])
     turned = [
         [0.0, -1.0, 0.0, 6.0],
         [1.0, 0.0, 0.0, 1.0],

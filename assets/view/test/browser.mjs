@@ -184,8 +184,25 @@ try {
     const boxes = await page.evaluate(() => viewer.panes[0].frame.boxes);
     const cars = boxes.filter((box) => box.class === "car");
     const [car] = cars.filter((box) => !box.truth);
-    const isAt = ({ centre, truth }) => truth && Math.hypot(centre[0] - car.centre[0], centre[1] - car.centre[1]) < 0.7;
+    const off = ({ centre }) => centre.map((x, axis) => x - car.centre[axis]);
+    const isAt = (box) => box.truth && Math.hypot(...off(box).slice(0, 2)) < 0.7 && Math.abs(off(box)[2]) < 0.4;
     assert.ok(cars.some(isAt), JSON.stringify(cars));
+    // Boxes are drawn as they stand: each has a line from its corner ahead on the left.
+    const away = await page.evaluate(() => {
+      const { instanceStart } = viewer.panes[0].stage.parts.boxes[0].geometry.attributes;
+      const starts = Array.from({ length: instanceStart.count }, (_, i) => [
+        instanceStart.getX(i),
+        instanceStart.getY(i),
+      ]);
+      const found = viewer.panes[0].frame.boxes.filter((box) => !box.truth);
+      const toCorner = ({ centre: [x, y], size: [length, width], yaw }) => {
+        const [cos, sin] = [Math.cos(yaw) / 2, Math.sin(yaw) / 2];
+        const corner = [x + cos * length - sin * width, y + sin * length + cos * width];
+        return Math.min(...starts.map((at) => Math.hypot(at[0] - corner[0], at[1] - corner[1])));
+      };
+      return found.map(toCorner);
+    });
+    assert.ok(Math.max(...away) < 0.01, away.join());
     await page.click(".labels .box >> nth=0", { force: true });
     assert.match(await page.textContent(".facts"), /score0\.\d/);
     // The point that is drawn nearest to the middle of the picture is picked there.
