@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _edgepuck
+from . import _edgepuck, _poses
 from ._detect import Detection
 from ._mesh import Mesh
 from ._page import View, page_of
@@ -156,8 +156,9 @@ def _save_scene(scene: Scene, place: Path) -> str:
         )
     parts = []
     for number, (mesh, (scale, name, label, *_)) in enumerate(scene._added, first):
-        rotation, position = _rigid(scene._moved[number])
-        vertices = (mesh.vertices * scale) @ rotation.T + position
+        row = np.asarray(scene._moved[number])
+        pose = _poses.matrix("pose", row.reshape(4, 4) if len(row) == 16 else row)
+        vertices = (mesh.vertices * scale) @ pose[:3, :3].T + pose[:3, 3]
         parts.append((name or f"object {number}", label, vertices.astype(np.float32), mesh.faces.astype(np.uint32)))
     return _save_gltf(place / "scene.gltf", parts)
 
@@ -198,17 +199,6 @@ def _save_gltf(file: Path, parts: list[tuple[str, str | None, NDArray[Any], NDAr
     }
     file.write_text(json.dumps(gltf), encoding="utf-8")
     return os.fspath(file)
-
-
-def _rigid(rows: Sequence[float]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The rotation and the position of a pose of a scene: a matrix, or x, y, z and a quaternion x, y, z, w."""
-    if len(rows) == 16:
-        matrix = np.array(rows).reshape(4, 4)
-        return matrix[:3, :3], matrix[:3, 3]
-    x, y, z, *quaternion = rows
-    w, a, b, c = np.roll(quaternion, 1) / np.linalg.norm(quaternion)
-    skew = np.array([[0, -c, b], [c, 0, -a], [-b, a, 0]])
-    return np.eye(3) + 2 * w * skew + 2 * skew @ skew, np.array([x, y, z])
 
 
 def _save_batch(batch: Batch, folder: Path) -> None:

@@ -10,8 +10,6 @@ import numpy as np
 import pytest
 
 import edgepuck as ep
-from edgepuck._poses import matrix
-from edgepuck._view import _rigid
 
 
 def test_scans_arrays_meshes_and_detections_become_a_page(tmp_path: Path) -> None:
@@ -73,15 +71,23 @@ def data(page: str) -> list[dict[str, Any]]:
     return found
 
 
+def places_of(mesh: dict[str, Any]) -> np.ndarray:
+    """The vertices of a mesh of a page."""
+    return np.frombuffer(base64.b64decode(mesh["position"]["f32"]), np.float32).reshape(-1, 3)
+
+
 def test_scenes_and_batches_become_a_page() -> None:
     scene, cube = ep.Scene(), ep.Mesh(*ep.box((1.0, 1.0, 1.0)), normalize="none")
     scene.add(cube, position=(3, 0, 0), name="near", label="box")
     far = scene.add(cube, scale=2.0)
-    # Seven numbers of a pose turn as its matrix does.
-    turned = [1.0, 2.0, 3.0, 0.1, -0.5, 0.3, 0.8062257748298549]
-    rotation, position = _rigid(turned)
-    np.testing.assert_allclose(rotation, matrix("pose", turned)[:3, :3], atol=1e-12)
-    np.testing.assert_array_equal(position, turned[:3])
+    # Seven numbers of a pose, which turn by 30 degrees about x: y comes to y cos 30 - z sin 30.
+    half = np.radians(15)
+    scene.move(far, [1.0, 2.0, 3.0, np.sin(half), 0.0, 0.0, np.cos(half)])
+    ahead = places_of(data(ep.view(scene).page)[0]["frames"][0]["meshes"][1])
+    x, y, z = ep.box((2.0, 2.0, 2.0))[0].T
+    cos, sin = np.cos(2 * half), np.sin(2 * half)
+    expected = np.column_stack([1 + x, 2 + cos * y - sin * z, 3 + sin * y + cos * z])
+    np.testing.assert_allclose(ahead, expected, atol=1e-5)
     turned = [
         [0.0, -1.0, 0.0, 6.0],
         [1.0, 0.0, 0.0, 1.0],
@@ -92,7 +98,7 @@ def test_scenes_and_batches_become_a_page() -> None:
     [pane] = data(ep.view(scene).page)
     near, second = pane["frames"][0]["meshes"]
     assert (near["name"], near["class"]) == ("near", "box")
-    corners = np.frombuffer(base64.b64decode(second["position"]["f32"]), np.float32).reshape(-1, 3)
+    corners = places_of(second)
     assert corners.min(axis=0).tolist() == [5, 0, -1]
     assert corners.max(axis=0).tolist() == [7, 2, 1]
     # Points on the objects that they are of are one picture.
