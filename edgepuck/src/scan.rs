@@ -155,8 +155,8 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
         program::say!("{sensor}: {}: {}", summary(&scene, scan), file.display());
     }
     if scans.iter().all(|scan| scan.is_empty()) {
-        let too_far = scene.sensors.iter().find_map(|mounted| out_of_reach(&scene, mounted));
-        let why = too_far.unwrap_or_else(|| {
+        let range = scene.sensors.iter().find_map(|mounted| out_of_reach(&scene, mounted));
+        let why = range.unwrap_or_else(|| {
             "expected an object in the sensor's range and view, larger than the gaps between beams, \
              and not seen edge-on"
                 .to_owned()
@@ -301,14 +301,14 @@ fn tell_objects(scene: &Scene) {
 fn out_of_reach(scene: &Scene, mounted: &MountedSensor) -> Option<String> {
     let at_m = mounted.motion.as_ref().map_or(mounted.pose, |it| it.at(mounted.start_s)).position_m;
     let nearest = scene.instances().iter().map(|it| it.extent().distance_m(at_m));
-    let (nearest_m, most_m) = (nearest.reduce(f64::min)?, mounted.sensor.profile().range.max_m);
+    let (nearest_m, range) = (nearest.reduce(f64::min)?, &mounted.sensor.profile().range);
     let name = &mounted.name;
-    let least_m = mounted.sensor.profile().range.min_m;
-    let limit = match nearest_m {
-        ..=0.0 => return None,
-        _ if nearest_m > most_m => format!("{most_m} m far"),
-        _ if nearest_m < least_m => format!("from {least_m} m"),
-        _ => return None,
+    let limit = if nearest_m > range.max_m {
+        format!("{} m far", range.max_m)
+    } else if nearest_m > 0.0 && nearest_m < range.min_m {
+        format!("from {} m", range.min_m)
+    } else {
+        return None;
     };
     Some(format!("the nearest object is {nearest_m:.1} m from {name}, which sees {limit}"))
 }

@@ -26,11 +26,11 @@ pub fn run(args: &Args) -> anyhow::Result<()> {
         None => built.as_path(),
     };
     let shown = binary.display();
-    let file = fs::read(binary).with_context(|| format!("cannot read {shown}"))?;
+    let n_bytes = fs::metadata(binary).with_context(|| format!("cannot read {shown}"))?.len();
     check_static_stripped_aarch64(binary)?;
     let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
-    let (size, limit) = (mebibytes(file.len() as u64), mebibytes(MOST_BYTES));
-    if file.len() as u64 > MOST_BYTES {
+    let (size, limit) = (mebibytes(n_bytes), mebibytes(MOST_BYTES));
+    if n_bytes > MOST_BYTES {
         bail!("{shown} has {size:.2} MiB; the limit is {limit} MiB");
     }
     println!("{shown}");
