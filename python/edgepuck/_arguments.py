@@ -43,7 +43,9 @@ def whole(name: str, value: Any, least: int, most: int) -> int:
 def real(name: str, value: Any) -> float:
     """`value` as a number."""
     try:
-        return float(value)
+        if not isinstance(value, (str, bytes)):
+            return float(value)
+        raise TypeError
     except (TypeError, ValueError):
         raise Error(f"{name}: expected a number, found {value!r}") from None
 

@@ -30,11 +30,13 @@ class Prediction:
     """The probability of the class."""
     logits: NDArray[np.float32]
     """The outputs of the network, [n_classes]."""
+    nearest: str
+    """The name of the most probable class, known or not."""
 
     def __repr__(self) -> str:
         share = f"{100 * self.confidence:.1f} %"
         if self.is_unknown:
-            return f"<Prediction unknown: resembles class {self.index} the most, {share}>"
+            return f"<Prediction unknown: resembles {self.nearest} the most, {share}>"
         return f"<Prediction {self.label}, {share}>"
 
 
@@ -105,7 +107,8 @@ class Classifier(Remade):
             try:
                 one = Scan.read(one) if isinstance(one, (str, os.PathLike)) else one
                 points = points_of(one.positions if isinstance(one, Scan) else one)
-                found.append(Prediction(**self._classifier.classify(points, ground_z, isinstance(one, Scan))))
+                answer = self._classifier.classify(points, ground_z, isinstance(one, Scan))
+                found.append(Prediction(**answer, nearest=self.classes[answer["index"]]))
             except _edgepuck.Error as error:
                 raise _edgepuck.Error(f"cloud {i}: {error}" if is_batch else str(error)) from None
         return found if is_batch else found[0]

@@ -37,7 +37,9 @@ def place(
     """The row of the pose of a sensor, or the three numbers of a sensor that looks at the origin, [1, 3]."""
     around = [distance, elevation, azimuth]
     if pose is None:
-        found = [usual if one is None else float(one) for one, usual in zip(around, (3.0, 20.0, 0.0), strict=True)]
+        names, usual = ("distance", "elevation", "azimuth"), (3.0, 20.0, 0.0)
+        given = zip(names, around, usual, strict=True)
+        found = [default if one is None else _arguments.real(name, one) for name, one, default in given]
         if not np.isfinite(found).all():
             raise _edgepuck.Error(f"expected finite numbers as the sensor's place, found {found}")
         if found[0] <= 0:

@@ -101,8 +101,8 @@ def test_reprs_are_a_line_with_what_matters(shapes: Path, tmp_path: Path) -> Non
     share = 100 * np.isfinite(batch.ranges).mean()
     assert repr(batch) == f"<Batch of 1 x {beams} ranges by vlp16: {share:.1f} % returned>"
     assert repr(prediction) == f"<Prediction {prediction.label}, {100 * prediction.confidence:.1f} %>"
-    unknown = ep.Prediction("unknown", 3, True, 0.94, np.zeros(5))
-    assert repr(unknown) == "<Prediction unknown: resembles class 3 the most, 94.0 %>"
+    unknown = ep.Prediction("unknown", 3, True, 0.94, np.zeros(5), "chair")
+    assert repr(unknown) == "<Prediction unknown: resembles chair the most, 94.0 %>"
     found = ep.detect(ep.Scenes("street", seed=1)[0].scan)
     assert all(repr(one).startswith(f"<Detection {one.label}, ") and "\n" not in repr(one) for one in found)
     assert len(repr(found)) < 200 * len(found)
@@ -299,3 +299,9 @@ def test_files_without_sensors_are_scanned_by_one_that_is_named(tmp_path: Path) 
     assert scan.object_labels == ["base"]
     with pytest.raises(ep.Error, match="pose: expected a sensor beside it"):
         ep.scan_scene(tmp_path / "box.urdf", pose=SEVEN)
+
+
+@pytest.mark.parametrize("name", ["distance", "elevation", "azimuth"])
+def test_the_place_of_a_sensor_is_of_numbers(name):
+    with pytest.raises(ep.Error, match=f"{name}: expected a number, found '3'"):
+        ep.Sensor("vlp16").scan(ep.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]), **{name: "3"})
