@@ -23,6 +23,8 @@
     allow(dead_code, reason = "formats that are left out leave helpers that others share")
 )]
 
+#[cfg(feature = "boxes")]
+pub mod boxes;
 pub mod cloud;
 #[cfg(feature = "files")]
 pub mod cloud_file;

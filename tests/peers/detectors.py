@@ -1,9 +1,9 @@
-"""pykitti on our sequences, and nuscenes-devkit on the boxes that test the laboratory's precision.
+"""pykitti on our sequences, and nuscenes-devkit on the boxes that test the precision of `eval`.
 
 pykitti reads a drive that `gen-scenes --drive S --layout semantickitti` wrote. Its points on objects that stand
 still must coincide over all sweeps once its poses have moved them into the first camera's frame, but
 for the noise. nuscenes-devkit's average precision of the
-boxes in xtask/lab/src/study/frames/precision.json must be what that file says, which the test of
+boxes in train/src/detections/precision.json must be what that file says, which the test of
 precision.rs beside it expects of ours. Run by `cargo xtask test`; see xtask/src/test/peers.rs.
 """
 
@@ -125,8 +125,8 @@ def boxes(rows):
 
 
 def precision():
-    """The devkit's precision of the boxes that the laboratory's is tested by."""
-    file = ROOT / "xtask/lab/src/study/frames/precision.json"
+    """The devkit's precision of the boxes that ours is tested by."""
+    file = ROOT / "train/src/detections/precision.json"
     for case in json.loads(file.read_text()):
         labelled, found = boxes(case["labelled"]), boxes(case["found"])
         for within_m, expected in case["precision"]:

@@ -56,11 +56,34 @@ def drive(seed):
     truth_file = capture.with_suffix(".truth.jsonl")
     truth = [json.loads(line) for line in truth_file.read_text().splitlines()]
     turns = judged(truth, found)
+    ours_is_theirs(turns)
+    turns = [([one["object"] for one in objects], *rest) for objects, *rest in turns]
     ours = score(turns, {id(one): one["track"] for one in found})
     theirs = score(turns, hungarian(found, numpy.loadtxt(capture.with_suffix(".tum"))))
     print(f"seed {seed}, {SECONDS} s, {len(found)} clusters: live {ours}; Hungarian {theirs}",
           flush=True)
     return ours["HOTA"], theirs["HOTA"]
+
+
+def ours_is_theirs(turns):
+    """`eval`'s HOTA and switches of what is in each turn must be those of TrackEval, for points 2 m apart at most."""
+    files, data = [OUT / "eval.jsonl", OUT / "eval.truth.jsonl"], []
+    with files[0].open("w") as detections, files[1].open("w") as truth:
+        for number, (objects, clusters, _) in enumerate(turns):
+            off = numpy.array([[math.dist(one["centre_m"][:2], of["position_m"][:2]) for of in clusters] for one in objects])
+            data.append(([one["object"] for one in objects], clusters,
+                         numpy.maximum(0, 1 - off.reshape(len(objects), len(clusters)) / 2)))
+            box = {"class": "thing", "turn": number, "size_m": [1, 1, 1], "yaw_deg": 0}
+            for one in objects:
+                truth.write(json.dumps(box | {"object": one["object"], "position_m": one["centre_m"]}) + "\n")
+            for one in clusters:
+                detections.write(json.dumps(box | {"track": one["track"], "position_m": one["position_m"]}) + "\n")
+    wanted = score(data, {id(one): one["track"] for _, clusters, _ in data for one in clusters})
+    said = edgepuck("eval", "--detections", files[0], "--truth", files[1]).stdout.splitlines()
+    line = next(line for line in said if "HOTA" in line)
+    parts = [f"{wanted[name]:.1f}" for name in ("HOTA", "DetA", "AssA")]
+    expected = "HOTA {:>5} (detection {}, association {}), {} switches".format(*parts, wanted["switches"])
+    assert line.endswith(expected), (line, expected)
 
 
 def judged(truth, found):
@@ -82,7 +105,7 @@ def judged(truth, found):
                 kept.append(cluster)
                 similar.append([max(0.0, 1 - away[i] / FARTHEST_M) for i in wanted])
         similar = numpy.array(similar).reshape(len(kept), len(wanted)).T
-        turns.append(([here[i]["object"] for i in wanted], kept, similar))
+        turns.append(([here[i] for i in wanted], kept, similar))
     return turns
 
 

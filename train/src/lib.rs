@@ -47,6 +47,7 @@ mod checkpoint;
 pub mod cli;
 mod clouds;
 mod cluster;
+mod detections;
 mod draws;
 mod error;
 mod evaluate;

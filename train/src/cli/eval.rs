@@ -5,6 +5,7 @@ use anyhow::{bail, ensure};
 
 use crate::accuracy_report;
 use crate::clouds::Clouds;
+use crate::detections;
 use crate::evaluate::evaluate;
 use crate::object_report::{Labels, Table, classified};
 use formats::atomic;
@@ -23,15 +24,31 @@ sensor or ids, for several files, and with --known, --tracks or --min-points, it
 table: the shares of right answers, with 95 % intervals, by class, label, range, number of
 points, sensor and file. An object whose label is not a class of the model is a negative;
 the right answer to it is `unknown`. Views of one mesh are often right or wrong together: the
-interval of an accuracy counts meshes, which the names of the clouds tell.")]
+interval of an accuracy counts meshes, which the names of the clouds tell.
+
+With --detections, it compares boxes with those of --truth: objects found and false alarms by class,
+the average precision of the centres as nuScenes defines it, what was taken for what, and HOTA of tracks.
+Both are files of detect, live, gen-scenes or gen-scenes --drive (its truth), of KITTI's labels, or JSON like
+nuScenes' results; or folders of such files with the same names.")]
 pub struct EvalArgs {
     /// The model file, or the name of a bundled model
-    #[arg(long, value_name = "MODEL")]
+    #[arg(long, value_name = "MODEL", required_unless_present = "detections", default_value = "")]
+    #[arg(hide_default_value = true)]
     model: PathBuf,
     /// Labelled clouds: a packed NPZ file, NPZ files of clusters (repeat the flag), or data with a
     /// test part in any form that `train --data` accepts
-    #[arg(long, value_name = "PATH", required = true)]
+    #[arg(long, value_name = "PATH", required_unless_present = "detections")]
     data: Vec<PathBuf>,
+    /// Boxes that a detector found, in place of a model
+    #[arg(long, value_name = "PATH", requires = "truth")]
+    #[arg(conflicts_with_all = ["model", "data", "precision", "known", "tracks", "csv"])]
+    detections: Option<PathBuf>,
+    /// Boxes of the objects that are there
+    #[arg(long, value_name = "PATH", requires = "detections")]
+    truth: Option<PathBuf>,
+    /// Draw precision over recall of the detections to this file
+    #[arg(long, value_name = "FILE", requires = "detections")]
+    svg: Option<PathBuf>,
     /// Precision of the inference: f32 or i8
     #[arg(long, default_value = "f32")]
     precision: Precision,
@@ -54,7 +71,11 @@ pub struct EvalArgs {
 
 pub fn run(args: &EvalArgs) -> anyhow::Result<()> {
     args.csv.iter().try_for_each(|file| need_extension("--csv", file, &["csv"]))?;
-    args.overwrite.check(args.csv.iter().map(PathBuf::as_path))?;
+    args.svg.iter().try_for_each(|file| need_extension("--svg", file, &["svg"]))?;
+    args.overwrite.check(args.csv.iter().chain(&args.svg).map(PathBuf::as_path))?;
+    if let (Some(detections), Some(truth)) = (&args.detections, &args.truth) {
+        return report_detections(args, [detections, truth]);
+    }
     let full = |path: &PathBuf| path.canonicalize().unwrap_or_else(|_| path.clone());
     let data: Vec<PathBuf> = args.data.iter().map(full).collect();
     if let Some(i) = (0..data.len()).find(|&i| data[..i].contains(&data[i])) {
@@ -82,6 +103,18 @@ pub fn run(args: &EvalArgs) -> anyhow::Result<()> {
         }
         _ => report_objects(args, &card, &names, &clouds),
     }
+}
+
+/// Reports on boxes that a detector found.
+fn report_detections(args: &EvalArgs, files: [&Path; 2]) -> anyhow::Result<()> {
+    let frames = detections::read(files)?;
+    let least = args.min_points.unwrap_or(1) as u64;
+    super::print(detections::table(&frames, 0.0, least).trim_end())?;
+    if let Some(path) = &args.svg {
+        atomic::write_bytes(path, detections::to_svg(&frames, least))?;
+        program::say!("precision over recall: {}", path.display());
+    }
+    Ok(())
 }
 
 fn options(args: &EvalArgs) -> Options {

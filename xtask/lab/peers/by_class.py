@@ -4,7 +4,7 @@
 
 It needs the package edgepuck and NumPy. A frame holds `xyz_mm`, `boxes` (centre, length, width, height, yaw), and `classes`
 (of KITTI or Argoverse 2) or `cls` (1 car, 2 person, 3 two-wheeler, 4 truck, 5 bus, 6 not judged), and as JSON in `meta` the
-sensor and the half angle within which it is labelled. The rules are those of `cargo xtask bench frames`: an object of 30
+sensor and the half angle within which it is labelled. The rules: an object of 30
 points or more within 40 m is found if a detection of its class holds half of its points that are not ground, and is
 half made of its points; a false alarm is a detection half of which is in no labelled box of its class.
 """
@@ -25,7 +25,8 @@ LABELS = {
     "school_bus": "bus", "cyclist": "two-wheeler", "bicyclist": "two-wheeler", "bicycle": "two-wheeler",
     "motorcycle": "two-wheeler", "motorcyclist": "two-wheeler",
 }
-# Where the sensors of Argoverse 2's car stand, as `bench frames` has it, metres.
+# Where the sensors of Argoverse 2's car stand, the mean of both, metres. Fitted so that each laser draws a cone, to two sweeps
+# of one log, which agree within a millimetre; other cars may differ.
 ARGOVERSE2_M = np.array([1.347, 0.003, 1.583])
 
 

@@ -1,14 +1,14 @@
 //! `cargo xtask bench`: measures, and writes the figures and the machine to a record.
 //!
 //! [`embree`] compares with Embree; [`pi5`] is about a Raspberry Pi, [`gpu`] about adapters and the time of a
-//! dataset, [`frames`] about detection in real sweeps.
+//! dataset.
 
 use crate::measure::backends;
 use crate::measure::bench_mesh::{self, BenchMesh};
 use crate::measure::machine::{self, Machine};
 use crate::pi5;
 use crate::rivals as embree;
-use crate::study::{frames, gpu};
+use crate::study::gpu;
 use crate::table::write_json;
 use anyhow::Result;
 use clap::{Args, Subcommand};
@@ -34,8 +34,6 @@ pub enum Benchmark {
     /// measured. The exit code is 1 if a comparison fails. A copy of the program runs on a machine
     /// without the workspace and without a network.
     Gpu(gpu::GpuArgs),
-    /// Detect the cars and persons in labelled sweeps of real sensors, and count false alarms.
-    Frames(frames::FramesArgs),
 }
 
 /// Meshes to cast at, and casters.
@@ -73,7 +71,6 @@ pub fn run(benchmark: &Benchmark) -> Result<Outcome> {
         Benchmark::Gpu(args) => return gpu::run(args),
         Benchmark::Embree(args) => args.embree(),
         Benchmark::PiModel(args) => pi5::run(args),
-        Benchmark::Frames(args) => frames::run(args),
     }?;
     Ok(Outcome::Success)
 }

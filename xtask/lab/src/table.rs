@@ -1,4 +1,4 @@
-//! Tables: the same rows as text for a terminal and as Markdown.
+//! Tables for a terminal.
 
 use formats::atomic;
 pub use program::significant_digits::digits;
@@ -41,24 +41,6 @@ impl Table {
     fn lines(&self) -> impl Iterator<Item = &Vec<String>> {
         std::iter::once(&self.heading).chain(&self.rows)
     }
-
-    /// The table as Markdown, under its title.
-    fn markdown(&self) -> String {
-        let line = |words: &Vec<String>| format!("| {} |\n", words.join(" | "));
-        let mut lines: Vec<String> = self.lines().map(line).collect();
-        lines.insert(1, line(&vec!["---".to_owned(); self.heading.len()]));
-        format!("## {}\n\n{}", self.title, lines.concat())
-    }
-}
-
-/// Prints `tables`, and writes them to the Markdown file `report`, if one is asked for.
-pub fn publish(tables: &[Table], report: Option<&Path>) -> anyhow::Result<()> {
-    tables.iter().for_each(|table| print!("{table}"));
-    if let Some(file) = report {
-        let text: Vec<String> = tables.iter().map(|table| table.markdown() + "\n").collect();
-        atomic::write_bytes(file, text.concat())?;
-    }
-    Ok(())
 }
 
 /// Writes `record` to the JSON file `file`, if one is asked for.
@@ -98,24 +80,16 @@ pub fn milliseconds(seconds: f64) -> String {
     digits(seconds * 1e3)
 }
 
-pub fn percent(share: f64) -> String {
-    format!("{:.1}", 100.0 * share)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn the_same_rows_are_text_and_markdown() {
+    fn rows_are_lines_of_text() {
         let columns: [Column<'_, u8>; 2] =
             [("name", &|_| "a < b".to_owned()), ("ms", &|ms| ms.to_string())];
         let mut table = Table::of("title", &[1], &columns);
         table.push(vec!["c".to_owned(), "10".to_owned()]);
         assert_eq!(table.to_string(), "\ntitle\n  name   ms\n  a < b   1\n  c      10\n");
-        assert_eq!(
-            table.markdown(),
-            "## title\n\n| name | ms |\n| --- | --- |\n| a < b | 1 |\n| c | 10 |\n"
-        );
     }
 }

@@ -1,6 +1,5 @@
 //! The studies, each of which ends in a record.
 
-pub mod frames;
 pub mod gpu;
 pub mod speed;
 pub mod to_disk;

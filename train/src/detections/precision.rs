@@ -1,10 +1,10 @@
 //! Average precision as nuScenes defines it (Caesar et al., "nuScenes", CVPR 2020, 3.1): a detection is
 //! right by the horizontal distance of its centre from that of a labelled object of its class.
 
-use crate::table::{Table, percent};
+use super::frames::{Frames, Thing};
 
 /// The farthest centres of the four precisions, metres.
-const DISTANCES_M: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
+pub const DISTANCES_M: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
 /// Lower recalls and precisions do not count.
 const LEAST: f64 = 0.1;
 /// Steps of recall.
@@ -22,14 +22,32 @@ pub struct Place {
 
 /// What was found of a class, and what is there.
 pub struct OfClass {
-    pub class: &'static str,
     pub found: Vec<Place>,
     pub labelled: Vec<Place>,
 }
 
 impl OfClass {
-    /// The average precision of detections within a distance of the label.
-    fn average_precision(&self, within_m: f64) -> f64 {
+    /// Those of a class; labelled objects of fewer than `min_points` are left out.
+    pub fn of(frames: &Frames, class: usize, min_points: u64) -> Self {
+        let mut of = Self { found: Vec::new(), labelled: Vec::new() };
+        for (frame, [found, labelled]) in frames.of.iter().enumerate() {
+            for (things, places, least) in
+                [(found, &mut of.found, 0), (labelled, &mut of.labelled, min_points)]
+            {
+                let is_asked = |one: &&Thing| one.n_points.is_none_or(|n| n >= least);
+                let of_class =
+                    things.iter().filter(|one| one.class == Some(class)).filter(is_asked);
+                places.extend(of_class.map(|one| {
+                    let [x, y, _] = one.place.centre_m;
+                    Place { frame, centre_m: [x, y], score: one.score }
+                }));
+            }
+        }
+        of
+    }
+
+    /// Recall and precision after each detection, the best first.
+    pub fn curve(&self, within_m: f64) -> Vec<[f64; 2]> {
         let mut order: Vec<usize> = (0..self.found.len()).collect();
         order.sort_by(|&a, &b| self.found[b].score.total_cmp(&self.found[a].score).then(b.cmp(&a)));
         let mut is_taken = vec![false; self.labelled.len()];
@@ -37,7 +55,10 @@ impl OfClass {
         for (n, &at) in (1..).zip(&order) {
             let found = self.found[at];
             let off_m = |label: &Place| {
-                (label.centre_m[0] - found.centre_m[0]).hypot(label.centre_m[1] - found.centre_m[1])
+                libm::hypot(
+                    label.centre_m[0] - found.centre_m[0],
+                    label.centre_m[1] - found.centre_m[1],
+                )
             };
             let free = self.labelled.iter().enumerate();
             let free = free.filter(|(i, label)| label.frame == found.frame && !is_taken[*i]);
@@ -49,7 +70,13 @@ impl OfClass {
             let share = |of: usize| n_right as f64 / of as f64;
             curve.push([share(self.labelled.len()), share(n)]);
         }
-        if n_right == 0 {
+        curve
+    }
+
+    /// The average precision of detections within a distance of the label.
+    pub fn average_precision(&self, within_m: f64) -> f64 {
+        let curve = self.curve(within_m);
+        if curve.last().is_none_or(|[recall, _]| *recall == 0.0) {
             return 0.0;
         }
         // Recalls above the least one, of which the first step is left out.
@@ -78,21 +105,6 @@ fn precision_at(curve: &[[f64; 2]], recall: f64) -> f64 {
     }
 }
 
-/// The average precisions of each class, at each distance and their mean.
-pub fn table(classes: &[OfClass]) -> Table {
-    let titles = ["class", "labelled", "0.5 m", "1 m", "2 m", "4 m", "mean"];
-    let mut table =
-        Table::new("Average precision of the centres, by nuScenes' definition", &titles);
-    for of in classes {
-        let all = DISTANCES_M.map(|within_m| of.average_precision(within_m));
-        let mean = all.iter().sum::<f64>() / all.len() as f64;
-        let mut row = vec![of.class.to_owned(), of.labelled.len().to_string()];
-        row.extend(all.into_iter().chain([mean]).map(percent));
-        table.push(row);
-    }
-    table
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -110,7 +122,6 @@ mod tests {
         let cases: Vec<Case> = serde_json::from_str(include_str!("precision.json")).unwrap();
         for Case { labelled, found, precision } in cases {
             let of = OfClass {
-                class: "car",
                 found: found.into_iter().map(|(frame, x, y, s)| place(frame, x, y, s)).collect(),
                 labelled: labelled
                     .into_iter()

@@ -1,0 +1,245 @@
+//! Detections and labelled objects, frame by frame.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use formats::FormatError;
+use formats::boxes::{BoxOfFile as Placed, read_boxes};
+use formats::geometry::OrientedBox;
+
+/// The longest time between a detection and the object that it may be, seconds: half a turn.
+const MOST_APART_S: f64 = 0.06;
+
+/// Classes of data sets, and what they are here. Those without a name are not judged.
+const ALIASES: [(&str, &str); 28] = [
+    ("van", "car"),
+    ("regular_vehicle", "car"),
+    ("pickup", "car"),
+    ("pedestrian", "person"),
+    ("person_sitting", "person"),
+    ("child", "person"),
+    ("cyclist", "two-wheeler"),
+    ("bicyclist", "two-wheeler"),
+    ("bicycle", "two-wheeler"),
+    ("motorcycle", "two-wheeler"),
+    ("motorcyclist", "two-wheeler"),
+    ("box_truck", "truck"),
+    ("truck_cab", "truck"),
+    ("large_vehicle", "truck"),
+    ("trailer", "truck"),
+    ("construction_vehicle", "truck"),
+    ("school_bus", "bus"),
+    ("tram", ""),
+    ("dontcare", ""),
+    ("misc", ""),
+    ("other", ""),
+    ("unknown", ""),
+    ("animal", ""),
+    ("barrier", ""),
+    ("traffic_cone", ""),
+    ("wheeled_device", ""),
+    ("sign", ""),
+    ("bollard", ""),
+];
+
+/// A detection, or a labelled object.
+#[derive(Clone, Debug)]
+pub struct Thing {
+    /// The index of its class; `None` for what is not judged.
+    pub class: Option<usize>,
+    pub place: OrientedBox,
+    /// The confidence, 0 to 1; 1 if the file has none.
+    pub score: f64,
+    /// The number of its points, if the file has it.
+    pub n_points: Option<u64>,
+    /// The number of its track, if it has one.
+    pub track: Option<u64>,
+}
+
+/// Detections and labelled objects of the same frames.
+#[derive(Debug, Default)]
+pub struct Frames {
+    /// The names of the classes, sorted.
+    pub classes: Vec<String>,
+    /// Of each frame: what was found, and what is there.
+    pub of: Vec<[Vec<Thing>; 2]>,
+}
+
+/// Reads the detections and the truth of `files`: a pair of files, or of folders whose files have the same
+/// names.
+///
+/// # Errors
+/// A file that holds no boxes, a folder whose partner lacks a file, detections or truth that are empty, and times
+/// that do not meet.
+pub fn read([detections, truth]: [&Path; 2]) -> Result<Frames, FormatError> {
+    let pairs = match (detections.is_dir(), truth.is_dir()) {
+        (false, false) => vec![[detections.to_path_buf(), truth.to_path_buf()]],
+        (true, true) => paired(detections, truth)?,
+        (is_folder, _) => {
+            let [folder, file] = if is_folder { [detections, truth] } else { [truth, detections] };
+            let cause =
+                format!("expected two files or two folders, found the folder {}", folder.display());
+            return Err(FormatError::malformed(file, "detections and truth", cause));
+        }
+    };
+    let mut classes = Vec::new();
+    let mut of = Vec::new();
+    for [found, labelled] in &pairs {
+        let [boxes, truth] = [read_boxes(found)?, read_boxes(labelled)?];
+        of.extend(by_frame(boxes, truth, &mut classes));
+    }
+    let mut frames = Frames { classes, of };
+    frames.sort_classes();
+    match frames.of.iter().all(|[_, labelled]| labelled.is_empty()) {
+        false => Ok(frames),
+        true => {
+            Err(FormatError::malformed(truth, "objects", "expected labelled objects, found none"))
+        }
+    }
+}
+
+/// The files of two folders that have the same names but for their extensions.
+fn paired(detections: &Path, truth: &Path) -> Result<Vec<[std::path::PathBuf; 2]>, FormatError> {
+    let list = |folder: &Path| -> Result<BTreeMap<String, std::path::PathBuf>, FormatError> {
+        let io = |source| FormatError::io(folder, source);
+        let mut files = BTreeMap::new();
+        for entry in std::fs::read_dir(folder).map_err(io)? {
+            let path = entry.map_err(io)?.path();
+            let is_boxes = path
+                .extension()
+                .is_some_and(|end| ["json", "jsonl", "txt"].iter().any(|known| end == *known));
+            if let Some(stem) = path.file_stem().filter(|_| is_boxes) {
+                files.insert(stem.to_string_lossy().into_owned(), path);
+            }
+        }
+        Ok(files)
+    };
+    let (found, mut labelled) = (list(detections)?, list(truth)?);
+    let pair = |(stem, file): (String, std::path::PathBuf)| {
+        let partner = labelled.remove(&stem).ok_or_else(|| {
+            let cause = format!("expected the truth of {stem}, found none");
+            FormatError::malformed(truth, "folder", cause)
+        })?;
+        Ok([file, partner])
+    };
+    found.into_iter().map(pair).collect()
+}
+
+/// The frames of a file of detections and one of the truth: those of samples by their names, those of turns
+/// by the times of the objects, and one if they have neither.
+fn by_frame(
+    found: Vec<Placed>,
+    labelled: Vec<Placed>,
+    classes: &mut Vec<String>,
+) -> Vec<[Vec<Thing>; 2]> {
+    let key = |one: &Placed| match one.turn {
+        Some(turn) => turn.to_string(),
+        None if one.in_world => one.sweep.clone().unwrap_or_default(),
+        // A file of one sweep.
+        None => String::new(),
+    };
+    let mut frames: BTreeMap<String, [Vec<Thing>; 2]> = BTreeMap::new();
+    for one in &labelled {
+        frames.entry(key(one)).or_default()[1].push(thing(one, classes));
+    }
+    for one in found {
+        // Lines of `live` name no turn: theirs is that of the nearest object about their time, and they
+        // are where they were then.
+        let (own, one) = match one.turn.is_none().then_some(one.time_s).flatten() {
+            None => (key(&one), one),
+            Some(time_s) => match nearest(&one, time_s, &labelled) {
+                None => ("no turn".to_owned(), one),
+                Some(there) => (key(there), at_time_of(one, there, time_s)),
+            },
+        };
+        frames.entry(own).or_default()[0].push(thing(&one, classes));
+    }
+    frames.into_values().collect()
+}
+
+/// The labelled object about this time that is nearest to `one`.
+fn nearest<'a>(one: &Placed, time_s: f64, labelled: &'a [Placed]) -> Option<&'a Placed> {
+    let off_m = |other: &Placed| {
+        let there = at_time_of(one.clone(), other, time_s);
+        let off = |axis: usize| there.place.centre_m[axis] - other.place.centre_m[axis];
+        libm::hypot(off(0), off(1))
+    };
+    let about = labelled.iter().filter(|other| {
+        other.time_s.is_some_and(|there_s| (there_s - time_s).abs() < MOST_APART_S)
+    });
+    about.min_by(|a, b| off_m(a).total_cmp(&off_m(b)))
+}
+
+/// Where `one` was at the time of `other`, if it moved with it; it is of this time.
+fn at_time_of(mut one: Placed, other: &Placed, time_s: f64) -> Placed {
+    let after_s = time_s - other.time_s.unwrap_or(time_s);
+    let moved_m = other.velocity_m_s.unwrap_or_default().map(|speed| after_s * speed);
+    (0..3).for_each(|axis| one.place.centre_m[axis] -= moved_m[axis]);
+    one
+}
+
+fn thing(one: &Placed, classes: &mut Vec<String>) -> Thing {
+    let own = one.class.clone().unwrap_or_default().to_lowercase();
+    let alias = ALIASES.iter().find(|(name, _)| *name == own);
+    let name = alias.map_or(&*own, |(_, name)| name);
+    let class = (!name.is_empty()).then(|| match classes.iter().position(|known| known == name) {
+        Some(at) => at,
+        None => {
+            classes.push(name.to_owned());
+            classes.len() - 1
+        }
+    });
+    let Placed { place, n_points, track, .. } = *one;
+    Thing { class, place, score: one.score.unwrap_or(1.0), n_points, track }
+}
+
+impl Frames {
+    fn sort_classes(&mut self) {
+        let mut order: Vec<usize> = (0..self.classes.len()).collect();
+        order.sort_by(|&a, &b| self.classes[a].cmp(&self.classes[b]));
+        let place = |class: usize| order.iter().position(|&at| at == class);
+        for one in self.of.iter_mut().flatten().flatten() {
+            one.class = one.class.and_then(place);
+        }
+        self.classes.sort();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn boxed(class: &str, x: f64) -> Placed {
+        let place = OrientedBox { centre_m: [x, 0.0, 0.0], size_m: [1.0; 3], yaw_rad: 0.0 };
+        Placed { class: Some(class.to_owned()), place, in_world: true, ..Placed::default() }
+    }
+
+    /// Lines of `live` name no turn. The car moves 1 m in a turn of 0.1 s.
+    #[test]
+    fn detections_belong_to_the_turn_of_the_nearest_object_about_their_time() {
+        let at = |turn: u64| {
+            let (time_s, velocity_m_s) = (Some(0.1 * turn as f64), Some([10.0, 0.0, 0.0]));
+            Placed { turn: Some(turn), time_s, velocity_m_s, ..boxed("Car", turn as f64) }
+        };
+        let live = |x: f64, time_s: f64| Placed { time_s: Some(time_s), ..boxed("car", x) };
+        let mut classes = Vec::new();
+        let found = vec![live(1.0, 0.1), live(2.4, 0.24), live(9.0, 0.9)];
+        let frames = by_frame(found, vec![at(1), at(2)], &mut classes);
+        let counts: Vec<_> =
+            frames.iter().map(|[found, labelled]| [found.len(), labelled.len()]).collect();
+        // The last is of no turn of the truth.
+        assert_eq!((counts, classes), (vec![[1, 1], [1, 1], [1, 0]], vec!["car".to_owned()]));
+    }
+
+    #[test]
+    fn classes_of_data_sets_are_ours_and_sorted() {
+        let names = ["Pedestrian", "DontCare", "bus", "Van"];
+        let mut frames = Frames::default();
+        let labelled = names.map(|name| boxed(name, 0.0)).to_vec();
+        frames.of = by_frame(Vec::new(), labelled, &mut frames.classes);
+        frames.sort_classes();
+        let classes = frames.of[0][1].iter().map(|one| one.class);
+        assert_eq!(frames.classes, ["bus", "car", "person"]);
+        assert_eq!(classes.collect::<Vec<_>>(), [Some(2), None, Some(0), Some(1)]);
+    }
+}
