@@ -10,18 +10,16 @@ fn largest(size_m: [f64; 3]) -> f64 {
     size_m.into_iter().fold(0.0, f64::max)
 }
 
-/// Why the unit of a mesh of this size, metres, is probably not `unit`. A user names another by `remedy`.
+/// Why the unit of a mesh of this size, metres, is probably not `unit`. A user names another by `remedy`,
+/// if there is one in which the size is expected.
 #[must_use]
 pub fn mesh_size(size_m: [f64; 3], unit: Unit, remedy: &'static str) -> Option<Warning> {
     let most = largest(size_m);
     let is_expected = most == 0.0 || EXPECTED_M.contains(&most);
+    let fits = |other: &Unit| EXPECTED_M.contains(&(most / unit.metres() * other.metres()));
     (!is_expected).then(|| {
-        let likely = match unit {
-            _ if most > 1.0 => Unit::Millimetre,
-            Unit::Metre => Unit::Inch,
-            _ => Unit::Metre,
-        };
-        Warning::MeshSize { size_m, unit, likely: Some(likely).filter(|it| *it != unit), remedy }
+        let likely = Unit::ALL.into_iter().find(fits);
+        Warning::MeshSize { size_m, unit, likely, remedy }
     })
 }
 
@@ -99,23 +97,22 @@ mod tests {
             (
                 950.0,
                 Unit::Metre,
-                Some(
-                    "950 x 950 x 950 m if its unit is the metre (0.95 x 0.95 x 0.95 m if it is millimetres)",
-                ),
+                Some("is the metre (0.95 x 0.95 x 0.95 m if it is millimetres); -"),
             ),
-            (0.002, Unit::Metre, Some("0.002 x 0.002 x 0.002 m")),
+            (0.002, Unit::Metre, Some("0.002 x 0.002 x 0.002 m if its unit is the metre.")),
+            (9e5, Unit::Metre, Some("x 900000 m if its unit is the metre.")),
             (
                 0.002,
                 Unit::Millimetre,
-                Some("if its unit is millimetres (2 x 2 x 2 m if it is metres)"),
+                Some("its unit is millimetres (2 x 2 x 2 m if it is metres)"),
             ),
-            (900.0, Unit::Millimetre, Some("found 900 x 900 x 900 m if its unit is millimetres")),
+            (900.0, Unit::Millimetre, Some("found 900 x 900 x 900 m if its unit is millimetres.")),
             (304.8, Unit::Foot, Some("is feet (1 x 1 x 1 m if it is millimetres)")),
             (0.0, Unit::Metre, None),
             (0.01, Unit::Metre, None),
             (100.0, Unit::Inch, None),
         ] {
-            let found = mesh_size([size; 3], unit, "").map(|warning| warning.to_string());
+            let found = mesh_size([size; 3], unit, "--units").map(|warning| format!("{warning}."));
             assert_eq!(found.is_some(), expected.is_some(), "{size}: {found:?}");
             let (found, part) = (found.unwrap_or_default(), expected.unwrap_or_default());
             assert!(found.contains(part), "{found}");

@@ -252,14 +252,10 @@ impl Warning {
 fn mesh_size(size_m: [f64; 3], unit: Unit, likely: Option<Unit>, remedy: &str) -> String {
     let named = if unit == Unit::Metre { "the metre" } else { unit.plural() };
     let found = box_of(size_m);
-    let mut text =
-        format!("expected a size of 1 cm to 100 m, found {found} if its unit is {named}");
-    if let Some(likely) = likely {
-        let factor = likely.metres() / unit.metres();
-        let other = box_of(size_m.map(|side| side * factor));
-        text += &format!(" ({other} if it is {})", likely.plural());
-    }
-    if remedy.is_empty() { text } else { text + "; " + remedy }
+    let text = format!("expected a size of 1 cm to 100 m, found {found} if its unit is {named}");
+    let Some(likely) = likely else { return text };
+    let other = box_of(size_m.map(|side| side / unit.metres() * likely.metres()));
+    format!("{text} ({other} if it is {}); {remedy}", likely.plural())
 }
 
 fn without_mesh(classes: &[String]) -> String {
