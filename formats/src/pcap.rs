@@ -23,7 +23,7 @@ use pcap_parser::traits::PcapNGPacketBlock;
 use pcap_parser::{Block, Linktype, PIB_MAGIC, PcapBlockOwned, PcapError, create_reader};
 
 use crate::error::FormatError;
-use crate::plausible::or_foreign_file;
+use crate::plausible::{foreign, or_foreign_file};
 
 /// The magic number of a file in this byte order with times in microseconds.
 const MAGIC: u32 = 0xa1b2_c3d4;
@@ -146,6 +146,9 @@ pub fn read(
     each: impl FnMut(&UdpPacket<'_>) -> ControlFlow<()>,
 ) -> Result<Counts, FormatError> {
     let file = File::open(path).map_err(|source| match path.to_str() {
+    if path.is_dir() {
+        return Err(FormatError::malformed(path, "name", "expected a capture, found a folder"));
+    }
         Some("-") => {
             let cause = "expected a file, found standard input: write it to a file first";
             FormatError::malformed(path, "name", cause)
@@ -223,18 +226,11 @@ fn begins_with_short_block(data: &[u8]) -> bool {
 /// Whether the file at `path` is a capture by its extension or its first bytes.
 #[must_use]
 pub fn is_capture(path: &Path) -> bool {
-    /// Classic captures of micro- or nanoseconds in either byte order, and pcapng.
-    const SIGNS: [[u8; 4]; 5] = [
-        [0xa1, 0xb2, 0xc3, 0xd4],
-        [0xd4, 0xc3, 0xb2, 0xa1],
-        [0xa1, 0xb2, 0x3c, 0x4d],
-        [0x4d, 0x3c, 0xb2, 0xa1],
-        [0x0a, 0x0d, 0x0d, 0x0a],
-    ];
     let is_named = |end: &str| path.extension().is_some_and(|it| it.eq_ignore_ascii_case(end));
     let mut start = [0; 4];
     let read = File::open(path).and_then(|mut file| file.read_exact(&mut start));
-    ["pcap", "pcapng", "cap"].into_iter().any(is_named) || (read.is_ok() && SIGNS.contains(&start))
+    let is_sign = || foreign(&start).is_some_and(|found| found.starts_with("a capture"));
+    ["pcap", "pcapng", "cap"].into_iter().any(is_named) || (read.is_ok() && is_sign())
 }
 
 #[derive(Clone, Copy)]

@@ -50,8 +50,9 @@ fn stand_ins_of_files_are_named() {
         ([b"PK\x03\x04\x14\0", &[0x7f; 300][..]].concat(), "a compressed file: unpack it"),
         ([b"PK\x03\x04\x14\0", &[0; 25][..], b"points.npy"].concat(), "a NumPy archive (NPZ)"),
         (b"<!DOCTYPE html>\n<html><head></head></html>\n".to_vec(), "a web page"),
+        ([b"\n\r\r\n\x1C\0\0\0\x4D\x3C\x2B\x1A", &[0; 60][..]].concat(), "a capture of packets"),
     ] {
-        for (name, expected, read) in &readers {
+        for (name, expected, read) in readers.iter().filter(|(_, it, _)| !found.starts_with(it)) {
             let path = folder.path().join(name);
             fs::write(&path, &bytes).unwrap();
             let error = read(&path).unwrap_err().to_string();

@@ -5,10 +5,9 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 pub use formats::InvalidValue;
-use formats::plausible::read_text;
+use formats::plausible::{foreign_toml, read_text};
 use serde::de::DeserializeOwned;
 
-use edgepuck_mesh::MeshFormat;
 use formats::mistakes::Mistakes;
 pub(crate) use formats::mistakes::{did_you_mean, one_of};
 
@@ -80,12 +79,14 @@ pub fn all<T, E: Into<Vec<InvalidValue>>>(
     if wrong.is_empty() { Ok(sound) } else { Err(wrong) }
 }
 
-/// Reads `file`, parses it, and makes of it what is wanted by `check`.
+/// Reads `file`, in which a user `expected` such as "a scene", parses it, and makes of it what is wanted by
+/// `check`.
 ///
 /// # Errors
-/// As [`parse`]'s.
+/// As [`parse`]'s; a file of another kind.
 pub fn read<T: DeserializeOwned, U, E: Into<Vec<InvalidValue>>>(
     file: &Path,
+    expected: &str,
     check: impl Fn(T) -> Result<U, E>,
 ) -> Result<U, ConfigError> {
     let failed = |source| ConfigError::Read { file: file.to_owned(), source };
@@ -93,16 +94,10 @@ pub fn read<T: DeserializeOwned, U, E: Into<Vec<InvalidValue>>>(
     if text.len() as u64 > MAX_FILE_BYTES {
         return Err(ConfigError::TooLong { file: file.to_owned() });
     }
-    // A mesh, or XML, would have a mistake in each line.
-    let is_other = MeshFormat::from_path(file).is_some() || text.trim_start().starts_with('<');
-    let other = file.extension().filter(|_| is_other);
-    match other.filter(|_| text.parse::<toml::Table>().is_err()) {
-        Some(extension) => Err(ConfigError::Content {
-            file: file.to_owned(),
-            message: format!("expected a TOML file, found .{}", extension.display()),
-        }),
-        None => parse(&text, file, check),
-    }
+    parse(&text, file, check).map_err(|error| match foreign_toml(&text, expected) {
+        Some(message) => ConfigError::Content { file: file.to_owned(), message },
+        None => error,
+    })
 }
 
 /// Parses `text`, which is in `file`, and makes of it what is wanted by `check`.

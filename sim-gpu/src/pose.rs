@@ -37,7 +37,7 @@ pub(crate) fn azimuth_on_ring(view: u32, count: u32, first_azimuth_rad: f64) -> 
 ///
 /// An empty file is an empty list.
 pub fn load_poses(file: &Path) -> Result<Vec<Pose>, ConfigError> {
-    config::read(file, poses)
+    config::read(file, "poses", poses)
 }
 
 #[derive(Deserialize)]

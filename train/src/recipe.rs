@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use edgepuck_assets::TRAINING_RECIPES;
 use formats::mistakes::Mistakes;
 use formats::model_card::Normalization;
-use formats::plausible::read_text;
+use formats::plausible::{foreign_toml, read_text};
 use formats::{FormatError, InvalidValue};
 use serde::{Deserialize, Serialize};
 
@@ -102,7 +102,10 @@ impl Recipe {
             None => read_text(path, u64::MAX).map_err(|e| FormatError::io(path, e))?,
         };
         let checked = |recipe: Self| recipe.check().map(|()| recipe).map_err(Vec::from);
-        Mistakes::find(&text, checked).map_err(|mistakes| Error::data(path, mistakes.to_string()))
+        Mistakes::find(&text, checked).map_err(|mistakes| {
+            let other = foreign_toml(&text, "a recipe of a training");
+            Error::data(path, other.unwrap_or_else(|| mistakes.to_string()))
+        })
     }
 
     /// The recipe as TOML, with all defaults.

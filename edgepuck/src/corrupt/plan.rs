@@ -30,7 +30,7 @@ impl Plan {
     pub fn read(file: Option<&Path>) -> anyhow::Result<Self> {
         let checked = |plan: Self| plan.check().map(|()| plan);
         Ok(match file {
-            Some(file) => settings::read(file, checked)?,
+            Some(file) => settings::read(file, "corruptions of sweeps", checked)?,
             None => settings::parse(CORRUPTIONS, Path::new("corruptions.toml"), checked)?,
         })
     }

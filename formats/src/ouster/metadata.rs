@@ -103,6 +103,10 @@ impl Metadata {
             FormatError::malformed(path, "metadata", format!("expected JSON: {cause}"))
         })?;
         let fields = Fields { path, root: &root, is_nested: root.get("beam_intrinsics").is_some() };
+        if root["beam_intrinsics"].is_null() && root["beam_altitude_angles"].is_null() {
+            let cause = "expected those of an Ouster, found JSON without beam_altitude_angles";
+            return Err(FormatError::malformed(path, "metadata", cause));
+        }
         let has_format = root
             .pointer(FORMAT[usize::from(fields.is_nested)])
             .is_some_and(|format| !format.is_null());

@@ -11,6 +11,8 @@ mod object;
 mod sweep;
 mod warning;
 
+#[cfg(feature = "mistakes")]
+pub use foreign::foreign_toml;
 #[cfg(feature = "weights")]
 pub(crate) use foreign::or_foreign;
 #[cfg(any(feature = "files", feature = "pcap", feature = "poses"))]

@@ -151,8 +151,8 @@ pub fn read_effects(file: &Path) -> Result<Effects, ConfigError> {
     struct EffectsFile {
         effects: Effects,
     }
-    let mut effects =
-        settings::read(file, |EffectsFile { effects }| Ok::<_, InvalidValue>(effects))?;
+    let whole = |EffectsFile { effects }| Ok::<_, InvalidValue>(effects);
+    let mut effects = settings::read(file, "effects", whole)?;
     if let Some(weather) = &mut effects.weather {
         weather.empty_beams.get_or_insert(false);
     }

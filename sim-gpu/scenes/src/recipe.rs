@@ -236,7 +236,7 @@ impl Recipe {
     /// # Errors
     /// The file is missing or invalid; the error names the key and the cause.
     pub fn load(file: &Path) -> Result<Self, SceneError> {
-        Ok(settings::read(file, Self::checked)?)
+        Ok(settings::read(file, "a recipe of scenes", Self::checked)?)
     }
 
     /// Parses the recipe `text`. Errors name `file`, which need not exist.

@@ -92,7 +92,7 @@ pub struct SceneSensor {
 impl SceneFile {
     /// Reads a scene and its sensor profiles.
     pub fn load(file: &Path) -> Result<Self, ConfigError> {
-        config::read(file, |table| Self::from_table(table, file))
+        config::read(file, "a scene", |table| Self::from_table(table, file))
     }
 
     /// Parses a scene in `file`, which need not exist; relative paths start from its folder.

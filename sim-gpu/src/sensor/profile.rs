@@ -55,7 +55,7 @@ pub(super) fn parse(text: &str, file: &Path) -> Result<SensorProfile, ConfigErro
 }
 
 pub(super) fn load(file: &Path) -> Result<SensorProfile, ConfigError> {
-    config::read(file, |mut profile: Profile| {
+    config::read(file, "a sensor's profile", |mut profile: Profile| {
         profile.load_table(file)?;
         profile.checked()
     })
