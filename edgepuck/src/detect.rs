@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use formats::atomic;
+use formats::{atomic, counted};
 use infer_cpu::detect::{
     DetectError, Detections, Detector, LEAST_CONFIDENCE, Object, OrientedBox, Sweep,
 };
@@ -99,9 +99,10 @@ pub(crate) fn run(args: &DetectArgs) -> anyhow::Result<Outcome> {
     };
     atomic::write_bytes(&args.out, written)?;
     program::say!(
-        "{} points in {elapsed_ms:.1} ms: {} objects, {n_other} other clusters: {}",
-        scan.len(),
-        objects.len(),
+        "{} in {elapsed_ms:.1} ms: {}, {}: {}",
+        counted(scan.len(), "point"),
+        counted(objects.len(), "object"),
+        counted(*n_other, "other cluster"),
         args.out.display()
     );
     Ok(Outcome::Success)

@@ -15,10 +15,10 @@ use std::time::Instant;
 use anyhow::Context;
 use edgepuck_scenes::{ClusterCounts, LabelledScene, Recipe, Stage, generate};
 use edgepuck_segment::Settings;
-use formats::FormatError;
 use formats::atomic::{self, UnfinishedFolder};
 use formats::hash::{Hashing, of_bytes, of_file};
 use formats::scan_file::{ScanFormat, write_scan};
+use formats::{FormatError, counted};
 use indicatif::{ProgressBar, ProgressStyle};
 use layout::{Layout, Writer};
 use serde_json::{Value, json};
@@ -102,8 +102,8 @@ fn scan_scenes(args: &Args) -> anyhow::Result<Outcome> {
     let out = args.folder();
     let numbers = args.shard.map_or(0..args.sweeps, |shard| shard.part_of(args.sweeps));
     if let Some(Shard { of, .. }) = args.shard.filter(|shard| shard.of > args.sweeps) {
-        let cause =
-            format!("--shard: expected at most {} parts, one a sweep, found {of}", args.sweeps);
+        let most = counted(args.sweeps, "part");
+        let cause = format!("--shard: expected at most {most}, one a sweep, found {of}");
         return Err(Usage(cause).into());
     }
     let mut recipe = Recipe::resolve(&args.recipe)?;
@@ -159,9 +159,9 @@ fn scan_scenes(args: &Args) -> anyhow::Result<Outcome> {
     bar.finish_and_clear();
     let seconds = started.elapsed().as_secs_f64();
     program::say!(
-        "{} sweeps of {} points on average in {seconds:.1} s ({:.1} a second)",
-        numbers.len(),
-        n_points / numbers.len(),
+        "{} of {} on average in {seconds:.1} s ({:.1} a second)",
+        counted(numbers.len(), "sweep"),
+        counted(n_points / numbers.len(), "point"),
         numbers.len() as f64 / seconds
     );
     let is_whole = args.shard.is_none();

@@ -20,11 +20,11 @@ pub fn run(args: &Args) -> anyhow::Result<Outcome> {
     let folders: Vec<PathBuf> = folders.collect();
     if folders.iter().any(|folder| parts::record(folder).exists()) {
         parts::merge(&folders, &args.out)?;
-        program::say!("{} parts: {}", folders.len(), args.out.display());
+        program::say!("{}: {}", formats::counted(folders.len(), "part"), args.out.display());
         return Ok(Outcome::Success);
     }
     let manifest = merge(&folders, &args.out)?;
-    program::say!("{} meshes: {}", manifest.meshes.len(), args.out.display());
+    program::say!("{}: {}", formats::counted(manifest.meshes.len(), "mesh"), args.out.display());
     if manifest.adapters.len() > 1 {
         program::say!(
             "The shards were cast on different adapters ({}): the clean scans equal those of one \

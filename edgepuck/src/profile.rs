@@ -46,7 +46,7 @@ pub fn run(args: &ProfileArgs) -> anyhow::Result<Outcome> {
     }
     if let Some(file) = &args.beams {
         atomic::write_bytes(file, beams(&pattern))?;
-        program::say!("{} beams: {}", pattern.len(), file.display());
+        program::say!("{}: {}", counted(pattern.len(), "beam"), file.display());
     }
     Ok(Outcome::Success)
 }
@@ -58,11 +58,11 @@ fn described(sensor: &SensorProfile, pattern: &BeamPattern) -> String {
         writeln!(text, "{name:<18} {value}").expect("invariant: a string takes all");
     };
     let kind = match &sensor.layout {
-        Layout::Rotating(head) => format!("{} beams on a head that turns", head.beam.len()),
+        Layout::Rotating(head) => counted(head.beam.len(), "beam") + " on a head that turns",
         Layout::Uniform(_) => "regular angles".to_owned(),
         Layout::Grid(grid) => format!("{} x {} pixels", grid.width, grid.height),
         Layout::Risley(risley) => {
-            format!("{} lines behind {} prisms", risley.line.len(), risley.prism.len())
+            counted(risley.line.len(), "line") + " behind " + &counted(risley.prism.len(), "prism")
         }
         Layout::Table(table) => format!("a table of {} directions", table.directions_deg.len()),
     };

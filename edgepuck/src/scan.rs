@@ -7,12 +7,12 @@ use anyhow::{Context, ensure};
 use edgepuck_mesh::MeshFormat;
 use edgepuck_mesh::frame::{Normalize, Unit, Up};
 use edgepuck_mesh::import::Format;
-use formats::atomic;
 use formats::hash::Hashing;
 use formats::plausible::{Warning, mesh_size};
 use formats::scan::Attribute;
 use formats::scan_file::ScanFormat;
 use formats::vlp32c::{self, Returns};
+use formats::{atomic, counted};
 use glam::{DAffine3, DVec3};
 use program::outputs::Overwrite;
 use sim_gpu::effects::Intensity;
@@ -325,8 +325,8 @@ fn summary(scene: &Scene, scan: &Scan) -> String {
     // Noise can move a return behind a sensor that is close to it.
     let behind = (tally.negative > 0).then(|| format!(", {} behind the sensor", tally.negative));
     format!(
-        "{} points ({}{} out of range, {}{} dropped{})",
-        tally.points,
+        "{} ({}{} out of range, {}{} dropped{})",
+        counted(tally.points, "point"),
         of_the_air.unwrap_or_default(),
         tally.out_of_range,
         undetected.unwrap_or_default(),

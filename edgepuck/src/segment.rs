@@ -9,7 +9,7 @@ use formats::atomic::UnfinishedFolder;
 use formats::cloud_file::write_cloud;
 use formats::hash::Hashing;
 use formats::scan::Column;
-use formats::{FormatError, Scan, rows};
+use formats::{FormatError, Scan, counted, rows};
 use program::outputs::Overwrite;
 use std::path::Path;
 use std::time::Instant;
@@ -43,9 +43,9 @@ pub fn run(
     begun.into_iter().for_each(UnfinishedFolder::finish);
     let ground = segmentation.labels().iter().filter(|label| **label == Label::Ground).count();
     program::say!(
-        "{} points in {elapsed_ms:.1} ms: {} clusters, {:.0} % ground: {}",
-        scan.len(),
-        segmentation.clusters().len(),
+        "{} in {elapsed_ms:.1} ms: {}, {:.0} % ground: {}",
+        counted(scan.len(), "point"),
+        counted(segmentation.clusters().len(), "cluster"),
         100.0 * ground as f64 / scan.len().max(1) as f64,
         out.display()
     );

@@ -97,6 +97,7 @@ pub mod webdataset;
 mod archive;
 #[cfg(feature = "pcap")]
 mod capture;
+mod counted;
 #[cfg(feature = "dataset")]
 mod csv;
 #[cfg(feature = "files")]
@@ -116,6 +117,8 @@ mod records;
 
 #[cfg(feature = "pcap")]
 pub use capture::{ChosenSender, Senders};
+#[doc(hidden)]
+pub use counted::counted;
 pub use error::{FormatError, InvalidValue};
 pub use scan::{Attribute, AttributeSet, Scan};
 pub use split::Split;

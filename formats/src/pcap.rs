@@ -22,6 +22,7 @@ use etherparse::{
 use pcap_parser::traits::PcapNGPacketBlock;
 use pcap_parser::{Block, Linktype, PIB_MAGIC, PcapBlockOwned, PcapError, create_reader};
 
+use crate::counted;
 use crate::error::FormatError;
 use crate::plausible::{foreign, or_foreign_file};
 
@@ -124,8 +125,8 @@ impl Display for Counts {
             write!(f, ", beside {} without all fragments", self.incomplete)?;
         }
         if let Some((first, flaw)) = &self.first_unread {
-            let n = self.unread;
-            write!(f, ", beside {n} frames that cannot be read (the first, {first}: {flaw})")?;
+            let frames = counted(self.unread, "frame");
+            write!(f, ", beside {frames} that cannot be read (the first, {first}: {flaw})")?;
         }
         if let Some((first, flaw)) = &self.first_flawed {
             let n = self.flawed;
@@ -145,10 +146,10 @@ pub fn read(
     path: &Path,
     each: impl FnMut(&UdpPacket<'_>) -> ControlFlow<()>,
 ) -> Result<Counts, FormatError> {
-    let file = File::open(path).map_err(|source| match path.to_str() {
     if path.is_dir() {
         return Err(FormatError::malformed(path, "name", "expected a capture, found a folder"));
     }
+    let file = File::open(path).map_err(|source| match path.to_str() {
         Some("-") => {
             let cause = "expected a file, found standard input: write it to a file first";
             FormatError::malformed(path, "name", cause)

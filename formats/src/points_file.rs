@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::cloud_file::{Cloud, CloudFormat, must_be_scan, read_cloud_as};
 use crate::scan_file::read_scan;
-use crate::{ChosenSender, FormatError, Scan, Senders, ouster, pcap, velodyne};
+use crate::{ChosenSender, FormatError, Scan, Senders, counted, ouster, pcap, velodyne};
 
 /// How a file of points is read, beyond what it says itself.
 #[derive(Clone, Debug, Default)]
@@ -93,9 +93,9 @@ impl PointsReader {
 #[must_use]
 pub fn unread_packets(file: &Path, senders: &Senders, counts: &pcap::Counts) -> Vec<String> {
     let missing = (counts.missing > 0)
-        .then(|| format!("{} packets of the turn are probably missing", counts.missing));
+        .then(|| format!("the turn probably lacks {}", counted(counts.missing, "packet")));
     let unread = (counts.unread + counts.flawed > 0)
-        .then(|| format!("{} UDP packets{counts}", counts.packets));
+        .then(|| format!("{}{counts}", counted(counts.packets, "UDP packet")));
     let all = senders.warning().into_iter().chain(missing).chain(unread);
     all.map(|warning| format!("{}: {warning}", file.display())).collect()
 }

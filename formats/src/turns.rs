@@ -110,12 +110,12 @@ pub fn read_turns(
         Ok::<_, PacketError>(ControlFlow::Continue(()))
     })?;
     if head.is_none() {
-        let n = counts.packets;
+        let n = crate::counted(counts.packets, "UDP packet");
         let cause = match metadata {
             Some(_) => format!("expected packets of {size} bytes, as the metadata state"),
             None => "expected packets of a VLP-16 or VLP-32C, or --metadata for an Ouster's".into(),
         };
-        let cause = format!("{cause}, found none among {n} UDP packets{senders}{counts}");
+        let cause = format!("{cause}, found none among {n}{senders}{counts}");
         return Err(FormatError::malformed(path, "packets", cause));
     }
     counts.missing = lost;

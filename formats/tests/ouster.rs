@@ -502,7 +502,7 @@ fn a_capture_without_a_whole_frame_is_named() {
     fragments.truncate(3);
     fragments.remove(1);
     let expected = "packets: expected a whole frame of 25 columns, found 0 at most among \
-                    1 UDP packets, beside 1 without all fragments";
+                    1 UDP packet, beside 1 without all fragments";
     assert_eq!(read(&fragments, &metadata).unwrap_err(), expected);
 }
 

@@ -349,7 +349,7 @@ fn missing_packets_are_counted() {
     assert_eq!(
         read(classic(1, &mixed, 96)).unwrap_err(),
         format!(
-            ": packets: expected a turn of a VLP-16 or VLP-32C, found none among 1 UDP packets, \
+            ": packets: expected a turn of a VLP-16 or VLP-32C, found none among 1 UDP packet, \
              beside 2 frames that cannot be read (the first, 1: {cut})"
         )
     );

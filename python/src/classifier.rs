@@ -70,8 +70,8 @@ impl Classifier {
         let found = found.map_err(raised)?;
         let dropped = (found.n_dropped > 0).then(|| {
             format!(
-                "dropped {} points at 0, 0, 0 or not finite, which are lost returns",
-                found.n_dropped
+                "dropped {} at 0, 0, 0 or not finite: lost returns",
+                formats::counted(found.n_dropped, "point")
             )
         });
         warn(py, dropped.as_slice())?;

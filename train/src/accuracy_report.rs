@@ -15,8 +15,7 @@ pub fn summary(found: &Evaluation, n_classes: usize, data: &Path) -> String {
     };
     // Views of one mesh are often right or wrong together.
     let of = match n_instances < n {
-        true if n_instances == 1 => " of 1 mesh".to_owned(),
-        true => format!(" of {n_instances} meshes"),
+        true => format!(" of {}", formats::counted(n_instances, "mesh")),
         false => String::new(),
     };
     let name = data.file_name().unwrap_or(data.as_os_str()).to_string_lossy();

@@ -3,11 +3,11 @@ use super::{CorruptArgs, Written, ended, remove_former, usage, write_list};
 use crate::Outcome;
 use crate::points::SweepArgs;
 use edgepuck_segment::{Label, Segmenter, Settings, Sweep};
-use formats::Scan;
 use formats::atomic::UnfinishedFolder;
 use formats::hash::Hashing;
 use formats::scan_file::{ScanFormat, write_scan};
 use formats::streams::Stream;
+use formats::{Scan, counted};
 use glam::DVec3;
 use sim_gpu::effects::{Detection, Effects};
 use sim_gpu::glam;
@@ -83,7 +83,7 @@ pub(super) fn run(
              they were recorded: see --sensor, --white and --reflectivity"
         );
     }
-    program::say!("{} scans: {}", written.len(), out.display());
+    program::say!("{}: {}", counted(written.len(), "scan"), out.display());
     Ok(ended(&written))
 }
 

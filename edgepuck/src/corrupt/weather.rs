@@ -4,10 +4,10 @@ use super::{CorruptArgs, usage};
 use crate::flags::{first_given, of_flag};
 use crate::points::SweepArgs;
 use crate::{Outcome, Usage};
-use formats::Scan;
 use formats::hash::Hashing;
 use formats::scan_file::{ScanFormat, write_scan};
 use formats::streams::Stream;
+use formats::{Scan, counted};
 use glam::DVec3;
 use sim_gpu::effects::{Effects, Weather};
 use sim_gpu::glam;
@@ -89,7 +89,7 @@ pub(super) fn run(
     args.brightness.restore(&mut changed);
     write_scan(out, format, Hashing::None, &changed)?;
     report(&fates, &changed);
-    program::say!("{} points: {}", changed.len(), out.display());
+    program::say!("{}: {}", counted(changed.len(), "point"), out.display());
     if changed.is_empty() {
         program::say!("warning: no point is left: expected milder weather, or another --sensor");
         return Ok(Outcome::SomeRefused);

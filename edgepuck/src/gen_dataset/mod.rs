@@ -17,6 +17,7 @@ use edgepuck_dataset::{
     verify,
 };
 use edgepuck_shapes as shapes;
+use formats::counted;
 use formats::hash::Hashing;
 use program::outputs::check_place;
 use settings::Settings;
@@ -198,8 +199,8 @@ fn check(folder: &Path) -> anyhow::Result<Outcome> {
     for problem in &report.problems {
         writeln!(out, "{problem}")?;
     }
-    let (files, problems) = (report.files, report.problems.len());
-    program::say!("{}: {files} files {by}, {problems} problems.", folder.display());
+    let problems = counted(report.problems.len(), "problem");
+    program::say!("{}: {} {by}, {problems}.", folder.display(), counted(report.files, "file"));
     Ok(if report.is_sound() { Outcome::Success } else { Outcome::SomeFailed })
 }
 

@@ -1,4 +1,5 @@
 use edgepuck_dataset::{DatasetFolder, Manifest, Progress};
+use formats::counted;
 use std::path::Path;
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Duration;
@@ -7,19 +8,19 @@ pub fn print(out: &Path, manifest: &Manifest, progress: &Progress, total: Durati
     print_notes(&progress.notes());
     let seconds = total.as_secs_f64();
     program::say!(
-        "{} meshes, {} failed; {} scans, {} points in {seconds:.1} s ({:.1} meshes/s)",
-        manifest.meshes.len(),
+        "{}, {} failed; {}, {} in {seconds:.1} s ({:.1} meshes/s)",
+        counted(manifest.meshes.len(), "mesh"),
         manifest.failures.len(),
-        progress.scans.load(Relaxed),
-        progress.points.load(Relaxed),
+        counted(progress.scans.load(Relaxed), "scan"),
+        counted(progress.points.load(Relaxed), "point"),
         progress.meshes.load(Relaxed) as f64 / seconds,
     );
     for packed in &manifest.packed {
         let left_out = match packed.left_out.len() {
             0 => "0 left out".to_owned(),
-            n => format!("{n} left out for fewer than {} points", manifest.config.min_points),
+            n => format!("{n} left out below --min-points {}", manifest.config.min_points),
         };
-        program::say!("{}: {} clouds, {left_out}", packed.file, packed.clouds);
+        program::say!("{}: {}, {left_out}", packed.file, counted(packed.clouds, "cloud"));
     }
     tell_failures(out, manifest);
     program::say!("Dataset: {}", out.display());

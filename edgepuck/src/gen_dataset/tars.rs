@@ -4,6 +4,7 @@ use super::{report_failures, summary};
 use crate::flags::first_given;
 use crate::{Outcome, shell, signals};
 use edgepuck_dataset::{Cut, HandOver, Plan, Progress, Sample, TarRecord, Tars, make_tars};
+use formats::counted;
 use sim_gpu::Caster;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering::SeqCst};
@@ -56,7 +57,7 @@ pub fn run(
     let tars = Tars {
         cut: Cut { sample: args.sample, clouds_per_tar: args.tar_clouds },
         on_made: &|TarRecord { file, clouds, bytes, .. }| {
-            program::say!("{file}: {clouds} clouds, {} MiB", bytes >> 20);
+            program::say!("{file}: {}, {} MiB", counted(*clouds, "cloud"), bytes >> 20);
         },
         hand_over: hand_over.as_ref().map(|hand_over| hand_over as HandOver),
     };
@@ -69,8 +70,8 @@ pub fn run(
     report_failures(&failures);
     let clouds: u64 = made.tars.iter().map(|tar| tar.clouds).sum();
     let bytes: u64 = made.tars.iter().map(|tar| tar.bytes).sum();
-    let (tars, mib, out) = (made.tars.len(), bytes >> 20, plan.out.display());
-    program::say!("{tars} tars, {clouds} clouds, {mib} MiB: {out}");
+    let (tars, clouds) = (counted(made.tars.len(), "tar"), counted(clouds, "cloud"));
+    program::say!("{tars}, {clouds}, {} MiB: {}", bytes >> 20, plan.out.display());
     Ok(if failures.is_empty() { Outcome::Success } else { Outcome::SomeRefused })
 }
 

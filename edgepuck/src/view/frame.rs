@@ -9,7 +9,7 @@ use formats::geometry::{OrientedBox, Pose, Trajectory};
 use formats::plausible::{bounds, mesh_size, unit_of_scanned};
 use formats::trajectory::check_cover;
 use formats::unit::Unit;
-use formats::{FormatError, Scan};
+use formats::{Scan, counted};
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 use std::path::{Path, PathBuf};
@@ -200,13 +200,12 @@ impl Pane {
     pub fn summary(&self) -> String {
         let sum = |of: fn(&Frame) -> usize| self.frames.iter().map(of).sum::<usize>();
         let all = [
-            (sum(Frame::n_points), ["point", "points"]),
-            (sum(|frame| frame.meshes.len()), ["mesh", "meshes"]),
-            (sum(|frame| frame.boxes.len()), ["box", "boxes"]),
+            (sum(Frame::n_points), "point"),
+            (sum(|frame| frame.meshes.len()), "mesh"),
+            (sum(|frame| frame.boxes.len()), "box"),
         ];
-        let all = all.iter().filter(|(n, _)| *n > 0);
-        let counts: Vec<_> =
-            all.map(|(n, words)| format!("{n} {}", words[usize::from(*n > 1)])).collect();
+        let all = all.into_iter().filter(|(n, _)| *n > 0);
+        let counts: Vec<_> = all.map(|(n, noun)| counted(n, noun)).collect();
         match self.frames.len() {
             1 => counts.join(", "),
             n => format!("{} in {n} frames", counts.join(", ")),

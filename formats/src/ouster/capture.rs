@@ -40,10 +40,9 @@ pub fn read_frame(
         })
     })?;
     if most < expected {
-        let n = counts.packets;
+        let n = crate::counted(counts.packets, "UDP packet");
         let cause = format!(
-            "expected a whole frame of {expected} columns, found {most} at most among {n} UDP \
-             packets{senders}{counts}"
+            "expected a whole frame of {expected} columns, found {most} at most among {n}{senders}{counts}"
         );
         return Err(FormatError::malformed(path, "packets", cause));
     }

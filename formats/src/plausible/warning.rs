@@ -2,6 +2,7 @@
 
 use std::fmt::Display;
 
+use crate::counted;
 use crate::unit::Unit;
 
 /// Why an input is probably not what its user meant, or what of it is not used.
@@ -125,8 +126,9 @@ pub enum Warning {
     OneMeshAClass(usize),
     /// So many meshes in folders called `val` and the like are used for training.
     #[error(
-        "{0} meshes in folders for validation are in the train split: training holds out its own \
-         clouds for validation"
+        "the train split has {} of folders for validation: training holds out its own clouds for \
+         validation",
+        counted(*.0, "mesh")
     )]
     Validation(usize),
     /// Files that probably hold meshes are of formats that are not read.

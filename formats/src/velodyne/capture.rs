@@ -61,10 +61,9 @@ pub fn read_turn(path: &Path, senders: &mut Senders) -> Result<(Scan, Counts), F
             None => "none".to_owned(),
             Some(_) => format!("{:.1} degrees of one", turn.end().max(0.0) * AZIMUTH_UNIT_DEG),
         };
-        let n = counts.packets;
+        let n = crate::counted(counts.packets, "UDP packet");
         let cause = format!(
-            "expected a turn of a VLP-16 or VLP-32C, found {found} among {n} UDP \
-             packets{senders}{counts}"
+            "expected a turn of a VLP-16 or VLP-32C, found {found} among {n}{senders}{counts}"
         );
         return Err(FormatError::malformed(path, "packets", cause));
     }

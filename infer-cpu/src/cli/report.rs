@@ -87,7 +87,7 @@ fn warn(name: &Path, prediction: &Prediction, precision: Precision) {
     let warn = |what: &str| say(format!("warning: {}: {what}", name.display()));
     match prediction.n_dropped {
         0 => {}
-        n => warn(&format!("dropped {n} points at 0, 0, 0 or not finite, which are lost returns")),
+        n => warn(&format!("dropped {} at 0, 0, 0 or not finite", formats::counted(n, "point"))),
     }
     if prediction.n_clipped > 0 {
         let n = prediction.n_clipped;

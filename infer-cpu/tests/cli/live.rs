@@ -347,13 +347,13 @@ fn systemd_is_notified_of_ready_alive_and_stopping() {
     let sent: Vec<_> = sent.collect();
     let [ready, alive, .., stopping] = &sent[..] else { panic!("{sent:?}") };
     assert_eq!(ready, "READY=1\nSTATUS=Waiting for packets\n");
-    assert_eq!(alive, "WATCHDOG=1\nSTATUS=1 packets, 0 objects\n");
+    assert_eq!(alive, "WATCHDOG=1\nSTATUS=1 packet, 0 objects\n");
     assert_eq!(stopping, "STOPPING=1\n");
     // Half of the watchdog's time passes between two messages, and without a watchdog 5 s.
     assert!(sent.len() < 10, "{sent:?}");
     assert!(live(&socket, "none").status.success());
     let sent: Vec<_> = std::iter::from_fn(next).collect();
-    assert_eq!(sent[1], b"STATUS=1 packets, 0 objects\n");
+    assert_eq!(sent[1], b"STATUS=1 packet, 0 objects\n");
     let failed = live(Path::new("/nowhere/notify"), "10000000");
     let error = String::from_utf8_lossy(&failed.stderr);
     assert!(!failed.status.success() && error.contains("sending to NOTIFY_SOCKET"), "{error}");

@@ -12,7 +12,7 @@ use crate::tars::{PartManifest, RootManifest, Sample, root_file};
 use crate::verify::is_unfinished;
 use formats::hash::Hashing;
 use formats::scan::{ColumnSlot, Scan};
-use formats::{Split, atomic};
+use formats::{Split, atomic, counted};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -83,9 +83,10 @@ impl Facts {
     fn from_tars(out: &Path) -> Result<Self, DatasetError> {
         let manifest = root_file(out);
         let RootManifest { version, config, cut, classes, parts, .. } = read_json(&manifest)?;
-        let (form, what) = match cut.sample {
-            Sample::Clouds => ("clouds", format!("clouds of {} points", config.packed_points)),
-            Sample::Scan => ("scan", "scans".to_owned()),
+        let of_points = || format!(" of {}", counted(config.packed_points, "point"));
+        let (form, noun, of) = match cut.sample {
+            Sample::Clouds => ("clouds", "cloud", of_points()),
+            Sample::Scan => ("scan", "scan", String::new()),
         };
         let mut all = Vec::new();
         for part in &parts {
@@ -97,7 +98,8 @@ impl Facts {
             let own = all.iter().filter(|tar| tar.file.starts_with(split.name()));
             let (n, samples) = own.fold((0, 0), |(n, sum), tar| (n + 1, sum + tar.clouds));
             if n > 0 {
-                rows.push(format!("| {n} tars `{split}-*.tar` | {samples} {what} |"));
+                let (n, samples) = (counted(n, "tar"), counted(samples, noun));
+                rows.push(format!("| {n} `{split}-*.tar` | {samples}{of} |"));
                 tars.push(json!({"split": split.name(), "path": format!("{split}-*.tar")}));
             }
         }
@@ -117,10 +119,11 @@ impl Facts {
         let count = scans.map(|scan| scan.variants.len() as u64).sum();
         let (version, config) = (manifest.version, manifest.config);
         let packed = manifest.packed.iter().map(|it| {
-            format!("| `{}` | {} clouds of {} points |", it.file, it.clouds, config.packed_points)
+            let points = counted(config.packed_points, "point");
+            format!("| `{}` | {} of {points} |", it.file, counted(it.clouds, "cloud"))
         });
         let files = scan_patterns(&config).join("`, `");
-        let scans = format!("| `{files}` | {count} scans, in metres, z upwards |");
+        let scans = format!("| `{files}` | {}, in metres, z upwards |", counted(count, "scan"));
         let rows = packed.chain([scans]).collect();
         let (form, tars, manifest) = ("files", Vec::new(), folder.manifest_file());
         Ok(Self { version, config, classes, form, count, tars, rows, manifest })
@@ -146,11 +149,11 @@ fn values(publication: &Publication, facts: &Facts) -> Result<Value, DatasetErro
     let tars = json!([{"config_name": "default", "data_files": facts.tars}]).to_string();
     let sets = &facts.config.sets;
     let of: Vec<&str> = sets.iter().map(|set| set.sensor.name()).collect();
-    let noun = if facts.form == "clouds" { "point clouds" } else { "scans" };
+    let noun = if facts.form == "clouds" { "point cloud" } else { "scan" };
     let summary = format!(
-        "{} {noun} of meshes of {} classes, simulated by Edgepuck {} for the sensor {}.",
-        facts.count,
-        facts.classes.len(),
+        "{} of meshes of {}, simulated by Edgepuck {} for the sensor {}.",
+        counted(facts.count, noun),
+        counted(facts.classes.len(), "class"),
         facts.version,
         of.join(" and ")
     );
@@ -197,10 +200,10 @@ fn sensor(set: &SetConfig) -> String {
     let between =
         |from: f64, to: Option<f64>| to.map_or(format!("{from}"), |to| format!("{from} to {to}"));
     let views = match &set.viewpoints {
-        Viewpoints::Poses(poses) => format!("{} given poses", poses.len()),
+        Viewpoints::Poses(poses) => counted(poses.len(), "given pose"),
         Viewpoints::Views(views) => format!(
-            "{} views of each mesh, at {} m and an elevation of {} degrees",
-            views.count,
+            "{} of each mesh, at {} m and an elevation of {} degrees",
+            counted(views.count, "view"),
             between(views.distance_m, views.distance_to_m),
             between(views.elevation_deg, views.elevation_to_deg),
         ),

@@ -703,8 +703,8 @@ mod tests {
         };
         let sound = ["a/train/1.off", "a/test/2.off", "b/train/1.off", "b/test/2.obj"];
         let lack = "split the meshes otherwise";
-        let held = "2 meshes in folders for validation are in the train split: training holds out \
-                    its own clouds for validation";
+        let held = "the train split has 2 meshes of folders for validation: training holds out its \
+                    own clouds for validation";
         let cases: [(&[&str], &[&str]); 7] = [
             (&sound, &[]),
             (&sound[..1], &["no mesh is in the test split", lack]),

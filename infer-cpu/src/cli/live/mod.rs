@@ -16,7 +16,7 @@ use crate::{Classifier, Error, Options, Precision};
 use formats::ouster::Metadata;
 use formats::plausible::sensor_motion;
 use formats::trajectory::check_cover;
-use formats::{ChosenSender, FormatError};
+use formats::{ChosenSender, FormatError, counted};
 use program::outputs::need_extension;
 use signal_hook::consts::{SIGINT, SIGTERM};
 
@@ -174,36 +174,35 @@ pub fn run(args: &LiveArgs) -> anyhow::Result<Outcome> {
         report::print(&pipeline, &read);
     }
     read.error.take().map_or(Ok(()), Err)?;
+    let (here, of_all) = (args.capture(), counted(read.n_packets, "UDP packet"));
     if !args.stats && read.capture.first_unread.is_some() {
-        program::say!("warning: {}{} UDP packets{}", args.capture(), read.n_packets, read.capture);
+        program::say!("warning: {here}{of_all}{}", read.capture);
     }
     let Counts { packets, lost, duplicated, late, points, clusters, .. } = *pipeline.counts();
     if args.pcap.is_some() && !args.stats && packets > 0 && clusters == 0 {
         program::say!(
-            "warning: {}no object was found among {points} points of {packets} packets: expected a whole \
-             turn of the sensor or more, and clusters of {} points or more (--min-points)",
-            args.capture(),
-            args.min_points
+            "warning: {here}no object was found among {} of {}: expected a whole turn of the sensor or \
+             more, and clusters of {} or more (--min-points)",
+            counted(points, "point"),
+            counted(packets, "packet"),
+            counted(args.min_points, "point")
         );
     }
     // Single repeated and late packets are usual in networks.
     if duplicated + late > packets {
         program::say!(
-            "warning: {}expected packets in the order of the sensor's stamps, found {duplicated} with a \
-             stamp again and {late} with an earlier one, which were not used",
-            args.capture()
+            "warning: {here}expected packets in the order of the sensor's stamps, found {duplicated} with \
+             a stamp again and {late} with an earlier one, which were not used"
         );
     }
     if !args.stats && lost > 0 {
-        let of = packets + lost;
-        program::say!("warning: {}{lost} of {of} packets are probably missing", args.capture());
+        let of = counted(packets + lost, "packet");
+        program::say!("warning: {here}probably missing: {lost} of {of}");
     }
     if packets == 0 {
         let cause = format!(
-            "{}expected packets of {}, found none among {} UDP packets{}{}",
-            args.capture(),
+            "{here}expected packets of {}, found none among {of_all}{}{}",
             if args.metadata.is_some() { "the Ouster" } else { "a VLP-16 or VLP-32C" },
-            read.n_packets,
             read.senders,
             read.capture
         );

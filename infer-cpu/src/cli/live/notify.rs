@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use crate::live::Counts;
 use anyhow::Context;
+use formats::counted;
 
 /// The interval of status messages without a watchdog.
 const STATUS_PERIOD: Duration = Duration::from_secs(5);
@@ -37,7 +38,8 @@ impl Notifier {
         let Counts { packets, clusters, .. } = counts;
         let sign = if self.watchdog.is_some() { "WATCHDOG=1\n" } else { "" };
         // If this fails, the next packet tries again.
-        if send(&format!("{sign}STATUS={packets} packets, {clusters} objects")).is_ok() {
+        let (packets, objects) = (counted(*packets, "packet"), counted(*clusters, "object"));
+        if send(&format!("{sign}STATUS={packets}, {objects}")).is_ok() {
             // sd_watchdog_enabled(3) recommends half of the time.
             self.due = Some(now + self.watchdog.map_or(STATUS_PERIOD, |time| time / 2));
         }

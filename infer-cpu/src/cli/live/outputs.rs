@@ -59,8 +59,9 @@ impl Outputs {
             return Err(failure.into());
         }
         if let Some((file, n_turns @ 1..)) = self.recorder_failure.map_or(recorded, Err)? {
-            let n_objects = pipeline.counts().clusters;
-            program::say!("{}: {n_turns} turns, {n_objects} boxes of objects", file.display());
+            let turns = formats::counted(n_turns, "turn");
+            let boxes = formats::counted(pipeline.counts().clusters, "box");
+            program::say!("{}: {turns}, {boxes} of objects", file.display());
         }
         Ok(())
     }

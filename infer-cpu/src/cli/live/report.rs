@@ -1,6 +1,7 @@
 //! The report of `--stats`.
 
 use crate::live::{Pipeline, Stage};
+use formats::counted;
 
 use super::source::Read;
 
@@ -27,13 +28,12 @@ pub fn print(pipeline: &Pipeline, read: &Read) {
     }
     let [points, clusters] = stats.per_turn();
     program::say!(
-        "{} turns of {points:.0} points and {clusters:.1} clusters on average",
-        stats.n_turns()
+        "{} of {points:.0} points and {clusters:.1} clusters on average",
+        counted(stats.n_turns(), "turn")
     );
     program::say!(
-        "{} packets{}; {} lost, {} late, {} duplicate, {} foreign, {} from other addresses, {} overrun, \
-         {} restarts",
-        counts.packets,
+        "{}{}; {} lost, {} late, {} duplicate, {} foreign, {} from other addresses, {} overrun, {}",
+        counted(counts.packets, "packet"),
         read.capture,
         counts.lost,
         counts.late,
@@ -41,12 +41,12 @@ pub fn print(pipeline: &Pipeline, read: &Read) {
         counts.foreign,
         read.senders.n_dropped(),
         read.n_overrun,
-        counts.restarts
+        counted(counts.restarts, "restart")
     );
     program::say!(
-        "{} points dropped, {} clusters too small for a class",
-        counts.dropped_points,
-        counts.unclassified
+        "{} dropped, {} too small for a class",
+        counted(counts.dropped_points, "point"),
+        counted(counts.unclassified, "cluster")
     );
     if let Some([now, most]) = resident_mib() {
         program::say!("{now:.1} MiB resident, {most:.1} MiB at most");
