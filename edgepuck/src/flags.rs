@@ -1,8 +1,11 @@
 //! Checks and parsers for flags of several commands.
 
 use crate::Usage;
+use formats::{FormatError, hash};
 use sim_gpu::errors::InvalidValue;
-use std::path::Path;
+use sim_gpu::sensors::SensorProfile;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
 
 /// The first of these flags that was given.
 pub fn first_given(flags: &[(bool, &'static str)]) -> Option<&'static str> {
@@ -28,6 +31,24 @@ const FLAGS: [(&str, &str); 11] = [
 pub fn of_flag(InvalidValue { key, cause }: InvalidValue) -> Usage {
     let flag = FLAGS.iter().find(|(beginning, _)| key.starts_with(beginning));
     Usage(format!("{}: {cause}", flag.map_or(&*key, |(_, flag)| flag)))
+}
+
+/// That one of several `files` has the same bytes as one before it.
+pub fn copy_among(files: &[PathBuf]) -> Result<Option<String>, FormatError> {
+    let mut known = HashMap::new();
+    for file in files.iter().filter(|_| files.len() > 1) {
+        let name = file.display();
+        let key = if file.is_file() { hash::of_file(file)? } else { name.to_string() };
+        if let Some(first) = known.insert(key, name) {
+            return Ok(Some(format!("{}: it has the same bytes as {first}", file.display())));
+        }
+    }
+    Ok(None)
+}
+
+/// Prints which numbers of a sensor's profile are odd.
+pub fn warn_of_sensor(sensor: &SensorProfile) {
+    sensor.warnings().iter().for_each(|warning| program::say!("warning: {warning}"));
 }
 
 /// The folder of a dataset, which may be named by its manifest.

@@ -1,5 +1,6 @@
 use crate::Outcome;
-use formats::atomic;
+use crate::flags::warn_of_sensor;
+use formats::{atomic, counted};
 use glam::DVec3;
 use program::outputs::{Overwrite, need_extension};
 use program::significant_digits::digits;
@@ -41,7 +42,8 @@ pub fn run(args: &ProfileArgs) -> anyhow::Result<Outcome> {
     let sensor = SensorProfile::resolve(name)?;
     let pattern = sensor.pattern();
     out.write_all(described(&sensor, &pattern).as_bytes())?;
-    for oddity in oddities(&sensor, &pattern) {
+    warn_of_sensor(&sensor);
+    for oddity in oddities(&sensor, pattern.len()) {
         program::say!("warning: {oddity}");
     }
     if let Some(file) = &args.beams {
@@ -108,61 +110,16 @@ fn described(sensor: &SensorProfile, pattern: &BeamPattern) -> String {
     text
 }
 
-/// Numbers beyond those of the sensors on the market, which are probably in another unit: 5 to 100
-/// revolutions a second, 3 m of blindness, 10 km of range, 3 cm of noise, 0.5 degrees of divergence, 1.5 cm of
-/// quantum, 300 firings a revolution (SENSORS.md).
-fn slips(sensor: &SensorProfile, n_rays: usize) -> impl Iterator<Item = String> {
-    let odd = |is_odd: bool, key: &str, found: f64, unit: &str| {
-        is_odd.then(|| format!("{key} = {found}: is it in {unit}?"))
-    };
-    let range = &sensor.range;
-    let mut found = vec![odd(range.min_m > 30.0, "range.min_m", range.min_m, "metres")];
-    found.push(odd(range.max_m > 10_000.0, "range.max_m", range.max_m, "metres"));
-    let quantum_m = range.quantum_m.unwrap_or_default();
-    found.push(odd(quantum_m > 0.1, "range.quantum_m", quantum_m, "metres"));
-    let sigma_m = sensor.noise.map_or(0.0, |noise| noise.typical_sigma_m);
-    found.push(odd(sigma_m > 0.5, "noise.typical_sigma_m", sigma_m, "metres"));
-    let widest_deg = sensor.footprint.map_or(0.0, |shape| shape.divergence_deg[0]);
-    found.push(odd(widest_deg > 2.0, "footprint.divergence_deg", widest_deg, "degrees"));
+/// What else is probably a mistake in a valid profile.
+fn oddities(sensor: &SensorProfile, n_rays: usize) -> Vec<String> {
+    let few = || format!("a scan has only {}", counted(n_rays, "ray"));
+    let mut found: Vec<String> = (n_rays < 100).then(few).into_iter().collect();
     if let Layout::Uniform(raster) = &sensor.layout
         && (raster.azimuth_to_deg - raster.azimuth_from_deg).rem_euclid(360.0) == 0.0
         && raster.azimuth_steps > 1
     {
         let cause = "uniform: the first and the last azimuth are the same direction";
-        found.push(Some(cause.to_owned()));
-    }
-    if let Layout::Rotating(head) = &sensor.layout {
-        let is_odd = !(60.0..=6_000.0).contains(&head.rpm);
-        found.push(odd(is_odd, "rotating.rpm", head.rpm, "revolutions a minute"));
-        let firings = 60e6 / head.rpm / head.sequence_us;
-        let is_odd = firings < 30.0;
-        found.push(odd(is_odd, "rotating.sequence_us", head.sequence_us, "microseconds"));
-    }
-    let few = || format!("a scan has only {n_rays} rays");
-    found.into_iter().flatten().chain((n_rays < 100).then(few))
-}
-
-/// Warnings about values of a valid profile that are probably mistakes.
-fn oddities(sensor: &SensorProfile, pattern: &BeamPattern) -> Vec<String> {
-    let mut found: Vec<String> = slips(sensor, pattern.directions.len()).collect();
-    let [lowest, highest] = ends(pattern.directions.iter().map(elevation_deg));
-    // No elevation in radians exceeds a quarter turn.
-    let largest = std::f64::consts::FRAC_PI_2;
-    if pattern.ring.iter().any(|&ring| ring > 0) && lowest >= -largest && highest <= largest {
-        found.push(format!(
-            "all elevations lie within {lowest:.3} to {highest:.3} degrees: are they in radians?"
-        ));
-    }
-    let [first, last] =
-        ends(pattern.directions.iter().map(|at| libm::atan2(at.y, at.x).to_degrees()));
-    let turn = std::f64::consts::PI;
-    if (0.95 * turn..=turn).contains(&last)
-        && first >= -turn
-        && matches!(sensor.layout, Layout::Table(_))
-    {
-        found.push(format!(
-            "all azimuths lie within {first:.3} to {last:.3} degrees: are they in radians?"
-        ));
+        found.push(cause.to_owned());
     }
     if let Some(limit) = sensor.detection
         && limit.power() * sensor.range.max_m.powi(2) > 1.0 + 1e-9

@@ -231,6 +231,9 @@ fn scene_of_meshes(args: &Args) -> anyhow::Result<Scene> {
     if scene.attributes.contains(&Attribute::Intensity) {
         scene.effects.intensity.get_or_insert(Intensity);
     }
+    if let Some(copy) = flags::copy_among(&args.inputs)? {
+        program::say!("warning: {copy}, and stands where that does: each hides the other");
+    }
     let mut extents = Vec::new();
     for file in &args.inputs {
         let extent = add_input(&mut scene, args, file)?;
@@ -256,6 +259,7 @@ fn scene_of_meshes(args: &Args) -> anyhow::Result<Scene> {
         }
     }
     let sensor = Sensor::resolve(args.meshes.sensor.as_deref().unwrap_or("vlp32c"))?;
+    flags::warn_of_sensor(sensor.profile());
     scene.mount(sensor.name(), &sensor, pose);
     Ok(scene)
 }

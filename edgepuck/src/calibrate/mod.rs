@@ -9,15 +9,15 @@ mod quantum;
 mod report;
 mod turning;
 
-use std::collections::HashMap;
 use std::io::Write;
 use std::path::PathBuf;
 
 use anyhow::{bail, ensure};
-use formats::{atomic, hash};
+use formats::atomic;
 use program::outputs::{Overwrite, need_extension};
 use sim_gpu::sensors::{Layout, Rotating, SensorProfile, TypicalNoise};
 
+use crate::flags::{copy_among, warn_of_sensor};
 use crate::points::PointsArgs;
 use crate::{Outcome, Usage};
 use estimate::rounded;
@@ -61,6 +61,7 @@ pub fn run(args: &CalibrateArgs) -> anyhow::Result<Outcome> {
     need_extension("--out", &args.out, &["toml"])?;
     args.overwrite.check([&*args.out])?;
     let named = args.sensor.as_deref().map(SensorProfile::resolve).transpose()?;
+    named.iter().for_each(warn_of_sensor);
     let recording = firings::read(&args.inputs, &args.points)?;
     let base = match named {
         Some(base) => base,
@@ -69,7 +70,12 @@ pub fn run(args: &CalibrateArgs) -> anyhow::Result<Outcome> {
     let Layout::Rotating(head) = &base.layout else {
         bail!(Usage(format!("--sensor: expected a head that turns, found {}", base.name)));
     };
-    check_copies(&args.inputs)?;
+    // Of a recording twice, the noise would seem smaller.
+    if let Some(copy) = copy_among(&args.inputs)? {
+        bail!(Usage(format!(
+            "{copy}; expected other turns in each file: give each recording once"
+        )));
+    }
     let name = match &args.inputs[..] {
         [one] => one.display().to_string(),
         [first, .., last] => format!("{} to {}", first.display(), last.display()),
@@ -127,19 +133,6 @@ pub fn run(args: &CalibrateArgs) -> anyhow::Result<Outcome> {
     }
     program::say!("profile from {} turns: {}", recording.n_turns, args.out.display());
     Ok(Outcome::Success)
-}
-
-/// That no two files are the same recording, whose noise would then seem smaller.
-fn check_copies(files: &[PathBuf]) -> anyhow::Result<()> {
-    let mut known = HashMap::new();
-    for file in files {
-        if let Some(first) = known.insert(hash::of_file(file)?, file) {
-            let [first, file] = [first, file].map(|it| it.display());
-            let cause = "expected other turns in each file: give each recording once";
-            bail!(Usage(format!("{file}: it has the same bytes as {first}; {cause}")));
-        }
-    }
-    Ok(())
 }
 
 /// Those of several captures that are not at rest by themselves.

@@ -5,14 +5,14 @@ mod sweep;
 mod weather;
 
 use crate::brightness::BrightnessArgs;
-use crate::flags::first_given;
+use crate::flags::{first_given, warn_of_sensor};
 use crate::points::{PlaceArgs, SweepArgs};
 use crate::{Outcome, Usage};
 use anyhow::Context;
 use formats::cloud_file::CloudFormat;
 use plan::{Entry, Plan};
 use program::outputs::Overwrite;
-use sim_gpu::Sensor;
+use sim_gpu::sensors::SensorProfile;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -88,8 +88,8 @@ pub fn run(args: &CorruptArgs) -> anyhow::Result<Outcome> {
         return Err(usage(format!("--out {}: {cause}", out.display())).into());
     }
     args.overwrite.check_folder(out)?;
-    let sensor = Sensor::resolve(&args.sensor)?;
-    sweep::run(args, &input, out, &plan, sensor.profile())
+    let sensor = SensorProfile::resolve(&args.sensor).inspect(warn_of_sensor)?;
+    sweep::run(args, &input, out, &plan, &sensor)
 }
 
 /// Adds weather to a sweep, as `flag` asks.
@@ -103,8 +103,8 @@ fn in_weather(args: &CorruptArgs, flag: &str) -> anyhow::Result<Outcome> {
         return Err(usage(format!("expected {flag} or {other}, found both")).into());
     }
     let input = sweep_of(args)?;
-    let sensor = Sensor::resolve(&args.sensor)?;
-    weather::run(args, &input, sensor.profile())
+    let sensor = SensorProfile::resolve(&args.sensor).inspect(warn_of_sensor)?;
+    weather::run(args, &input, &sensor)
 }
 
 /// The sweep to corrupt, which is not a folder.

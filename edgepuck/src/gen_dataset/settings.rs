@@ -1,6 +1,6 @@
 use super::usage;
 use crate::effect_flags::EffectFlags;
-use crate::flags::{of_flag, probability};
+use crate::flags::{of_flag, probability, warn_of_sensor};
 use edgepuck_dataset::{
     Around, DatasetConfig, Hashing, Layout, Normalize, Returns, ScanFormat, SetConfig, Unit, Up,
     Viewpoints,
@@ -166,6 +166,7 @@ impl Settings {
                     .map_err(of_flag)?,
             ],
         };
+        sets.iter().for_each(|set| warn_of_sensor(set.sensor.profile()));
         if let Some(file) = &self.poses {
             let poses = load_poses(file)?;
             sets.iter_mut().for_each(|set| set.viewpoints = Viewpoints::Poses(poses.clone()));

@@ -11,6 +11,7 @@ pub mod preview;
 mod recording;
 mod scene;
 
+use crate::flags::copy_among;
 use crate::points::PointsArgs;
 use crate::{Outcome, Usage};
 use anyhow::{bail, ensure};
@@ -85,6 +86,9 @@ pub fn panes(
     truth: Option<&Path>,
     read: impl Fn(&Path) -> anyhow::Result<Content>,
 ) -> anyhow::Result<Vec<Pane>> {
+    if let Some(copy) = copy_among(files)? {
+        program::say!("warning: {copy}, and shows the same");
+    }
     let (mut panes, mut boxes) = (Vec::<Pane>::new(), Vec::new());
     for file in files {
         let n = panes.len();

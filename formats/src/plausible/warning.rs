@@ -108,6 +108,12 @@ pub enum Warning {
         /// That of the effect, metres.
         found_m: f64,
     },
+    /// A number of a sensor's profile, which is called by its key, is probably not in this unit.
+    #[error("{0} = {1}: is it in {2}?")]
+    NumberOfSensor(&'static str, f64, &'static str),
+    /// All angles of this kind in a sensor's profile are within these bounds, degrees.
+    #[error("all {0} lie within {low:.3} to {high:.3} degrees: are they in radians?", low = .1[0], high = .1[1])]
+    AnglesOfSensor(&'static str, [f64; 2]),
     /// A sensor stands inside the bounding box of a mesh; the string says what places it elsewhere.
     #[error("a sensor stands inside its bounding box: expected {0}")]
     SensorInside(String),

@@ -81,6 +81,7 @@ impl Stage {
             sensors.push(StageSensor { sensor, caster: caster.for_effects(&effects)? });
         }
         let mut user_files = UserFiles::default();
+        user_files.warnings.extend(sensors.iter().flat_map(|it| it.sensor.profile().warnings()));
         let models = recipe.object.iter().map(|objects| match objects.built_in() {
             Some(_) => Ok((0..recipe.variants).map(|_| OnceLock::new()).collect()),
             None => user_models(objects, meshes, seed, &mut user_files),
@@ -90,7 +91,7 @@ impl Stage {
         Ok(Self { classes, recipe, seed, sensors, models, user_files })
     }
 
-    /// What is probably wrong with the files of the user's meshes.
+    /// What is probably wrong with the sensors and with the files of the user's meshes.
     #[must_use]
     pub fn warnings(&self) -> &[Warning] {
         &self.user_files.warnings

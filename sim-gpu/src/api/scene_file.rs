@@ -28,6 +28,7 @@ impl TryFrom<&SceneFile> for Scene {
             let warnings = motion.iter().flat_map(|it| motion_of(&what, kind == "sensor", it));
             scene.warnings.extend(warnings);
         }
+        scene.warnings.extend(file.sensors.iter().flat_map(|it| it.sensor.warnings()));
         let sensor_m = |it: &SceneSensor| match &it.motion {
             Some(motion) => motion.at(it.start_s).position_m,
             None => it.pose.position_m,

@@ -32,6 +32,7 @@ mod footprint;
 mod grid;
 mod ouster;
 mod pattern;
+mod plausible;
 mod profile;
 mod risley;
 mod rotating;
