@@ -12,6 +12,8 @@ use formats::unit::Unit;
 use formats::{Scan, counted};
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
+use sim_gpu::glam::DVec3;
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use crate::Usage;
@@ -136,7 +138,7 @@ impl Pane {
     /// it is one. Returns whether there is such a frame.
     pub fn lay_over(&mut self, under: &Self) -> bool {
         let Some(Frame { meshes, origin, .. }) = under.frames.first() else { return false };
-        let mut found = None;
+        let (mut found, mut share) = (None, 0.0);
         let from =
             |at: &[f32; 3], origin: [f64; 3]| [0, 1, 2].map(|i| f64::from(at[i]) + origin[i]);
         let vertices = meshes.iter().flat_map(|mesh| &mesh.position);
@@ -156,10 +158,19 @@ impl Pane {
             };
             frame.meshes.extend(meshes.iter().map(moved));
             found = Some(unit);
+            share = share_on(&frame.meshes, &scan.positions).max(share);
         }
+        let (mesh, scan) = (&under.name, &self.name);
         if let Some(unit) = found.filter(|unit| *unit != Unit::Metre) {
-            let (mesh, scan) = (&under.name, &self.name);
             program::say!("{mesh} is drawn in {}: so it fits {scan}, its scan", unit.plural());
+        }
+        // There may be a ground.
+        if share < 0.5 && self.frames.iter().any(|frame| frame.n_points() > 0) {
+            program::say!(
+                "warning: {scan} is probably not a scan of {mesh}, in any unit: of its points near the mesh, \
+                 {:.0} % are on the surface",
+                100.0 * share
+            );
         }
         found.is_some()
     }
@@ -232,9 +243,16 @@ impl Pane {
         let of_sweep = boxes.iter().find_map(|placed| placed.sweep.clone()).unwrap_or_default();
         let is_named = |frame: &Frame| Path::new(&frame.name).ends_with(&of_sweep);
         let one_is_named = !of_sweep.is_empty() && self.frames.iter().any(is_named);
+        let (file, name) = (file.display(), &self.name);
         if !one_is_named && !of_sweep.is_empty() && of_sweep != self.name && has_points {
-            let (file, name) = (file.display(), &self.name);
             program::say!("warning: {file}: expected boxes of {name}, found boxes of {of_sweep}");
+        }
+        let is_stray = |placed: &Placed| {
+            let mut turns = (0..).zip(&self.frames).map(|(n, frame)| frame.turn.unwrap_or(n));
+            placed.turn.is_some_and(|turn| turns.all(|other| other != turn))
+        };
+        if !boxes.is_empty() && boxes.iter().all(is_stray) {
+            program::say!("warning: {file}: expected boxes of {name}, found those of other turns");
         }
         for (number, frame) in (0..).zip(&mut self.frames) {
             if one_is_named && !is_named(frame) {
@@ -274,8 +292,12 @@ impl Pane {
             }
             let lack = || format!("{file}: expected `time_s` or `last_s` of each box, found none");
             let time_s = placed.time_s.with_context(lack)?;
-            check_cover(motion.known_s(), [time_s; 2])
-                .map_err(|cause| FormatError::malformed(&self.poses, "times", cause))?;
+            let (name, [first, last]) = (&self.name, motion.known_s());
+            ensure!(
+                check_cover([first, last], [time_s; 2]).is_ok(),
+                "{file}: expected boxes of {name}, whose poses in {poses} are from {first:.3} s to {last:.3} s, \
+                 found one at {time_s:.3} s: is it of another drive or clock?"
+            );
             let pose = motion.at(time_s);
             Ok(Placed { place: placed.place.seen_from(&pose), seen_from: Some(pose), ..placed })
         });
@@ -331,6 +353,31 @@ impl Frame {
         let at = scan.sensor_position_m();
         [0, 1, 2].map(|axis| at[axis] - scan.origin[axis])
     }
+}
+
+/// The share of the `points` in the bounding box of `meshes` that are within a twentieth of its size of their
+/// surfaces.
+fn share_on(meshes: &[Mesh], points: &[[f32; 3]]) -> f64 {
+    let wide = |at: &[f32; 3]| DVec3::from(at.map(f64::from));
+    let vertices = meshes.iter().flat_map(|mesh| &mesh.position);
+    let [low, high] = bounds(vertices.map(|at| at.map(f64::from))).map(DVec3::from);
+    let step_m = 0.05 * (high - low).max_element();
+    let cell = |at: DVec3| (at / step_m).floor().as_ivec3();
+    let mut surface = HashSet::new();
+    for (mesh, corners) in meshes.iter().flat_map(|it| it.index.iter().map(move |at| (it, at))) {
+        let [a, b, c] = corners.map(|i| wide(&mesh.position[i as usize]));
+        let n = (2.0 * (b - a).length().max((c - a).length()) / step_m).ceil().max(1.0) as u32;
+        for (i, j) in (0..=n).flat_map(|i| (0..=n - i).map(move |j| (i, j))) {
+            let [along, across] = [i, j].map(|k| f64::from(k) / f64::from(n));
+            surface.insert(cell(a + along * (b - a) + across * (c - a)));
+        }
+    }
+    let is_near = |at: &DVec3| at.cmpge(low - step_m).all() && at.cmple(high + step_m).all();
+    let near: Vec<DVec3> = points.iter().map(wide).filter(is_near).collect();
+    // Of the eight cells that are nearest.
+    let aside = |k: u8| step_m * (DVec3::from([k & 1, k >> 1 & 1, k >> 2].map(f64::from)) - 0.5);
+    let is_on = |at: &&DVec3| (0..8).any(|k| surface.contains(&cell(**at + aside(k))));
+    near.iter().filter(is_on).count() as f64 / near.len().max(1) as f64
 }
 
 /// A sensor at the origin, which looks along x.

@@ -93,7 +93,13 @@ pub fn panes(
     for file in files {
         let n = panes.len();
         match read(file)? {
-            Content::Frames(frames) => panes.push(Pane::new(n, file, frames)),
+            Content::Frames(frames) => {
+                panes.push(Pane::new(n, file, frames));
+                if files.len() > 1 && panes[n].is_empty() {
+                    let file = file.display();
+                    program::say!("warning: {file}: nothing is there: no point, mesh or box");
+                }
+            }
             // Before the first pane, they belong to it.
             Content::Boxes(found) => boxes.push((n.max(1) - 1, file, found)),
         }

@@ -37,6 +37,9 @@ fn of_scene(scene: &Scene) -> anyhow::Result<Frame> {
     let caster = Caster::cpu();
     let scan = |number| scene.scan_mounted(number).with(&caster).run();
     let scans = (0..scene.sensors.len()).map(scan).collect::<Result<Vec<_>, _>>()?;
+    if !scans.is_empty() && scans.iter().all(|scan| scan.is_empty()) {
+        program::say!("warning: no beam of a sensor returned a point");
+    }
     let origin = scans.first().map_or_else(|| origin_of(&scene), |scan| scan.origin);
     let meshes = scene.instances().iter().map(|instance| mesh(instance, origin)).collect();
     let sensors = scene.sensors.iter().zip(&scans).map(|(mounted, scan)| {
