@@ -48,12 +48,7 @@ pub fn judge_object(points: &[[f64; 3]], sensor: [f64; 3]) -> Result<Option<Unli
         let finite = points.iter().filter(is_known);
         finite.map(|point| [0, 1, 2].map(|i| point[i] - sensor[i]))
     };
-    let (mut n, mut low, mut high) = (0, [f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for point in counted() {
-        n += 1;
-        (low, high) =
-            ([0, 1, 2].map(|i| low[i].min(point[i])), [0, 1, 2].map(|i| high[i].max(point[i])));
-    }
+    let (n, [low, high]) = (counted().count(), bounds(counted()));
     if n > 0 && low == high {
         let place = [0, 1, 2].map(|i| low[i] + sensor[i]);
         return Err(format!("expected points of an object, found {n} in one place, {place:?}"));

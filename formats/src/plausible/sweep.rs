@@ -7,7 +7,7 @@ use std::path::Path;
 #[cfg(feature = "poses")]
 use glam::{DMat3, DVec3};
 
-use super::Warning;
+use super::{Warning, bounds};
 use crate::error::FormatError;
 
 /// Beyond the range of every sensor on the ground, metres.
@@ -57,7 +57,6 @@ pub fn judge_sweep(
     remedy: &str,
 ) -> Result<Option<Warning>, (String, String)> {
     let (mut nearest, mut farthest) = (f64::INFINITY, 0.0);
-    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     let points = points.into_iter();
     for (i, point) in points.clone().enumerate() {
         let finite = point.iter().filter(|x| x.is_finite()).count();
@@ -74,14 +73,13 @@ pub fn judge_sweep(
         let range = length(point);
         if range > 0.0 {
             (nearest, farthest) = (range.min(nearest), range.max(farthest));
-            (low, high) =
-                ([0, 1, 2].map(|i| low[i].min(point[i])), [0, 1, 2].map(|i| high[i].max(point[i])));
         }
     }
     if farthest == 0.0 {
         let cause = "expected metres from the sensor, found no point with a position";
         return Err(("points".into(), cause.into()));
     }
+    let [low, high] = bounds(points.clone().filter(|point| length(*point) > 0.0));
     let is_aside = (0..2).any(|axis| low[axis] > 0.0 || high[axis] < 0.0);
     Ok(if !EXPECTED_M.contains(&farthest) {
         Some(Warning::FarthestPoint(farthest))
@@ -106,25 +104,24 @@ pub fn judge_surroundings(
     if returns.len() < 100 {
         return Some(Warning::FewPoints(returns.len()));
     }
-    let (low, high) =
-        returns.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), at| {
-            (low.min(*at), high.max(*at))
-        });
+    let [low, high] = bounds(returns.iter().map(DVec3::to_array)).map(DVec3::from_array);
     let is_aside = low.x > 0.0 || low.y > 0.0 || high.x < 0.0 || high.y < 0.0;
     if is_aside && (high - low).length() < LONGEST_OBJECT_M {
         return Some(Warning::OneObject((high - low).to_array()));
     }
-    match ground_m(&returns) {
-        None => other_axis(),
-        Some(ground_m) if (-30.0..-0.15).contains(&ground_m) => None,
-        Some(ground_m) => Some(Warning::GroundAt(ground_m)),
+    let Some(ground) = ground(&returns) else { return other_axis() };
+    let slope_deg = libm::atan(ground.truncate().length()).to_degrees();
+    // Streets rise by less, and vehicles stand along them.
+    if slope_deg > 12.0 {
+        return Some(Warning::TiltedGround(slope_deg));
     }
+    (!(-30.0..-0.15).contains(&ground.z)).then_some(Warning::GroundAt(ground.z))
 }
 
-/// The height of the ground at the origin, metres: of a plane through the lowest points of most places near it,
-/// if more is above than below.
+/// The plane of the ground, z = a x + b y + c: through the lowest points of most places near the origin, if more
+/// is above than below.
 #[cfg(feature = "poses")]
-fn ground_m(returns: &[DVec3]) -> Option<f64> {
+fn ground(returns: &[DVec3]) -> Option<DVec3> {
     let near = || returns.iter().filter(|at| at.truncate().length() < 12.0);
     let mut places = BTreeMap::new();
     for at in near() {
@@ -151,7 +148,7 @@ fn ground_m(returns: &[DVec3]) -> Option<f64> {
     }
     let over = near().filter(|at| above(plane, at) > 0.5).count();
     let under = near().filter(|at| above(plane, at) < -0.5).count();
-    (2 * lowest.len() > n && over >= 4 * under).then_some(plane.z)
+    (2 * lowest.len() > n && over >= 4 * under).then_some(plane)
 }
 
 /// The unit of angles, if the columns of `points`, between `low` and `high`, are probably a range and two
@@ -272,6 +269,12 @@ mod tests {
             let found = judge(&street(ground_m).collect::<Vec<_>>()).map(|it| it.to_string());
             assert_eq!(found.is_some(), expected.is_some(), "{ground_m}: {found:?}");
             assert!(found.unwrap_or_default().starts_with(expected.unwrap_or_default()));
+        }
+        for tilt_deg in [15.0f32, 20.0, 45.0] {
+            let (sin, cos) = tilt_deg.to_radians().sin_cos();
+            let tilted = street(-1.73).map(|[x, y, z]| [cos * x + sin * z, y, cos * z - sin * x]);
+            let found = judge(&tilted.collect::<Vec<_>>());
+            assert!(matches!(found, Some(Warning::TiltedGround(_))), "{tilt_deg}: {found:?}");
         }
         let on_its_head: Vec<_> = street(-1.73).map(|[x, y, z]| [x, -y, -z]).collect();
         assert_eq!(judge(&on_its_head), Some(Warning::OnePose), "no ground was found");

@@ -182,6 +182,9 @@ pub enum Warning {
          vehicle's, or that of a map? --origin gives the sensor's position"
     )]
     GroundAt(f64),
+    /// The ground of a sweep rises by this angle, degrees.
+    #[error("the ground rises by {0:.0} degrees: is the sensor tilted? Turn the points upright")]
+    TiltedGround(f64),
     /// The columns of a sweep look like a range and two angles in this unit.
     #[error(
         "the columns are within the bounds of a range, an azimuth and an elevation in {0}: expected \
