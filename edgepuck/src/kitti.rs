@@ -189,24 +189,5 @@ mod tests {
             label("garden chair", [-10.0, 0.0, 0.0], Some(&camera)),
             "garden_chair -1 -1 1.57 -1.00 -1.00 -1.00 -1.00 1.00 2.00 4.00 0.00 0.50 -10.00 -1.57"
         );
-        for (valid, other, expected) in [
-            ("180", "x", "P2: expected a line of 12 finite numbers, found 6"),
-            ("P2: 700", "P2: 0", "P2: expected a projection: focal lengths above 0, a last row of"),
-            ("0 0 1 0\nR0", "0 0 0 0\nR0", "P2: expected a projection"),
-            ("1 0 0 0 1 0 0 0 1", "0 0 0 0 0 0 0 0 0", "R0_rect: expected a rotation: rows of"),
-            ("0 -1 0 0 0 0 -1 0 1", "0 1 0 0 0 0 -1 0 1", "Tr_velo_to_cam: expected a rotation"),
-            ("0 -1 0 0 0 0 -1 0 1 0 0 0", "1 0 0 0 0 1 0 0 0 0 1 0", "looks along the LiDAR's z"),
-            (
-                "0 0 -1 0 1 0 0 0",
-                "0 0 -1 -76 1 0 0 -272",
-                "found 282.4 m: is the fourth column in metres",
-            ),
-        ] {
-            let changed = CALIBRATION.replace(valid, other);
-            assert_ne!(changed, CALIBRATION);
-            std::fs::write(&file, changed).unwrap();
-            let error = Camera::read(&file).err().unwrap().to_string();
-            assert!(error.contains(expected), "{error}");
-        }
     }
 }

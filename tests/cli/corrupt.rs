@@ -117,17 +117,3 @@ fn intensities_stay_in_the_numbers_of_the_file() {
         assert!(expected.contains(&found), "{file}: {found} of {}", most(&sweep));
     }
 }
-
-#[test]
-fn corruptions_that_lose_all_points_leave_nothing_half_made() {
-    let folder = Folder::new();
-    folder.write("cloud.xyz", "5 0 0\n9 1 0\n");
-    let own = "[[sweep]]\nname = \"gone\"\nby = \"all is lost\"\n\
-               severity = [{ dirty-window = { transmission = 0 } }]\n";
-    folder.write("own.toml", own);
-    folder.exits(3, "corrupt cloud.xyz --reflectivity 1 --plan own.toml --out out");
-    assert!(folder.scan("out/gone-1.npz").is_empty());
-    let said = folder.exits(3, "corrupt cloud.xyz --only motion-blur");
-    assert!(said.contains("0 scans: data/corrupted\nwarning: nothing is left"), "{said}");
-    assert!(!folder.at("data/corrupted").exists());
-}

@@ -114,7 +114,4 @@ fn a_sensor_moves_evenly_where_its_effects_say_so() {
         moved != **content
     });
     assert_eq!(differ.count(), scans.len(), "all views are seen while the sensor moves");
-    folder.write("fast.toml", "[effects]\nmotion = { velocity_m_s = [0, 1e4, 0] }\n");
-    let said = folder.exits(1, "gen-dataset meshes --out bad --effects fast.toml");
-    assert!(said.contains("effects.motion.velocity_m_s[1]: expected a number within"), "{said}");
 }

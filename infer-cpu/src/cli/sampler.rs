@@ -84,17 +84,4 @@ mod tests {
             SamplerArgs::default().apply(Some(SamplerKind::Random), trained.clone()).unwrap();
         assert_eq!(random, SamplerSpec { kind: SamplerKind::Random, ..trained });
     }
-
-    #[test]
-    fn flags_of_other_samplers_are_refused() {
-        let points = SamplerArgs { points: Some(32), ..SamplerArgs::default() };
-        let error = points.apply(None, SamplerSpec::default()).unwrap_err().to_string();
-        assert_eq!(
-            error,
-            "--points does not apply to the sampler all; it applies to first, random, fps, cpl"
-        );
-        let front = SamplerArgs { front: Some(FrontChoice::Own), ..SamplerArgs::default() };
-        assert!(front.apply(Some(SamplerKind::Fps), SamplerSpec::default()).is_err());
-        assert!(front.apply(Some(SamplerKind::Cpl), SamplerSpec::default()).is_ok());
-    }
 }

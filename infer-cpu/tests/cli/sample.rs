@@ -47,12 +47,3 @@ fn the_same_seed_gives_the_same_bytes() {
     assert_eq!(bytes(1), bytes(1));
     assert_ne!(bytes(1), bytes(2));
 }
-
-#[test]
-fn points_that_are_not_finite_are_dropped_if_asked() {
-    let folder = Folder::new();
-    folder.write("nan.xyz", "0 0 0\nnan 1 2\n1 1 1\n");
-    let ran = folder.run("sample --drop-invalid --sampler fps --points 2 nan.xyz out.xyz");
-    assert_eq!(ran.out, "out.xyz: 2 of 2 points\n");
-    assert_eq!(ran.err, "nan.xyz: dropped 1 of 3 points\n");
-}
