@@ -296,7 +296,7 @@ impl Pane {
             ensure!(
                 check_cover([first, last], [time_s; 2]).is_ok(),
                 "{file}: expected boxes of {name}, whose poses in {poses} are from {first:.3} s to {last:.3} s, \
-                 found one at {time_s:.3} s: is it of another drive or clock?"
+                 found one at {time_s:.3} s: are the boxes or the poses of another drive?"
             );
             let pose = motion.at(time_s);
             Ok(Placed { place: placed.place.seen_from(&pose), seen_from: Some(pose), ..placed })
