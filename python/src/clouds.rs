@@ -155,7 +155,7 @@ impl Clouds {
         if index < n {
             return Ok(());
         }
-        let cause = format!("expected the number of one of {n} clouds, found {index}");
+        let cause = format!("expected a number below {n}, that of the clouds, found {index}");
         Err(pyo3::exceptions::PyIndexError::new_err(cause))
     }
 }

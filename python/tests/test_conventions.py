@@ -240,7 +240,7 @@ def test_lost_returns_are_dropped_and_counted(shapes: Path, lost: float) -> None
     classify = ep.Classifier("shapes-rotational-64")
     expected = classify(cloud)
     for n in (1, 500):
-        with pytest.warns(UserWarning, match=f"dropped {n} points at 0, 0, 0 or not finite"):
+        with pytest.warns(UserWarning, match=f"dropped {n} points? at 0, 0, 0 or not finite"):
             found = classify(np.vstack([np.full((n, 3), lost, np.float32), cloud]))
         np.testing.assert_array_equal(found.logits, expected.logits)
     sweep = ep.Scenes("street", seed=1)[0].scan
