@@ -185,6 +185,13 @@ fn a_sensor_that_sends_a_sector_sees_what_is_in_it_and_loses_nothing() {
             let turns: BTreeSet<_> = objects.iter().map(|object| object.turn).collect();
             assert!(turns.iter().copied().eq(0..turns.len() as u64), "{name}: {turns:?}");
             assert!((29..=31).contains(&turns.len()), "{name}: {turns:?}");
+            // Behind the first, turns begin where the sector does.
+            let width_s = f64::from((to + 36_000 - from) % 36_000) * 0.1 / 36_000.0;
+            let is_of_two = |pair: &[Object]| {
+                let [turn, next] = [pair[0].turn, pair[1].turn];
+                turn > 0 && turn == next && pair[1].last_s - pair[0].last_s > width_s
+            };
+            assert!(!objects.windows(2).any(is_of_two), "{name}");
             let is_inside = |object: &&Object| {
                 let azimuth_deg = (-object.position_m[1]).atan2(object.position_m[0]).to_degrees();
                 let after_deg =
