@@ -229,6 +229,8 @@ def test_a_message_of_ros_has_its_fields() -> None:
     np.testing.assert_array_equal(packed["normal_z"], scan.normal[:, 2])
     assert repr(message).startswith(f"<PointCloud2 of {len(scan)} points: x, y, z, intensity")
     assert SENSOR.scan(ep.Mesh(*BOX), attributes=[]).to_pointcloud2().point_step == 12
+    away = np.frombuffer(ep.Scan(np.zeros((1, 3), np.float32), origin=[500, 0, 2]).to_pointcloud2().data, "<f4")
+    assert away.tolist() == [500, 0, 2]
     with pytest.raises(ep.Error, match="stamp: expected seconds since 1970, found -1"):
         scan.to_pointcloud2(stamp=-1)
 

@@ -143,6 +143,10 @@ mod tests {
         });
         let room: Vec<_> = room.collect();
         assert_eq!(judge_object(&room, [5.0, 5.0, 1.5]), Ok(Some(Unlike::Sweep)));
+        // A sector of 60 degrees may be a wall.
+        let in_sector = (0..room.len()).filter(|i| i % 1800 < 300);
+        let sector: Vec<_> = in_sector.map(|i| room[i]).collect();
+        assert_eq!(judge_object(&sector, [5.0, 5.0, 1.5]), Ok(None));
         let walls =
             (0..120).flat_map(|step| (0..60).map(move |up| (f64::from(step), f64::from(up))));
         let walls = walls.flat_map(|(along, up)| {
