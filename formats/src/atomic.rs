@@ -253,7 +253,11 @@ pub fn write_bytes(path: &Path, bytes: impl AsRef<[u8]>) -> Result<(), FormatErr
     write(path, |writer| writer.write_all(bytes.as_ref()))
 }
 
-pub(crate) fn make_folder_of(path: &Path) -> Result<&Path, FormatError> {
+/// Makes the missing folders of the file at `path`, and returns its own: none after [`abandon`].
+///
+/// # Errors
+/// A folder that cannot be made.
+pub fn make_folder_of(path: &Path) -> Result<&Path, FormatError> {
     let _unfinished = unfinished();
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,

@@ -161,9 +161,7 @@ fn link_scans(part: &Shard, out: &Path) -> Result<(), DatasetError> {
 
 /// Makes `to` the same file as `from`, or else a copy of it.
 pub fn link(from: &Path, to: &Path) -> Result<(), DatasetError> {
-    if let Some(folder) = to.parent() {
-        fs::create_dir_all(folder).map_err(|error| DatasetError::io(folder, error))?;
-    }
+    atomic::make_folder_of(to)?;
     if fs::hard_link(from, to).is_ok() {
         return Ok(());
     }

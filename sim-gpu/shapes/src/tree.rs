@@ -1,4 +1,3 @@
-use std::fs;
 use std::path::Path;
 
 use rayon::prelude::*;
@@ -28,7 +27,6 @@ pub fn write_tree(
     for class in ShapeClass::ALL {
         for (split, first, count) in splits {
             let folder = out.join(class.name()).join(split);
-            fs::create_dir_all(&folder).map_err(|source| FormatError::io(&folder, source))?;
             for instance in first..first.saturating_add(count) {
                 let name = format!("{class}_{:04}.off", u64::from(instance) + 1);
                 jobs.push((class, instance, folder.join(name)));
@@ -45,6 +43,7 @@ pub fn write_tree(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
 
     fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
         let mut files: Vec<_> = fs::read_dir(folder)

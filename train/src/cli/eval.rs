@@ -32,9 +32,8 @@ Both are files of detect, live, gen-scenes or gen-scenes --drive (its truth), of
 nuScenes' results; or folders of such files with the same names.")]
 pub struct EvalArgs {
     /// The model file, or the name of a bundled model
-    #[arg(long, value_name = "MODEL", required_unless_present = "detections", default_value = "")]
-    #[arg(hide_default_value = true)]
-    model: PathBuf,
+    #[arg(long, value_name = "MODEL", required_unless_present = "detections")]
+    model: Option<PathBuf>,
     /// Labelled clouds: a packed NPZ file, NPZ files of clusters (repeat the flag), or data with a
     /// test part in any form that `train --data` accepts
     #[arg(long, value_name = "PATH", required_unless_present = "detections")]
@@ -69,6 +68,12 @@ pub struct EvalArgs {
     min_points: Option<usize>,
 }
 
+impl EvalArgs {
+    fn model(&self) -> &Path {
+        self.model.as_deref().expect("invariant: only with --detections there is none")
+    }
+}
+
 pub fn run(args: &EvalArgs) -> anyhow::Result<()> {
     args.csv.iter().try_for_each(|file| need_extension("--csv", file, &["csv"]))?;
     args.svg.iter().try_for_each(|file| need_extension("--svg", file, &["svg"]))?;
@@ -83,7 +88,7 @@ pub fn run(args: &EvalArgs) -> anyhow::Result<()> {
         return Err(Usage(format!("--data: expected each file once, found {twice} twice")).into());
     }
     let (card, names, unsuited) = {
-        let classifier = Classifier::load(&args.model, &options(args))?;
+        let classifier = Classifier::load(args.model(), &options(args))?;
         let names: Vec<String> = classifier.classes().iter().map(ToString::to_string).collect();
         (classifier.card().clone(), names, classifier.unsuited_to_clusters())
     };
@@ -95,7 +100,7 @@ pub fn run(args: &EvalArgs) -> anyhow::Result<()> {
         range_m.is_some() || sensor.is_some() || ids.is_some()
     };
     if let Some(warning) = unsuited.filter(|_| clouds.iter().any(has_remarks)) {
-        program::say!("warning: {}: {warning}", args.model.display());
+        program::say!("warning: {}: {warning}", args.model().display());
     }
     match (&args.data[..], &clouds[..]) {
         ([data], [clouds]) if !is_asked && !has_remarks(clouds) => {
@@ -130,7 +135,7 @@ fn report_clouds(
 ) -> anyhow::Result<()> {
     let n_classes = clouds.classes.len();
     number_as_in_model(args, data, &mut clouds, names)?;
-    let found = evaluate(&args.model, &clouds, &options(args))?;
+    let found = evaluate(args.model(), &clouds, &options(args))?;
     super::print(&accuracy_report::summary(&found, n_classes, data))?;
     if let Some(path) = &args.csv {
         atomic::write_bytes(path, accuracy_report::to_csv(&found, names))?;
@@ -159,7 +164,7 @@ fn number_as_in_model(
                 "{}: expected classes of {}, found {class}: rename it in the file's `classes`, or give \
                  --min-points 1, which counts it as a negative",
                 data.display(),
-                args.model.display()
+                args.model().display()
             );
         };
         *label = number;
@@ -179,7 +184,7 @@ fn report_objects(
     let mut objects = Vec::new();
     for (path, clouds) in args.data.iter().zip(clouds) {
         let name = path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy();
-        objects.extend(classified(&args.model, &name, clouds, (&labels, least), &options(args))?);
+        objects.extend(classified(args.model(), &name, clouds, (&labels, least), &options(args))?);
     }
     ensure!(!objects.is_empty(), "expected objects, found none of --min-points {least} or more");
     let table = Table::new(&objects, &labels, args.tracks);

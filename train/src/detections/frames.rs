@@ -54,6 +54,8 @@ pub struct Thing {
     pub n_points: Option<u64>,
     /// The number of its track, if it has one.
     pub track: Option<u64>,
+    /// The distance from the sensor, metres, if the place is in its frame.
+    pub range_m: Option<f64>,
 }
 
 /// Detections and labelled objects of the same frames.
@@ -190,7 +192,9 @@ fn thing(one: &Placed, classes: &mut Vec<String>) -> Thing {
         }
     });
     let Placed { place, n_points, track, .. } = *one;
-    Thing { class, place, score: one.score.unwrap_or(1.0), n_points, track }
+    let [x, y, _] = place.centre_m;
+    let range_m = (!one.in_world).then(|| libm::hypot(x, y));
+    Thing { class, place, score: one.score.unwrap_or(1.0), n_points, track, range_m }
 }
 
 impl Frames {

@@ -13,8 +13,8 @@ pub struct Asked {
     pub class: usize,
     /// The class by which it was found: its own, another one, or none.
     pub answer: Option<usize>,
-    /// Its distance from the origin, metres, where that is the sensor's.
-    pub range_m: f64,
+    /// Its distance from the sensor, metres, if it is known.
+    pub range_m: Option<f64>,
     pub n_points: Option<u64>,
 }
 
@@ -66,8 +66,7 @@ pub fn judge(frames: &Frames, least_score: f64, min_points: u64) -> Judged {
         }
         for (one, answer) in labelled.iter().zip(answers) {
             if let Some(class) = one.class.filter(|_| is_asked(one, min_points)) {
-                let [x, y, _] = one.place.centre_m;
-                let (range_m, n_points) = (libm::hypot(x, y), one.n_points);
+                let Thing { range_m, n_points, .. } = *one;
                 judged.asked.push(Asked { class, answer, range_m, n_points });
             }
         }
@@ -97,7 +96,7 @@ mod tests {
     fn thing(class: Option<usize>, x: f64, score: f64, n_points: u64) -> Thing {
         let size_m = if class == Some(CAR) { [4.0, 2.0, 1.5] } else { [0.6, 0.6, 1.8] };
         let place = OrientedBox { centre_m: [x, 0.0, score], size_m, yaw_rad: 0.0 };
-        Thing { class, place, score, n_points: Some(n_points), track: None }
+        Thing { class, place, score, n_points: Some(n_points), track: None, range_m: None }
     }
 
     fn judged(found: Vec<Thing>, labelled: Vec<Thing>) -> Judged {

@@ -13,6 +13,18 @@ use super::tracks::followed;
 const RANGES_M: [f64; 5] = [0.0, 10.0, 20.0, 30.0, 40.0];
 const POINTS: [u64; 5] = [0, 30, 60, 150, 500];
 
+/// The classes of streets, which `detect` looks for.
+const STREET: [&str; 5] = ["bus", "car", "person", "truck", "two-wheeler"];
+
+/// The classes that are reported, with their names: those of streets and those that were detected. Of the
+/// others, such as buildings, nothing is looked for.
+fn reported(frames: &Frames) -> Vec<(usize, &str)> {
+    let is_found =
+        |class| frames.of.iter().any(|[found, _]| found.iter().any(|one| one.class == Some(class)));
+    let names = frames.classes.iter().map(String::as_str).enumerate();
+    names.filter(|(class, name)| STREET.contains(name) || is_found(*class)).collect()
+}
+
 /// The report on `frames`, for detections of `least_score` or more and objects of `min_points` or more.
 pub fn table(frames: &Frames, least_score: f64, min_points: u64) -> String {
     let judged = judge(frames, least_score, min_points);
@@ -21,7 +33,7 @@ pub fn table(frames: &Frames, least_score: f64, min_points: u64) -> String {
         "{:14} {:>14} {:>17} {:>6} {:>8} {:>6} {:>6} {:>6} {:>6}\n",
         "class", "found", "95 % interval, %", "false", "a frame", "AP 0.5", "1 m", "2 m", "4 m"
     );
-    for (class, name) in frames.classes.iter().enumerate() {
+    for (class, name) in reported(frames) {
         let asked: Vec<&Asked> = judged.asked.iter().filter(|one| one.class == class).collect();
         let n_wrong = judged.wrong.iter().filter(|one| one.class == class).count();
         let (share, interval) = found(&asked);
@@ -45,21 +57,26 @@ pub fn table(frames: &Frames, least_score: f64, min_points: u64) -> String {
 fn found(asked: &[&Asked]) -> (String, String) {
     let n = asked.iter().filter(|one| one.answer == Some(one.class)).count();
     let (low, high) = if asked.is_empty() { (0.0, 1.0) } else { wilson(n, asked.len()) };
-    (format!("{n} of {}", asked.len()), format!("{:.1} to {:.1}", 100.0 * low, 100.0 * high))
+    (
+        format!("{n} of {}", asked.len()),
+        format!("{:.1} to {:.1}", 100.0 * low.max(0.0), 100.0 * high),
+    )
 }
 
 /// What objects were taken for.
 fn confusion(frames: &Frames, asked: &[Asked]) -> String {
     let mut text = "\nobjects of (row) that were called (column)\n".to_owned();
     let _ = write!(text, "{:14}", "");
-    frames.classes.iter().for_each(|name| _ = write!(text, " {name:>12}"));
+    reported(frames).iter().for_each(|(_, name)| _ = write!(text, " {name:>12}"));
     text += "   none\n";
-    for (class, name) in frames.classes.iter().enumerate() {
+    for (class, name) in reported(frames) {
         let n = |answer: Option<usize>| {
             asked.iter().filter(|one| one.class == class && one.answer == answer).count()
         };
         let _ = write!(text, "{name:14}");
-        (0..frames.classes.len()).for_each(|answer| _ = write!(text, " {:12}", n(Some(answer))));
+        reported(frames)
+            .iter()
+            .for_each(|&(answer, _)| _ = write!(text, " {:12}", n(Some(answer))));
         let _ = writeln!(text, " {:6}", n(None));
     }
     text
@@ -68,10 +85,11 @@ fn confusion(frames: &Frames, asked: &[Asked]) -> String {
 /// The shares that are found by range and by number of points.
 fn bins(frames: &Frames, asked: &[Asked]) -> String {
     let mut text = String::new();
+    let shown = reported(frames);
     let mut push = |title: String, is_in: &dyn Fn(&Asked) -> bool| {
         let mut row = format!("{title:22}");
         let of: Vec<&Asked> = asked.iter().filter(|one| is_in(one)).collect();
-        for class in 0..frames.classes.len() {
+        for &(class, _) in &shown {
             let of_class: Vec<&Asked> =
                 of.iter().copied().filter(|one| one.class == class).collect();
             let _ = write!(row, " {:>13}", found(&of_class).0);
@@ -82,7 +100,12 @@ fn bins(frames: &Frames, asked: &[Asked]) -> String {
     };
     for (i, &from_m) in RANGES_M.iter().enumerate() {
         let to_m = RANGES_M.get(i + 1).copied().unwrap_or(f64::INFINITY);
-        push(format!("{from_m} to {to_m} m"), &|one| (from_m..to_m).contains(&one.range_m));
+        let title = if to_m.is_infinite() {
+            format!("{from_m} m or more")
+        } else {
+            format!("{from_m} to {to_m} m")
+        };
+        push(title, &|one| one.range_m.is_some_and(|range_m| (from_m..to_m).contains(&range_m)));
     }
     for (i, &from) in POINTS.iter().enumerate() {
         let to = POINTS.get(i + 1).copied().unwrap_or(u64::MAX);
@@ -94,14 +117,14 @@ fn bins(frames: &Frames, asked: &[Asked]) -> String {
         push(title, &|one| one.n_points.is_some_and(|n| (from..to).contains(&n)));
     }
     let mut head = format!("\n{:22}", "found");
-    frames.classes.iter().for_each(|name| _ = write!(head, " {name:>13}"));
+    shown.iter().for_each(|(_, name)| _ = write!(head, " {name:>13}"));
     head + "\n" + &text
 }
 
 /// The metrics of tracks, if there are any.
 fn tracks(frames: &Frames, min_points: u64) -> String {
     let mut text = String::new();
-    for (class, name) in frames.classes.iter().enumerate() {
+    for (class, name) in reported(frames) {
         if let Some(of) = followed(frames, class, min_points) {
             let [hota, detection, association] =
                 [of.hota, of.detection, of.association].map(|share| 100.0 * share);
@@ -133,7 +156,7 @@ pub fn to_svg(frames: &Frames, min_points: u64) -> String {
             SIDE - at + 4.0
         );
     }
-    for (class, name) in frames.classes.iter().enumerate() {
+    for (class, name) in reported(frames) {
         let colour = COLOURS[class % COLOURS.len()];
         let curve = OfClass::of(frames, class, min_points).curve(2.0);
         let points: Vec<String> =

@@ -26,7 +26,7 @@ pub struct Followed {
 }
 
 /// How well the tracks of `class` follow its objects of `min_points` or more; `None` without numbers of
-/// tracks or objects.
+/// tracks and of objects, or without tracks.
 pub fn followed(frames: &Frames, class: usize, min_points: u64) -> Option<Followed> {
     let turns: Vec<Turn> =
         frames.of.iter().map(|of| Turn::of(of, class, min_points)).collect::<Option<_>>()?;
@@ -47,7 +47,7 @@ pub fn followed(frames: &Frames, class: usize, min_points: u64) -> Option<Follow
     let of_alphas: Vec<[f64; 2]> = matched.iter().map(|one| one.accuracies(&counts)).collect();
     let mean =
         |of: &dyn Fn(&[f64; 2]) -> f64| of_alphas.iter().map(of).sum::<f64>() / N_ALPHAS as f64;
-    let has_any = !counts.objects.is_empty() || !counts.tracks.is_empty();
+    let has_any = !counts.tracks.is_empty();
     has_any.then(|| Followed {
         hota: mean(&|[detection, association]| (detection * association).sqrt()),
         detection: mean(&|[detection, _]| *detection),
@@ -172,8 +172,8 @@ impl Matched {
         let union = |(object, track): &(u64, u64), n: f64| {
             counts.objects[object] + counts.tracks[track] - n
         };
-        let association: f64 =
-            self.pairs.iter().map(|(pair, &n)| n * n / union(pair, n).max(1.0)).sum();
+        let of_pairs = self.pairs.iter().map(|(pair, &n)| n * n / union(pair, n).max(1.0));
+        let association = of_pairs.fold(0.0, |sum, share| sum + share);
         let all = self.n_objects + self.n_tracks - self.n;
         [self.n / all.max(1.0), association / self.n.max(1.0)]
     }
