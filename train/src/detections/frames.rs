@@ -134,13 +134,14 @@ fn by_frame(
     labelled: Vec<Placed>,
     classes: &mut Vec<String>,
 ) -> Vec<[Vec<Thing>; 2]> {
+    // In the order of turns, which tells switches of tracks.
     let key = |one: &Placed| match one.turn {
-        Some(turn) => turn.to_string(),
-        None if one.in_world => one.sweep.clone().unwrap_or_default(),
+        Some(turn) => (turn, String::new()),
+        None if one.in_world => (0, one.sweep.clone().unwrap_or_default()),
         // A file of one sweep.
-        None => String::new(),
+        None => (0, String::new()),
     };
-    let mut frames: BTreeMap<String, [Vec<Thing>; 2]> = BTreeMap::new();
+    let mut frames: BTreeMap<(u64, String), [Vec<Thing>; 2]> = BTreeMap::new();
     for one in &labelled {
         frames.entry(key(one)).or_default()[1].push(thing(one, classes));
     }
@@ -150,7 +151,7 @@ fn by_frame(
         let (own, one) = match one.turn.is_none().then_some(one.time_s).flatten() {
             None => (key(&one), one),
             Some(time_s) => match nearest(&one, time_s, &labelled) {
-                None => ("no turn".to_owned(), one),
+                None => ((u64::MAX, String::new()), one),
                 Some(there) => (key(there), at_time_of(one, there, time_s)),
             },
         };

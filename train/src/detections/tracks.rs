@@ -52,8 +52,31 @@ pub fn followed(frames: &Frames, class: usize, min_points: u64) -> Option<Follow
         hota: mean(&|[detection, association]| (detection * association).sqrt()),
         detection: mean(&|[detection, _]| *detection),
         association: mean(&|[_, association]| *association),
-        switches: matched[(SWITCHED_AT * (N_ALPHAS + 1) as f64) as usize - 1].switches,
+        switches: switches(&turns),
     })
+}
+
+/// How often an object goes on under another number, as CLEAR MOT counts (Bernardin and Stiefelhagen 2008):
+/// an object keeps the track of the turn before, as long as both are similar enough.
+fn switches(turns: &[Turn]) -> usize {
+    /// More than any similarity.
+    const KEPT: f64 = 1000.0;
+    let (mut last, mut before) = (BTreeMap::new(), BTreeMap::new());
+    let mut n = 0;
+    for turn in turns.iter().filter(|turn| !turn.similar.is_empty()) {
+        let pairs = turn.assigned(|object, track, similar| {
+            let kept = if before.get(&object) == Some(&track) { KEPT } else { 0.0 };
+            if similar < SWITCHED_AT - f64::EPSILON { 0.0 } else { kept + similar }
+        });
+        before.clear();
+        for (object, track, similar) in pairs {
+            if similar >= SWITCHED_AT - f64::EPSILON {
+                before.insert(object, track);
+                n += usize::from(last.insert(object, track).is_some_and(|other| other != track));
+            }
+        }
+    }
+    n
 }
 
 /// The objects and tracks of a turn, and how similar each two are.
@@ -151,8 +174,6 @@ struct Matched {
     n_objects: f64,
     n_tracks: f64,
     pairs: BTreeMap<(u64, u64), f64>,
-    last: BTreeMap<u64, u64>,
-    switches: usize,
 }
 
 impl Matched {
@@ -162,8 +183,6 @@ impl Matched {
         for &(object, track, _) in pairs {
             self.n += 1.0;
             *self.pairs.entry((object, track)).or_default() += 1.0;
-            let before = self.last.insert(object, track);
-            self.switches += usize::from(before.is_some_and(|before| before != track));
         }
     }
 
