@@ -35,6 +35,9 @@
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 #![forbid(unsafe_code)]
 
+#[cfg(feature = "detect")]
+#[doc(hidden)]
+pub mod birdseye;
 mod classify;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
