@@ -163,8 +163,9 @@ fn by_frame(
 /// The labelled object about this time that is nearest to `one`.
 fn nearest<'a>(one: &Placed, time_s: f64, labelled: &'a [Placed]) -> Option<&'a Placed> {
     let off_m = |other: &Placed| {
-        let there = at_time_of(one.clone(), other, time_s);
-        let off = |axis: usize| there.place.centre_m[axis] - other.place.centre_m[axis];
+        let moved_m = moved_m(other, time_s);
+        let there = |axis: usize| one.place.centre_m[axis] - moved_m[axis];
+        let off = |axis: usize| there(axis) - other.place.centre_m[axis];
         libm::hypot(off(0), off(1))
     };
     let about = labelled.iter().filter(|other| {
@@ -173,10 +174,15 @@ fn nearest<'a>(one: &Placed, time_s: f64, labelled: &'a [Placed]) -> Option<&'a 
     about.min_by(|a, b| off_m(a).total_cmp(&off_m(b)))
 }
 
-/// Where `one` was at the time of `other`, if it moved with it; it is of this time.
-fn at_time_of(mut one: Placed, other: &Placed, time_s: f64) -> Placed {
+/// How far an object has moved at this time, metres.
+fn moved_m(other: &Placed, time_s: f64) -> [f64; 3] {
     let after_s = time_s - other.time_s.unwrap_or(time_s);
-    let moved_m = other.velocity_m_s.unwrap_or_default().map(|speed| after_s * speed);
+    other.velocity_m_s.unwrap_or_default().map(|speed| after_s * speed)
+}
+
+/// Where `one`, which is of this time, was at the time of `other`, if it moved with it.
+fn at_time_of(mut one: Placed, other: &Placed, time_s: f64) -> Placed {
+    let moved_m = moved_m(other, time_s);
     (0..3).for_each(|axis| one.place.centre_m[axis] -= moved_m[axis]);
     one
 }
