@@ -207,7 +207,7 @@ def test_a_bad_mesh_of_a_dataset_is_named_when_it_is_drawn(tmp_path: Path) -> No
     dataset = ep.Dataset(tmp_path)
     with pytest.raises(ep.Error, match=r"^cup/train/a.off:3: expected a finite coordinate"):
         dataset[0]
-    with pytest.raises(IndexError, match="below 1, that of the clouds, found 1"):
+    with pytest.raises(IndexError, match="expected the number of one of 1 clouds, found 1"):
         dataset[1]
 
 
