@@ -63,9 +63,10 @@ pub const VIEWER: &str = include_str!("view/viewer.js");
 pub const COLOURS: &str = include_str!("view/colours.json");
 
 /// The bundled models: a model's name and the bytes of its file.
-pub const MODELS: [(&str, &[u8]); 4] = [
+pub const MODELS: [(&str, &[u8]); 5] = [
     ("edge-64", include_bytes!("weights/edge-64.safetensors")),
     ("set-64", include_bytes!("weights/set-64.safetensors")),
     ("street-128", include_bytes!("weights/street-128.safetensors")),
+    ("street-bev", include_bytes!("weights/street-bev.safetensors")),
     ("shapes-rotational-64", include_bytes!("weights/shapes-rotational-64.safetensors")),
 ];

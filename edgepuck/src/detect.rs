@@ -22,8 +22,8 @@ pub(crate) struct DetectArgs {
     #[command(flatten)]
     input: SweepArgs,
 
-    /// Model for clusters: street-128, or the path of a model file
-    #[arg(long, default_value = "street-128", value_name = "MODEL")]
+    /// Bird's-eye model: street-bev, or the path of a model file
+    #[arg(long, default_value = "street-bev", value_name = "MODEL")]
     model: PathBuf,
 
     /// File for the objects: .json, or .txt with a line of KITTI's labels for each. With
@@ -47,7 +47,7 @@ pub(crate) struct DetectArgs {
     #[arg(long, default_value_t = LEAST_CONFIDENCE, value_name = "P", value_parser = probability)]
     min_confidence: f64,
 
-    /// Precision of the network: f32 or i8
+    /// Precision of the networks: f32 or i8
     #[arg(long, default_value = "f32")]
     precision: Precision,
 
@@ -111,9 +111,6 @@ pub(crate) fn run(args: &DetectArgs) -> anyhow::Result<Outcome> {
 fn open(model: &Path, options: &Options, min_points: usize) -> anyhow::Result<Detector> {
     Detector::open(model, options, min_points).map_err(|error| match error {
         DetectError::Settings(error) => anyhow::Error::new(Usage(error.to_string())),
-        DetectError::Model(infer_cpu::Error::WholeObjects(cause)) => {
-            Usage(format!("{}: {cause}", model.display())).into()
-        }
         error => error.into(),
     })
 }

@@ -569,9 +569,9 @@ const char *edgepuck_class_name(const struct EdgepuckClassifier *classifier,
 void edgepuck_free(struct EdgepuckClassifier *classifier);
 
 /**
- * Opens a pipeline that classifies clusters with the model file at path and with options (null
- * stands for the defaults), one cluster per thread; clusters of fewer than min_points points are
- * not classified. The sensor is a Velodyne VLP-16 or VLP-32C, or an Ouster if metadata is the path
+ * Opens a pipeline that detects objects with the bird's-eye model file at path, beside which is the model
+ * that it asks, and with options (null stands for the defaults); clusters of fewer than min_points
+ * points have no class. The sensor is a Velodyne VLP-16 or VLP-32C, or an Ouster if metadata is the path
  * of its metadata file (JSON) instead of null. Writes the pipeline to out, or null if it fails.
  * Objects are reported from the second turn in which they are seen. Pass it to edgepuck_live_close in
  * the end.

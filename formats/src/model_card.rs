@@ -13,6 +13,8 @@
 //! | `abstractions` | JSON list: the number of centres and the radius of each set abstraction `sa1…` | none |
 //! | `activation_ranges` | JSON object: layer to its largest activation, for int8 | calibrated at load |
 //! | `unknown_classes` | JSON list of the classes that are answered as `unknown` | none |
+//! | `asked` | of a bird's-eye network: the model that is asked about what it sees | none |
+//! | `confidence` | of a bird's-eye network: JSON object, class to the weights of its confidence: of boxes, and of clusters | none |
 //! | `temperature` | divisor of the logits before the softmax | `1` |
 //! | `trained` | `false` for a model of random weights | `true` |
 //! | `training_set`, `accuracy`, `provenance` | free text | |
@@ -54,6 +56,12 @@ pub struct ModelCard {
     /// The classes that are not objects of interest, such as trees or walls, and are answered as
     /// `unknown`.
     pub unknown_classes: Vec<String>,
+    /// The model of clusters that is asked about what a bird's-eye network sees.
+    pub asked: Option<String>,
+    /// The confidence in an object of each class, before the logistic function: a bias, and the weights of
+    /// the logit of a bird's-eye network and of that of the model that is asked. The first are those of boxes that
+    /// the network sees, and the second, if there are any, those of clusters.
+    pub confidence: BTreeMap<String, Vec<[f64; 3]>>,
     /// The divisor of the logits before the softmax.
     pub temperature: f64,
     /// Whether the weights were trained.
@@ -108,6 +116,8 @@ impl Default for ModelCard {
             abstractions: Vec::new(),
             activation_ranges: BTreeMap::new(),
             unknown_classes: Vec::new(),
+            asked: None,
+            confidence: BTreeMap::new(),
             temperature: 1.0,
             trained: true,
             training_set: None,
@@ -153,6 +163,8 @@ impl ModelCard {
             abstractions: entries.get("abstractions", json, default.abstractions)?,
             activation_ranges: entries.get("activation_ranges", json, BTreeMap::new())?,
             unknown_classes,
+            asked: text("asked"),
+            confidence: entries.get("confidence", json, BTreeMap::new())?,
             temperature: entries.get("temperature", positive, default.temperature)?,
             trained: entries.get("trained", either("false", "true"), default.trained)?,
             training_set: text("training_set"),
@@ -182,6 +194,11 @@ impl ModelCard {
             (
                 "unknown_classes",
                 (!self.unknown_classes.is_empty()).then(|| json!(self.unknown_classes).to_string()),
+            ),
+            ("asked", self.asked.clone()),
+            (
+                "confidence",
+                (!self.confidence.is_empty()).then(|| json!(self.confidence).to_string()),
             ),
             ("temperature", (self.temperature != 1.0).then(|| self.temperature.to_string())),
             ("trained", Some(self.trained.to_string())),
@@ -265,6 +282,8 @@ mod tests {
             abstractions: vec![(256, 0.2), (64, 0.4)],
             activation_ranges: BTreeMap::from([("feat.conv1".into(), 1.1)]),
             unknown_classes: vec!["cup".into()],
+            asked: Some("cups".into()),
+            confidence: BTreeMap::from([("cup".into(), vec![[0.5, 1.0, -2.0], [0.0; 3]])]),
             temperature: 1.5,
             trained: false,
             training_set: Some("t".into()),

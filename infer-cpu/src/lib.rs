@@ -35,6 +35,8 @@
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 #![forbid(unsafe_code)]
 
+#[cfg(feature = "detect")]
+mod birdseye;
 mod classify;
 #[cfg(feature = "cli")]
 #[doc(hidden)]
@@ -90,7 +92,6 @@ pub use classify::normalize::{normalize, to_unit_sphere};
 pub use classify::options::Options;
 pub use classify::prediction::{Prediction, UNKNOWN};
 pub use classify::team::ClassifierTeam;
-pub use classify::usual_size::usual_size_m;
 pub use error::Error;
 pub use formats::cloud_file::read_cloud;
 pub use formats::model_card::{ModelCard, Normalization};

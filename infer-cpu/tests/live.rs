@@ -12,8 +12,8 @@ use crate::street::{
 };
 use formats::ouster::Metadata;
 use formats::rng::StreamKey;
+use infer_cpu::Options;
 use infer_cpu::live::{Arrival, Counts, LiveOptions, Object, Pipeline, Pose, Trajectory};
-use infer_cpu::{Classifier, Options};
 
 /// Unix time at the first packet, seconds.
 const START_S: f64 = 1.7e9;
@@ -27,8 +27,8 @@ fn all() -> LiveOptions {
 
 fn pipeline(options: &LiveOptions) -> Pipeline {
     let weights = concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/weights");
-    let model = Path::new(weights).join("street-128.safetensors");
-    Pipeline::new(Classifier::load(&model, &Options::default()).unwrap(), options).unwrap()
+    let model = Path::new(weights).join("street-bev.safetensors");
+    Pipeline::open(&model, &Options::default(), options).unwrap()
 }
 
 /// Runs a pipeline on packets with their times since the first one, and returns all objects.

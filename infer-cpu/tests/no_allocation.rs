@@ -4,18 +4,12 @@
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
-#[cfg(feature = "live")]
-#[path = "support/street.rs"]
-#[allow(dead_code, reason = "other tests use all of it")]
-mod street;
 #[path = "support/tiny_model.rs"]
 mod tiny_model;
 
 use std::path::Path;
 
 use formats::model_card::ModelCard;
-#[cfg(feature = "live")]
-use formats::model_card::Normalization;
 use formats::rng::StreamKey;
 use infer_cpu::sampler::{SamplerKind, SamplerSpec};
 use infer_cpu::{Classifier, ClassifierTeam, Options, Precision};
@@ -101,12 +95,6 @@ fn main() {
     let many = Options { capacity: CAPACITY, ..Options::default() };
     assert_eq!(allocations(&model, &many, &clouds, MANY), 0);
     team_allocates_nothing(&model, &clouds);
-    #[cfg(feature = "live")]
-    {
-        let card = ModelCard { normalization: Normalization::Metric, ..ModelCard::default() };
-        let path = folder.path().join("clusters.safetensors");
-        live_allocates_nothing(&tiny_model::write(&path, &tiny_model::tensors(4), &card));
-    }
 }
 
 /// A team classifies many clouds, in one thread and in more threads than cores.
@@ -124,26 +112,4 @@ fn team_allocates_nothing(model: &Path, clouds: &[Vec<[f32; 3]>]) {
         assert_eq!(allocations::count() - before, 0, "a team of {threads}");
         assert!(total > 0.0);
     }
-}
-
-/// The pipeline allocates no memory after its first turns.
-#[cfg(feature = "live")]
-fn live_allocates_nothing(model: &Path) {
-    use infer_cpu::live::{Arrival, LiveOptions, Pipeline};
-
-    let sent = street::packets(&street::street(), 7, 2 * street::PACKETS_PER_S);
-    let options = Options { threads: 2, ..Options::default() };
-    let classifier = Classifier::load(model, &options).unwrap();
-    let mut pipeline = Pipeline::new(classifier, &LiveOptions::default()).unwrap();
-    let (mut before, mut n_objects) = (0, 0);
-    for (i, packet) in sent.iter().enumerate() {
-        if i == sent.len() / 2 {
-            (before, n_objects) = (allocations::count(), 0);
-        }
-        let time_s = i as f64 * street::PACKET_S;
-        pipeline.take(packet, Arrival { time_s, moment: None });
-        pipeline.answer(|_| n_objects += 1);
-    }
-    assert_eq!(allocations::count() - before, 0, "live");
-    assert!(n_objects >= 27, "{n_objects}");
 }

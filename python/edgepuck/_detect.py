@@ -23,7 +23,7 @@ class Detection:
     label: str
     """The name of its class."""
     confidence: float
-    """The probability of the class."""
+    """How sure the detection is, 0 to 1: of those at 0.8, some eight in ten are right."""
     points: int
     """The number of its points."""
     indices: NDArray[np.uint32] = field(compare=False)
@@ -35,7 +35,7 @@ class Detection:
     yaw_deg: float
     """The rotation of the box about the z axis, counterclockwise from x, degrees."""
     whole_centre: list[float]
-    """The centre of the box of the whole object, by the usual size of its class, metres, [3]."""
+    """The centre of the box of the whole object, with what its points do not show, metres, [3]."""
     whole_size: list[float]
     """The length, width and height of that box, metres, [3]."""
     whole_yaw_deg: float
@@ -49,12 +49,12 @@ class Detection:
 
 def detect(
     sweep: Scan | str | os.PathLike[str] | ArrayLike | Any,
-    model: str | os.PathLike[str] = "street-128",
+    model: str | os.PathLike[str] = "street-bev",
     *,
     rings: ArrayLike | None = None,
     precision: str = "f32",
     min_points: int = 20,
-    min_confidence: float = 0.7,
+    min_confidence: float = 0.5,
 ) -> list[Detection]:
     """Find the objects of known classes in a sweep, like `edgepuck detect`.
 
@@ -62,11 +62,11 @@ def detect(
         sweep: A scan, or the path of a file that `Scan.read` reads, or points of shape [n, 3] in the frame
             of the sensor, metres, z up, or a cloud of Open3D or trimesh; further columns are ignored, and so
             are lost returns: points at 0, 0, 0 or without finite coordinates.
-        model: `street-128`, or the path of a model of clusters.
+        model: `street-bev`, or the path of a bird's-eye model.
         rings: The ring of each point, from below, [n]. A scan has its own.
-        precision: The precision of the network: f32 or i8.
+        precision: The precision of the networks: f32 or i8.
         min_points: The smallest number of points of an object.
-        min_confidence: The smallest confidence of an object; 0 returns all that resemble a known class.
+        min_confidence: The smallest confidence of an object; 0 returns all that the model is asked about.
 
     Raises:
         Error: The model cannot be read, or the points have a wrong shape.

@@ -13,7 +13,7 @@ use infer_cpu::{Classifier, Options};
 use std::collections::BTreeMap;
 use std::fs;
 use std::ops::ControlFlow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use tests::tree::files;
 
 /// The file of hashes, by name.
@@ -115,12 +115,11 @@ fn on_scalar_kernels() -> Options {
 #[test]
 fn a_drive_its_objects_and_its_recording_keep_their_bytes() {
     let folder = Folder::new();
-    folder.succeeds("gen-scenes street --drive 0.5 --speed 8 --seed 2 --out drive.pcap");
-    let model = in_repository("assets/weights/street-128.safetensors");
-    let classifier = Classifier::load(&model, &on_scalar_kernels()).unwrap();
+    folder.succeeds("gen-scenes street --drive 0.3 --speed 8 --seed 2 --out drive.pcap");
+    let model = in_repository("assets/weights/street-bev.safetensors");
     let mut options = LiveOptions::default();
     options.ego_motion = Some(Trajectory::load(&folder.at("drive.tum")).unwrap());
-    let mut pipeline = Pipeline::new(classifier, &options).unwrap();
+    let mut pipeline = Pipeline::open(&model, &on_scalar_kernels(), &options).unwrap();
     let mut recorder = Recorder::create(&folder.at("drive.mcap")).unwrap();
     let mut lines = Vec::new();
     let mut answer = |pipeline: &mut Pipeline, recorder: &mut Recorder| {
@@ -140,7 +139,7 @@ fn a_drive_its_objects_and_its_recording_keep_their_bytes() {
     pipeline.end();
     answer(&mut pipeline, &mut recorder);
     recorder.finish(&pipeline).unwrap();
-    assert!(lines.len() > 20, "{} lines", lines.len());
+    assert!(lines.len() > 10, "{} lines", lines.len());
     check(&[
         ("packets of a drive", of_bytes(&folder.bytes("drive.pcap"))),
         ("truth of a drive", of_bytes(&folder.bytes("drive.truth.jsonl"))),
@@ -162,7 +161,11 @@ fn logits_of_bundled_models_keep_their_bits() {
     assert_eq!(clouds.len(), 8);
     let weights = in_repository("assets/weights");
     let mut found = Vec::new();
-    for file in files(&weights).keys().filter(|file| file.extension().unwrap() == "safetensors") {
+    // What sees whole sweeps is in the objects of the drive.
+    let is_classifier = |file: &&PathBuf| {
+        file.extension().unwrap() == "safetensors" && !file.starts_with("street-bev.safetensors")
+    };
+    for file in files(&weights).keys().filter(is_classifier) {
         let mut classifier = Classifier::load(&weights.join(file), &on_scalar_kernels()).unwrap();
         let logits = clouds.iter().flat_map(|cloud| {
             let prediction = classifier.classify_f64(cloud).unwrap();

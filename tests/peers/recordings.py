@@ -42,7 +42,7 @@ def main():
     capture, recording = OUT / "drive.pcap", OUT / "run.mcap"
     edgepuck("gen-scenes", "street", "--drive", SECONDS, "--out", capture)
     live = infer("live", "--pcap", capture, "--poses", capture.with_suffix(".tum"), "--json", "--mcap",
-                 recording, "--model", ROOT / "assets/weights/street-128.safetensors")
+                 recording, "--model", ROOT / "assets/weights/street-bev.safetensors")
     objects = [json.loads(line) for line in live.stdout.splitlines()]
     messages = rosbags_messages(recording)
     compare_points(messages["/points"], capture)

@@ -31,7 +31,7 @@ if [name for _, name in socket.if_nameindex()] == ["lo"]:
     skip("DDS finds others by multicast, and there is no network")
 
 LIVE = [os.environ["EDGEPUCK_INFER"], "live", "--model",
-        ROOT / "assets/weights/street-128.safetensors", "--pcap", OUT / "drive.pcap"]
+        ROOT / "assets/weights/street-bev.safetensors", "--pcap", OUT / "drive.pcap"]
 SECONDS = 6
 # One that other programs of this machine do not use.
 DOMAIN = 40 + os.getpid() % 60

@@ -51,7 +51,7 @@ def drive(seed):
     capture = OUT / f"drive-{seed}.pcap"
     edgepuck("gen-scenes", "street", "--drive", SECONDS, "--seed", seed, "--out", capture)
     live = infer("live", "--pcap", capture, "--poses", capture.with_suffix(".tum"), "--model",
-                 ROOT / "assets/weights/street-128.safetensors")
+                 ROOT / "assets/weights/street-bev.safetensors")
     found = [json.loads(line) for line in live.stdout.splitlines()]
     truth_file = capture.with_suffix(".truth.jsonl")
     truth = [json.loads(line) for line in truth_file.read_text().splitlines()]

@@ -5,7 +5,6 @@ use std::ptr::null;
 
 use formats::ouster::Metadata;
 use infer_cpu::live::{Arrival, LiveOptions, Object, Pipeline};
-use infer_cpu::{Classifier, UNKNOWN};
 
 use super::options::EdgepuckOptions;
 use crate::pointers;
@@ -75,13 +74,12 @@ pub struct EdgepuckLiveCounts {
 }
 
 impl EdgepuckLive {
-    fn new(classifier: Classifier, options: &LiveOptions) -> Result<Self, Failure> {
-        let names = classifier.classes().iter().map(|name| name.as_bytes().to_vec());
-        let names = names.chain([UNKNOWN.into()]).map(CString::new).collect::<Result<_, _>>();
+    fn new(pipeline: Pipeline) -> Result<Self, Failure> {
+        let names = pipeline.classes().map(str::as_bytes).map(<[u8]>::to_vec);
+        let names = names.map(CString::new).collect::<Result<_, _>>();
         let names = names.map_err(|_| {
             Failure::new(EdgepuckStatus::BadModel, "expected class names without NUL")
         })?;
-        let pipeline = Pipeline::new(classifier, options)?;
         Ok(Self { pipeline, names, answered: VecDeque::new() })
     }
 
@@ -115,9 +113,9 @@ impl EdgepuckObject {
     }
 }
 
-/// Opens a pipeline that classifies clusters with the model file at path and with options (null
-/// stands for the defaults), one cluster per thread; clusters of fewer than min_points points are
-/// not classified. The sensor is a Velodyne VLP-16 or VLP-32C, or an Ouster if metadata is the path
+/// Opens a pipeline that detects objects with the bird's-eye model file at path, beside which is the model
+/// that it asks, and with options (null stands for the defaults); clusters of fewer than min_points
+/// points have no class. The sensor is a Velodyne VLP-16 or VLP-32C, or an Ouster if metadata is the path
 /// of its metadata file (JSON) instead of null. Writes the pipeline to out, or null if it fails.
 /// Objects are reported from the second turn in which they are seen. Pass it to edgepuck_live_close in
 /// the end.
@@ -144,7 +142,7 @@ pub unsafe extern "C" fn edgepuck_live_open(
             let read = Metadata::read(&unsafe { pointers::path(metadata, "metadata") }?);
             live.ouster = Some(read.map_err(Failure::of(EdgepuckStatus::BadValue))?);
         }
-        EdgepuckLive::new(Classifier::load(&path, &options)?, &live)
+        EdgepuckLive::new(Pipeline::open(&path, &options, &live)?)
     })
 }
 

@@ -9,7 +9,7 @@ pub use options::*;
 pub use prediction::*;
 
 use infer_cpu::Error;
-use infer_cpu::live::LiveError;
+use infer_cpu::detect::DetectError;
 use infer_cpu::sampler::SamplerError;
 
 use crate::status::{EdgepuckStatus, Failure};
@@ -20,10 +20,10 @@ impl From<Error> for Failure {
     }
 }
 
-impl From<LiveError> for Failure {
-    fn from(error: LiveError) -> Self {
+impl From<DetectError> for Failure {
+    fn from(error: DetectError) -> Self {
         match error {
-            LiveError::Classifier(error) => error.into(),
+            DetectError::Model(error) => error.into(),
             other => Self::new(EdgepuckStatus::BadValue, other.to_string()),
         }
     }

@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use formats::model_card::Normalization;
 use infer_cpu::live::{Arrival, LiveOptions, Object, Pipeline};
 use infer_cpu::{Classifier, Options};
 use test_support::need;
@@ -46,17 +45,16 @@ fn the_example_gives_what_the_rust_library_gives() {
 fn the_example_of_packets_gives_what_the_rust_library_gives() {
     let compiler = need!(Compiler::c());
     let example = compiler.compile("examples/live.c", &static_link());
-    let model = compiler.folder().join("model.safetensors");
-    let classes = ["car", "person", "truck"];
-    model::write_longest_axis_model_of(classes, Normalization::Metric, &model);
+    let weights = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/weights");
+    let model = weights.join("street-bev.safetensors");
     let sent = street::packets(&street::street(), 7, street::PACKETS_PER_S);
     let time_us = |i: usize| 1_000_000_000 + (i as f64 * street::PACKET_S * 1e6) as u64;
     let capture = compiler.folder().join("drive.pcap");
     let timed = sent.iter().enumerate().map(|(i, packet)| (time_us(i), &packet[..]));
     std::fs::write(&capture, street::capture(timed)).unwrap();
 
-    let classifier = Classifier::load(&model, &Options::default()).unwrap();
-    let mut pipeline = Pipeline::new(classifier, &LiveOptions::default()).unwrap();
+    let live = LiveOptions::default();
+    let mut pipeline = Pipeline::open(&model, &Options::default(), &live).unwrap();
     let mut expected = String::new();
     let mut write = |object: &Object| {
         let [x, y, z] = object.position_m;

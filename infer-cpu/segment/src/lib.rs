@@ -16,9 +16,7 @@
 //! The points are sorted into a range image by ring and azimuth. In each column, the ground is
 //! followed from the lowest ring up. The ground returns give a polar grid of heights; every point
 //! just above that grid is ground. The other points are linked to their neighbours in the image,
-//! and linked points form a cluster. A [`Segmenter`] does this for whole sweeps. It also links them
-//! by steps of several widths, to a [`Hierarchy`], and a [`Stream`] does so for returns as they
-//! arrive. Clouds without the structure of a scan are cut into connected components instead.
+//! and linked points form a cluster. A [`Segmenter`] does this for one sweep after the other. Clouds without the structure of a scan are cut into connected components instead.
 
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 #![warn(clippy::print_stdout, clippy::print_stderr)]
@@ -28,26 +26,20 @@ mod axes;
 mod components;
 mod ground;
 mod height_grid;
-mod hierarchy;
 mod image;
 mod label;
 mod link;
-mod look;
-mod open_sets;
 mod plane;
 mod segmentation;
 mod segmenter;
 mod sets;
 mod settings;
-mod stream;
 mod sweep;
 
 pub use axes::other_axis_up;
 pub use formats::geometry::OrientedBox;
-pub use hierarchy::{BestCut, Hierarchy, Node};
 pub use label::Label;
 pub use segmentation::{Cluster, Segmentation};
 pub use segmenter::Segmenter;
 pub use settings::{Settings, SettingsError};
-pub use stream::{Dropped, Stream, StreamCluster, StreamNode};
 pub use sweep::{SegmentError, Sweep};

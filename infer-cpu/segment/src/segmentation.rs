@@ -51,14 +51,28 @@ impl Segmentation {
         self.ground.z_m(x, y)
     }
 
-    /// Begins a cut: obstacles are in no cluster until one is [pushed](Self::push).
-    pub(crate) fn begin_cut(&mut self) {
-        self.ends.clear();
-        self.members.clear();
-        for label in &mut self.labels {
-            if matches!(label, Label::Cluster(_)) {
-                *label = Label::Small;
+    /// Makes each of `objects` a cluster, before those that are there. These stay clusters if they keep half of
+    /// their points and `min_points`: a few points about an object are no other one.
+    pub(crate) fn claim<'a>(
+        &mut self,
+        objects: impl Iterator<Item = (&'a [u32], Option<f32>)>,
+        min_points: usize,
+    ) {
+        let (members, ends) = (std::mem::take(&mut self.members), std::mem::take(&mut self.ends));
+        let mut is_claimed = vec![false; self.labels.len()];
+        for (points, ground_z_m) in objects {
+            self.push(points, ground_z_m);
+            points.iter().for_each(|&point| is_claimed[point as usize] = true);
+        }
+        let mut start = 0;
+        for (end, ground_z_m) in ends {
+            let left = members[start..end as usize].iter().copied();
+            let left: Vec<u32> = left.filter(|&point| !is_claimed[point as usize]).collect();
+            match left.len() >= min_points && 2 * left.len() >= end as usize - start {
+                true => self.push(&left, ground_z_m),
+                false => left.iter().for_each(|&point| self.labels[point as usize] = Label::Small),
             }
+            start = end as usize;
         }
     }
 

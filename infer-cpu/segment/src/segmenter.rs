@@ -1,6 +1,5 @@
 use crate::components::Components;
 use crate::ground::{GroundFinder, sector};
-use crate::hierarchy::{Hierarchy, Node};
 use crate::image::{Columns, RangeImage};
 use crate::label::Label;
 use crate::link::link_column;
@@ -18,9 +17,6 @@ pub struct Segmenter {
     components: Components,
     sets: Sets,
     segmentation: Segmentation,
-    hierarchy: Hierarchy,
-    /// The nodes of the last cut.
-    kept: Vec<usize>,
 }
 
 impl Segmenter {
@@ -37,8 +33,6 @@ impl Segmenter {
             components: Components::default(),
             sets: Sets::default(),
             segmentation: Segmentation::default(),
-            hierarchy: Hierarchy::default(),
-            kept: Vec::new(),
         })
     }
 
@@ -61,38 +55,19 @@ impl Segmenter {
         Ok(&self.segmentation)
     }
 
-    /// Finds the ground of `sweep`, and the clusters of its other points at several widths. Each has
-    /// [`Settings::min_points`] or more; there is no largest size, and no
-    /// [`Settings::radius_m`]. The same sweep gives the same result.
-    ///
-    /// # Errors
-    /// As [`Segmenter::segment`].
-    pub fn hierarchy(&mut self, sweep: &Sweep<'_>) -> Result<&Hierarchy, SegmentError> {
-        self.begin(sweep)?;
-        self.remove_ground(sweep)?;
-        let Self { settings, image, hierarchy, segmentation, .. } = self;
-        hierarchy.build(image, sweep.points, settings, &segmentation.ground);
-        Ok(&self.hierarchy)
-    }
-
-    /// The best cut of the hierarchy of the last sweep, by the worth of each of its nodes: a node is
-    /// kept if its worth is at least `1 + margin` times that of the best cut of those of which it is
-    /// made. Returns the number of the node of each cluster, too.
+    /// Makes each of `objects`, its points and the height of the ground under it, a cluster of the last sweep: the
+    /// first ones. Another cluster stays one if it keeps half of its points and [`Settings::min_points`] or more.
     ///
     /// # Panics
-    /// If there is not one worth for each node.
-    pub fn cut(&mut self, worths: &[f64], margin: f64) -> (&[usize], &Segmentation) {
-        let Self { hierarchy, segmentation, kept, .. } = self;
-        assert_eq!(worths.len(), hierarchy.len(), "worths");
-        segmentation.begin_cut();
-        kept.clear();
-        kept.extend_from_slice(hierarchy.cut(worths, margin));
-        kept.sort_unstable_by_key(|&node| hierarchy.node(node).points.iter().min().copied());
-        for &node in &*kept {
-            let Node { points, ground_z_m, .. } = hierarchy.node(node);
-            segmentation.push(points, ground_z_m);
-        }
-        (kept, segmentation)
+    /// If a point is not one of the sweep.
+    pub fn claim<'a>(&mut self, objects: impl Iterator<Item = (&'a [u32], Option<f32>)>) {
+        self.segmentation.claim(objects, self.settings.min_points);
+    }
+
+    /// The last sweep, segmented.
+    #[must_use]
+    pub fn segmentation(&self) -> &Segmentation {
+        &self.segmentation
     }
 
     fn begin(&mut self, sweep: &Sweep<'_>) -> Result<(), SegmentError> {
@@ -105,7 +80,6 @@ impl Segmenter {
         }
         self.segmentation.labels.clear();
         self.segmentation.labels.resize(n, Label::Invalid);
-        self.hierarchy.clear();
         Ok(())
     }
 

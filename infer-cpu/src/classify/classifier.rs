@@ -290,7 +290,7 @@ fn class_names(card: &ModelCard, n_classes: usize) -> Vec<Arc<str>> {
 }
 
 /// The kernels `forced`, or the fastest of this machine that support `precision`.
-fn choose_kernels(
+pub(crate) fn choose_kernels(
     precision: Precision,
     forced: Option<KernelName>,
 ) -> Result<&'static Kernels, Error> {

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use edgepuck_kernels::{F32, Format, I8, Kernels};
+use formats::FormatError;
 use formats::model_card::ModelCard;
 use formats::weights::WeightsFile;
 
@@ -30,6 +31,10 @@ pub fn load(
     kernels: &'static Kernels,
 ) -> Result<Loaded, Error> {
     let (mut file, mut card) = model.open()?;
+    if card.asked.is_some() {
+        let cause = "expected a model of clouds, found a bird's-eye model, which `detect` takes";
+        return Err(FormatError::malformed(model.name(), "card", cause).into());
+    }
     if let Some(ranges) = &options.activation_ranges {
         card.activation_ranges.clone_from(ranges);
     }

@@ -11,4 +11,3 @@ pub mod options;
 pub mod prediction;
 mod selection;
 pub mod team;
-pub mod usual_size;

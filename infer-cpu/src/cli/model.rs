@@ -19,7 +19,7 @@ const DEFAULT: &str = "edge-64";
 pub struct ModelArgs {
     /// Model: edge-64 (whole objects of ModelNet40), set-64 (the same, more accurate and slower),
     /// shapes-rotational-64 (scans of the built-in shapes), street-128 (clusters of streets), or a file in
-    /// safetensors format [default: $EDGEPUCK_MODEL, else edge-64, or street-128 for `live`]
+    /// safetensors format [default: $EDGEPUCK_MODEL, else edge-64, or street-bev for `live`]
     #[arg(long, value_name = "MODEL")]
     model: Option<PathBuf>,
 

@@ -1,5 +1,4 @@
-//! The objects of a sweep: its clusters at several widths, and the classes of those that the network
-//! recognises best.
+//! The objects of a sweep: what a network sees from above, and what another one says of its points.
 //!
 //! ```no_run
 //! use std::path::Path;
@@ -7,7 +6,7 @@
 //! use infer_cpu::Options;
 //! use infer_cpu::detect::{Detector, Sweep};
 //!
-//! let model = Path::new("street-128.safetensors");
+//! let model = Path::new("street-bev.safetensors");
 //! let mut detector = Detector::open(model, &Options::default(), 20)?;
 //! // In metres in the sensor's frame, z up.
 //! let points = [[5.0, 1.0, -1.2], [5.0, 1.1, -1.1]];
@@ -18,13 +17,11 @@
 //! # Ok::<(), infer_cpu::detect::DetectError>(())
 //! ```
 
-pub(crate) mod cluster_classifier;
+mod candidates;
+mod confidence;
 mod detector;
 mod object;
-mod rule;
 
 pub use detector::{DetectError, Detections, Detector, LEAST_CONFIDENCE};
 pub use edgepuck_segment::{Label, OrientedBox, Sweep};
 pub use object::Object;
-#[doc(hidden)]
-pub use rule::{MARGIN_OF_WHOLES, Rule};

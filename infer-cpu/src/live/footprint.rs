@@ -23,10 +23,10 @@ pub struct Observation<'a> {
     pub yaw_rad: f64,
     /// The position of the sensor, metres.
     pub sensor_m: [f64; 2],
-    /// The log-probability of each class, if it was classified.
+    /// The log-probability of each class, if it has enough points for one.
     pub view: Option<&'a [f64]>,
-    /// The usual length of what it is recognised as by itself, metres.
-    pub usual_length_m: Option<f32>,
+    /// The length of the whole object that was seen in it, metres.
+    pub whole_length_m: Option<f32>,
 }
 
 /// The size of an object seen from above, from all of its clusters.

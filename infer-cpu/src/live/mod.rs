@@ -1,17 +1,17 @@
 //! Classified and tracked objects from the packets of a LiDAR, while the sensor turns.
 //!
-//! A [`Pipeline`] takes packets one by one. It decodes each, passes the returns to
-//! [`edgepuck_segment::Stream`], classifies complete clusters at all widths, and assigns those that
-//! are recognised best to tracks. An [`Object`] is the result for a cluster.
+//! A [`Pipeline`] takes packets one by one and decodes each. When a turn is complete, a
+//! [`Detector`](crate::detect::Detector) finds its objects, and the clusters of what is left; all are assigned to
+//! tracks. An [`Object`] is the result for each.
 //!
 //! ```no_run
 //! use std::path::Path;
 //!
+//! use infer_cpu::Options;
 //! use infer_cpu::live::{Arrival, LiveOptions, Pipeline};
-//! use infer_cpu::{Classifier, Options};
 //!
-//! let classifier = Classifier::load(Path::new("street-128.safetensors"), &Options::default())?;
-//! let mut pipeline = Pipeline::new(classifier, &LiveOptions::default())?;
+//! let model = Path::new("street-bev.safetensors");
+//! let mut pipeline = Pipeline::open(model, &Options::default(), &LiveOptions::default())?;
 //! let socket = std::net::UdpSocket::bind("0.0.0.0:2368")?;
 //! let mut packet = [0; 2048];
 //! loop {
@@ -24,11 +24,11 @@
 //! ```
 
 mod arrival;
+mod classes;
 mod counts;
 mod footprint;
 mod kalman;
 mod object;
-mod object_classifier;
 mod options;
 mod packet_clock;
 mod pipeline;
@@ -36,18 +36,18 @@ mod pipeline;
 mod recorder;
 mod report;
 mod sensor;
-mod sensor_stream;
+mod sensor_data;
 mod stats;
 mod timeline;
 mod tracker;
-mod waiting;
+mod turns;
 mod whole;
 
 pub use arrival::Arrival;
 pub use counts::Counts;
 pub use formats::geometry::{OrientedBox, Pose, Trajectory};
 pub use object::{Object, SCHEMA_VERSION};
-pub use options::{LiveError, LiveOptions};
+pub use options::LiveOptions;
 pub use pipeline::{Decoded, Pipeline};
 #[cfg(feature = "mcap")]
 pub use recorder::{RecordError, Recorder};

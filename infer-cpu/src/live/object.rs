@@ -7,7 +7,7 @@ use serde::{Serialize, Serializer};
 /// a new field at the end does not.
 pub const SCHEMA_VERSION: u32 = 1;
 
-/// A classified and tracked cluster. The fields of the JSON form are in this order.
+/// A tracked object, or a cluster in which none was seen. The fields of the JSON form are in this order.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Object {
@@ -17,18 +17,17 @@ pub struct Object {
     pub turn: u64,
     /// The number of its track, from 1.
     pub track: u64,
-    /// The class of the track, from all of its clusters, or `unknown`; `None` if no cluster of it
-    /// had enough points to be classified.
+    /// The class of the track, from all turns, or `unknown`; `None` if it never had enough points for
+    /// one.
     #[serde(serialize_with = "name")]
     pub class: Option<Arc<str>>,
     /// The class that the track resembles most, even if `class` is `unknown`.
     #[serde(serialize_with = "name")]
     pub resembles: Option<Arc<str>>,
-    /// The probability of `resembles` from this cluster alone, at the model's temperature; `None`
-    /// if the cluster has too few points.
+    /// The probability of `resembles` from this turn alone; `None` with too few points.
     #[serde(serialize_with = "rounded")]
     pub confidence: Option<f64>,
-    /// The probability of `resembles` from all clusters of the track.
+    /// The probability of `resembles` from all turns.
     #[serde(serialize_with = "rounded")]
     pub probability: Option<f64>,
     /// The frame of positions and velocities: `sensor`, or `world` if the motion of the sensor is
@@ -61,8 +60,8 @@ pub struct Object {
     /// `None` if packets do not arrive in real time.
     #[serde(serialize_with = "rounded")]
     pub latency_ms: Option<f64>,
-    /// The box of the whole object: its near side is that of this cluster, and its size and direction
-    /// are from all clusters of the track. `None` if the class has no usual size. Its direction is in
+    /// The box of the whole object: its near side is that of this turn, and its size and direction
+    /// are from all turns. `None` while the track is unknown. Its direction is in
     /// -pi..=pi: that of the front once the object has moved, if the motion of the sensor is known. In
     /// JSON it has `centre_m`, `size_m` and `yaw_deg`.
     #[serde(serialize_with = "box_in_degrees")]

@@ -1,18 +1,16 @@
-use edgepuck_segment::{Settings, SettingsError};
+use edgepuck_segment::Settings;
 use formats::geometry::Trajectory;
 use formats::ouster::Metadata;
-
-use crate::error::Error;
 
 /// The options of a pipeline.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct LiveOptions {
-    /// The fewest points of a cluster that is classified.
+    /// The fewest points of an object with a class.
     pub min_points: usize,
     /// In how many clusters an object has been seen when it is first reported; at least 1.
     pub min_turns: u64,
-    /// The settings of the segmentation. The elevations of the rings come from the sensor.
+    /// The settings of the segmentation.
     pub segmentation: Settings,
     /// The poses of the sensor in the world by Unix time, if known.
     pub ego_motion: Option<Trajectory>,
@@ -34,16 +32,4 @@ impl Default for LiveOptions {
             is_recorded: false,
         }
     }
-}
-
-/// Errors of creating a pipeline.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum LiveError {
-    /// Invalid settings of the segmentation.
-    #[error(transparent)]
-    Settings(#[from] SettingsError),
-    /// The classifiers cannot be created.
-    #[error(transparent)]
-    Classifier(#[from] Error),
 }

@@ -1,26 +1,34 @@
 use std::f64::consts::TAU;
+use std::path::Path;
 use std::time::Instant;
 
+use edgepuck_segment::Sweep;
 use formats::geometry::Pose;
 use formats::returns::Return;
 
 use super::arrival::Arrival;
+use super::classes::Classes;
 use super::counts::Counts;
 use super::object::Object;
-use super::object_classifier::ObjectClassifier;
-use super::options::{LiveError, LiveOptions};
+use super::options::LiveOptions;
 use super::packet_clock::Succession;
 use super::report::Seen;
 use super::sensor::{Facts, Flaw};
-use super::sensor_stream::SensorStream;
+use super::sensor_data::SensorData;
 use super::stats::{Stage, Stats};
 use super::tracker::Tracker;
-use super::waiting::{Tag, Waiting};
-use crate::classify::classifier::Classifier;
+use super::turns::{Tag, Turn, Turns};
+use crate::classify::options::Options;
+use crate::detect::{DetectError, Detector};
 
 /// After this number of consecutive packets of another model (about 0.3 s), the sensor is taken as
 /// replaced.
 const MOST_FOREIGN: u32 = 300;
+/// This many turns in a row (about two seconds) are late because the machine is too slow.
+const MOST_LATE: u32 = 20;
+/// The least confidence of an object that a track takes into account: several turns make it sure, or
+/// unknown.
+const LEAST_CONFIDENCE: f64 = 0.15;
 
 /// A decoded packet.
 #[derive(Clone, Copy, Debug)]
@@ -33,118 +41,159 @@ pub struct Decoded<'a> {
     pub turn: u64,
 }
 
-/// Decodes, segments, classifies and tracks the data of one sensor.
+/// Decodes the data of one sensor, and detects and tracks its objects.
 ///
 /// Every packet is decoded or counted as foreign; no packet ends the pipeline, and its memory is
 /// bounded.
 pub struct Pipeline {
     options: LiveOptions,
-    sensor: Option<SensorStream>,
+    sensor: Option<SensorData>,
+    turns: Turns,
     returns: Vec<Return>,
     /// When the packet of `returns` was sent, Unix time in seconds; `None` if it was not used.
     taken_s: Option<f64>,
-    waiting: Waiting,
-    classifiers: ObjectClassifier,
+    detector: Detector,
+    classes: Classes,
     tracker: Tracker,
     counts: Counts,
     stats: Stats,
     /// The flaws of packets so far, one of each kind.
     flaws: Vec<Flaw>,
     n_reported: usize,
+    /// How many turns in a row took longer than the sensor's.
+    n_late: u32,
 }
 
 impl Pipeline {
-    /// A pipeline that classifies clusters with as many threads as `classifier` has.
+    /// A pipeline with a bundled bird's-eye model or the one at a path.
     ///
     /// # Errors
-    /// Invalid settings; threads that cannot be started.
-    pub fn new(classifier: Classifier, options: &LiveOptions) -> Result<Self, LiveError> {
-        options.segmentation.check()?;
-        let classifiers = ObjectClassifier::new(classifier)?;
+    /// A model that cannot be loaded with these options; invalid settings.
+    pub fn open(model: &Path, options: &Options, live: &LiveOptions) -> Result<Self, DetectError> {
+        let mut detector =
+            Detector::with(model, options, live.min_points, live.segmentation.clone())?;
+        detector.min_confidence = LEAST_CONFIDENCE;
+        let classes = Classes::new(&detector.classes());
         Ok(Self {
-            options: options.clone(),
+            options: live.clone(),
             sensor: None,
+            turns: Turns::default(),
             returns: Vec::new(),
             taken_s: None,
-            waiting: Waiting::new(),
-            tracker: Tracker::new(classifiers.classes.len()),
-            classifiers,
+            detector,
+            tracker: Tracker::new(classes.n()),
+            classes,
             counts: Counts::default(),
             stats: Stats::new(),
             flaws: Vec::new(),
             n_reported: 0,
+            n_late: 0,
         })
     }
 
-    /// Takes a packet: decodes it, places it in time, and passes its returns to the stream of
-    /// clusters. [`Pipeline::answer`] then reports the clusters that it completes.
+    /// The names of the classes of objects, `unknown` being the last.
+    pub fn classes(&self) -> impl Iterator<Item = &str> {
+        self.classes.names()
+    }
+
+    /// Takes a packet: decodes it, places it in time, and adds its returns to the turn.
+    /// [`Pipeline::answer`] then reports the objects of the turn that it completes.
     pub fn take(&mut self, payload: &[u8], arrival: Arrival) {
         self.taken_s = None;
         let arrival = arrival.likely();
         match self.decode(payload) {
             Err(flaw) => self.refuse(flaw),
             Ok(facts) => {
-                let decoded = Instant::now();
                 if let Some(packet) = self.in_order(&facts, arrival) {
-                    self.segment(&facts, packet);
+                    self.add(&facts, packet);
                 }
-                self.stats.spend(Stage::Segment, decoded.elapsed());
             }
         }
     }
 
-    /// Reports the complete clusters: classifies them at all widths, assigns those that are
-    /// recognised best to tracks, adds each to the box of its whole object, and passes each to
-    /// `each`, in the order in which the beams passed them.
+    /// Detects the objects of complete turns, assigns them and the clusters of what is left to tracks,
+    /// and passes each to `each`, in the order in which the beams passed them.
     pub fn answer(&mut self, mut each: impl FnMut(&Object)) {
-        let Self { options, waiting, classifiers, tracker, counts, stats, .. } = self;
-        if waiting.nodes.is_empty() {
-            return;
+        while let Some(mut turn) = self.turns.take() {
+            self.answer_turn(&mut turn, &mut each);
+            if turn.is_last {
+                self.tracker.forget();
+            }
+            self.turns.give_back(turn);
         }
-        let start = Instant::now();
-        classifiers.classify(waiting, options.min_points);
-        let classified = Instant::now();
-        stats.spend(Stage::Classify, classified - start);
+    }
 
-        let motion = options.ego_motion.as_ref();
-        for chosen in &classifiers.chosen {
-            let seen = Seen::new(waiting, chosen, motion);
-            let view = classifiers.view(chosen.node);
-            let usual_length_m =
-                classifiers.usual_size_m(chosen.node).map(|[length_m, _]| length_m);
-            let Some(track) = tracker.observe(&seen.observation(view, usual_length_m)) else {
+    fn answer_turn(&mut self, turn: &mut Turn, each: &mut impl FnMut(&Object)) {
+        let Self { options, detector, classes, tracker, counts, stats, .. } = self;
+        let start = Instant::now();
+        let motion = options.ego_motion.as_ref().filter(|_| !turn.points.is_empty());
+        if let Some(motion) = motion {
+            turn.rectify(motion);
+        }
+        let pose = motion.map(|motion| motion.at_unnormalized(turn.last_s()));
+        let sweep = Sweep { points: &turn.points, rings: Some(&turn.rings) };
+        // There are fewer points than a sweep can have, and one ring for each.
+        let Ok(found) = detector.detect(&sweep) else { return };
+        let detected = Instant::now();
+        stats.spend(Stage::Detect, detected - start);
+
+        let clusters = detector.clusters().enumerate();
+        let mut all: Vec<_> = clusters
+            .map(|(number, cluster)| Seen::new(turn, cluster, found.objects.get(number), pose))
+            .collect();
+        all.sort_by(|a, b| a.last_s().total_cmp(&b.last_s()));
+        for seen in all {
+            let is_asked = seen.n_points() >= options.min_points;
+            let view = is_asked.then(|| classes.view(seen.object()));
+            let Some(track) = tracker.observe(&seen.observation(view.as_deref())) else {
                 continue;
             };
-            let fused = classifiers.fused(&track.log_probabilities);
-            seen.fuse_whole(track, fused.as_ref(), view.is_some());
+            let fused = classes.fused(&track.log_probabilities);
+            seen.fuse_whole(track, fused.as_ref());
             // An object that was seen once may be noise.
             if track.n_seen < options.min_turns {
                 continue;
             }
             let latency = seen.latency();
-            each(&seen.report(track, fused.as_ref(), view, latency));
+            each(&seen.report(track, fused.as_ref(), view.as_deref(), latency));
             counts.clusters += 1;
             counts.unclassified += u64::from(view.is_none());
-            latency.into_iter().for_each(|latency| stats.answered_after(latency, seen.turn()));
+            latency.into_iter().for_each(|latency| stats.answered_after(latency));
         }
-        waiting.clear();
-        stats.spend(Stage::Track, classified.elapsed());
+        stats.spend(Stage::Track, detected.elapsed());
+        let (took_s, turn_s) = (start.elapsed().as_secs_f64(), tracker.turn_s());
+        let is_live = turn.tags.iter().any(|tag| tag.moment.is_some());
+        self.n_late = if is_live && took_s > turn_s { self.n_late + 1 } else { 0 };
+        if self.n_late == MOST_LATE {
+            self.note(Flaw::Late { took_s, turn_s });
+        }
     }
 
-    /// Completes all clusters, for example at the end of a recording.
+    /// Completes the turn, for example at the end of a recording.
     pub fn end(&mut self) {
         self.taken_s = None;
-        let Self { sensor: Some(sensor), waiting, options, .. } = self else { return };
-        sensor.end(waiting, options.ego_motion.as_ref());
+        self.turns.end();
+    }
+
+    /// Completes the turn, after which all objects are new ones.
+    fn break_off(&mut self) {
+        self.taken_s = None;
+        if self.turns.break_off() {
+            self.tracker.forget();
+        }
     }
 
     /// Decodes the returns of a packet; the first one decides which sensor it is.
     fn decode(&mut self, payload: &[u8]) -> Result<Facts, Flaw> {
-        let Self { sensor, options, returns, stats, .. } = self;
+        let Self { sensor, options, turns, returns, stats, .. } = self;
         let start = Instant::now();
         let sensor = match sensor {
             Some(sensor) => sensor,
-            None => sensor.insert(SensorStream::new(payload, options)?),
+            None => {
+                let first = sensor.insert(SensorData::new(payload, options)?);
+                turns.begin(first.capacity());
+                first
+            }
         };
         let facts = sensor.decoder.decode(payload, returns)?;
         sensor.n_foreign = 0;
@@ -159,10 +208,9 @@ impl Pipeline {
             sensor.n_foreign += 1;
             // The first sensor is silent, and another one sends instead.
             if flaw.is_of_another_model() && sensor.n_foreign >= MOST_FOREIGN {
-                self.end();
+                self.break_off();
                 self.sensor = None;
                 self.counts.restarts += 1;
-                self.tracker.forget();
             }
         }
         self.note(flaw);
@@ -189,8 +237,7 @@ impl Pipeline {
             Succession::First => {}
             Succession::Restart => {
                 self.counts.restarts += 1;
-                self.end();
-                self.tracker.forget();
+                self.break_off();
             }
             Succession::Follows { missing } => {
                 self.counts.lost += missing.saturating_sub(facts.n_unsent);
@@ -204,24 +251,22 @@ impl Pipeline {
         }
         let is_used = !matches!(succession, Succession::Duplicate | Succession::Late);
         let is_behind_gap = matches!(succession, Succession::Follows { missing: 1.. });
-        is_used.then_some((Tag { time_s, moment: arrival.moment, ring: 0 }, is_behind_gap))
+        is_used.then_some((Tag { time_s, moment: arrival.moment }, is_behind_gap))
     }
 
-    /// Passes the decoded returns of a packet to the stream.
-    fn segment(&mut self, facts: &Facts, packet: (Tag, bool)) {
-        let Self { sensor: Some(sensor), options, returns, waiting, counts, .. } = self else {
-            return;
-        };
+    /// Adds the decoded returns of a packet to the turn.
+    fn add(&mut self, facts: &Facts, packet: (Tag, bool)) {
+        let Self { turns, returns, counts, .. } = self;
         self.taken_s = Some(packet.0.time_s);
         counts.packets += 1;
         counts.points += returns.len() as u64;
         if facts.speed_rad_us > 0.0 {
             self.tracker.set_turn(TAU / facts.speed_rad_us * 1e-6);
         }
-        let n_turns = sensor.stream.n_turns();
-        sensor.push(facts, returns, packet, waiting, options.ego_motion.as_ref());
-        counts.dropped_points = sensor.stream.dropped().total();
-        if sensor.stream.n_turns() > n_turns {
+        let n_turns = turns.n_ended();
+        SensorData::push(turns, facts, returns, packet);
+        counts.dropped_points = turns.n_dropped();
+        if turns.n_ended() > n_turns {
             self.stats.end_turn(counts);
         }
     }
@@ -230,7 +275,7 @@ impl Pipeline {
     /// foreign, and after [`Pipeline::end`].
     #[must_use]
     pub fn decoded(&self) -> Option<Decoded<'_>> {
-        let turn = self.sensor.as_ref()?.stream.n_turns();
+        let turn = self.turns.n_ended();
         self.taken_s.map(|time_s| Decoded { returns: &self.returns, time_s, turn })
     }
 

@@ -3,24 +3,26 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use formats::geometry::{OrientedBox, Pose, Trajectory};
+use edgepuck_segment::Cluster;
+use formats::geometry::{OrientedBox, Pose};
 use glam::DVec3;
 
+use super::classes::Fused;
 use super::footprint::Observation;
 use super::object::{Object, SCHEMA_VERSION};
-use super::object_classifier::{Chosen, Fused};
 use super::tracker::Track;
-use super::waiting::{Tag, Waiting};
+use super::turns::{Tag, Turn};
 use super::whole::Whole;
-use crate::classify::usual_size::usual_size_m;
+use crate::detect;
 
-/// A cluster of the best cut, and where it is.
-pub struct Seen {
+/// A cluster of a turn, and where it is.
+pub struct Seen<'a> {
     /// Its first and its last point.
     span: [Tag; 2],
     turn: u64,
     n_points: usize,
-    ground_z_m: Option<f32>,
+    /// The object that was seen in it.
+    object: Option<&'a detect::Object>,
     /// The box around its points, in the sensor's frame.
     in_sensor: OrientedBox<f32>,
     /// The pose of the sensor, if its motion is known.
@@ -31,41 +33,52 @@ pub struct Seen {
     yaw_deg: f64,
 }
 
-impl Seen {
-    pub fn new(waiting: &Waiting, chosen: &Chosen, motion: Option<&Trajectory>) -> Self {
-        let cluster = &waiting.nodes[chosen.node];
-        let points = &waiting.points[cluster.points.clone()];
-        let pose = motion.map(|motion| motion.at_unnormalized(cluster.pose_s));
-        let in_sensor = OrientedBox::around(points);
+impl<'a> Seen<'a> {
+    pub fn new(
+        turn: &Turn,
+        cluster: Cluster<'_>,
+        object: Option<&'a detect::Object>,
+        pose: Option<Pose>,
+    ) -> Self {
+        let of = |point: &u32| *point as usize;
+        let in_sensor = object.map_or_else(
+            || {
+                let points: Vec<_> = cluster.points.iter().map(|at| turn.points[of(at)]).collect();
+                OrientedBox::around(&points)
+            },
+            |object| object.place,
+        );
+        let tags = || cluster.points.iter().map(|point| turn.tags[of(point)]);
+        let by_time = |a: &Tag, b: &Tag| a.time_s.total_cmp(&b.time_s);
+        let span = [tags().min_by(by_time), tags().max_by(by_time)].map(Option::unwrap_or_default);
         let (place, yaw_deg) = placed(&in_sensor, pose);
-        Self {
-            span: chosen.span,
-            turn: cluster.turn,
-            n_points: points.len(),
-            ground_z_m: cluster.ground_z_m,
-            in_sensor,
-            pose,
-            place,
-            yaw_deg,
-        }
+        let (turn, n_points) = (turn.number, cluster.points.len());
+        Self { span, turn, n_points, object, in_sensor, pose, place, yaw_deg }
     }
 
-    /// The cluster for the tracker, with the answer of the network and the usual length of the class
-    /// that it gives the cluster alone.
-    pub fn observation<'a>(
-        &self,
-        view: Option<&'a [f64]>,
-        usual_length_m: Option<f32>,
-    ) -> Observation<'a> {
-        let [_, last] = self.span;
+    /// When its last point was measured, Unix time in seconds.
+    pub fn last_s(&self) -> f64 {
+        self.span[1].time_s
+    }
+
+    pub fn object(&self) -> Option<&'a detect::Object> {
+        self.object
+    }
+
+    pub fn n_points(&self) -> usize {
+        self.n_points
+    }
+
+    /// The cluster for the tracker, with the log-probabilities of its classes.
+    pub fn observation<'b>(&self, view: Option<&'b [f64]>) -> Observation<'b> {
         Observation {
-            time_s: last.time_s,
+            time_s: self.last_s(),
             position_m: self.place.centre_m,
             size_m: [self.place.size_m[0], self.place.size_m[1]],
             yaw_rad: self.place.yaw_rad,
             sensor_m: self.sensor_m(),
             view,
-            usual_length_m,
+            whole_length_m: self.object.map(|object| object.whole.size_m[0]),
         }
     }
 
@@ -73,21 +86,20 @@ impl Seen {
         self.pose.map_or([0.0; 2], |pose| pose.position_m.truncate().to_array())
     }
 
-    /// Adds the cluster to the box of the whole object of its `track`, by the usual size of the
-    /// track's class. A class without one has no such box, and neither a piece of an object nor a
-    /// cluster that was not classified changes it.
-    pub fn fuse_whole(&self, track: &mut Track, fused: Option<&Fused>, is_classified: bool) {
-        let usual = fused.and_then(|fused| Some((fused.class, usual_size_m(&fused.answer)?)));
-        match usual {
-            Some((class, usual_m)) if is_classified && !track.is_piece => {
-                let whole = self.in_sensor.completed(usual_m, self.ground_z_m);
-                // Without the sensor's motion, a velocity does not tell the front.
-                let velocity_m_s = track.settled_velocity_m_s().filter(|_| self.pose.is_some());
-                let (place, _) = placed(&whole, self.pose);
-                track.whole.fuse(class, &place, self.sensor_m(), velocity_m_s);
-            }
-            Some(_) => {}
-            None => track.whole = Whole::default(),
+    /// Adds the object that was seen to the box of the whole object of its `track`, if it has the
+    /// track's class. A piece of an object does not change that box, and an unknown track has none.
+    pub fn fuse_whole(&self, track: &mut Track, fused: Option<&Fused>) {
+        let known = fused.filter(|fused| fused.answer == fused.resembles);
+        let Some(fused) = known else {
+            track.whole = Whole::default();
+            return;
+        };
+        let is_own = |object: &&detect::Object| *object.class == *fused.answer && !track.is_piece;
+        if let Some(object) = self.object.filter(is_own) {
+            // Without the sensor's motion, a velocity does not tell the front.
+            let velocity_m_s = track.settled_velocity_m_s().filter(|_| self.pose.is_some());
+            let (place, _) = placed(&object.whole, self.pose);
+            track.whole.fuse(fused.class, &place, self.sensor_m(), velocity_m_s);
         }
     }
 
@@ -95,11 +107,6 @@ impl Seen {
     pub fn latency(&self) -> Option<Duration> {
         let [_, last] = self.span;
         last.moment.map(|moment| moment.elapsed())
-    }
-
-    /// The number of the turn.
-    pub fn turn(&self) -> u64 {
-        self.turn
     }
 
     /// The result for the cluster, with its track's class.

@@ -6,7 +6,7 @@ use formats::packets::PacketError;
 pub use formats::packets::{Decoder, Facts};
 use formats::velodyne;
 
-/// Why a payload is not the sensor's data, or its time is implausible.
+/// Why a payload is not the sensor's data, its time is implausible, or its objects come late.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Flaw {
@@ -23,6 +23,17 @@ pub enum Flaw {
         recorded_s: f64,
         /// The same by the stamps.
         stamped_s: f64,
+    },
+    /// Several turns in a row took too long, although packets arrive in real time.
+    #[error(
+        "the objects of a turn take {took_s:.3} s, and the sensor turns in {turn_s:.3} s: results come \
+         late, and packets may be lost: try --precision i8 or more threads"
+    )]
+    Late {
+        /// How long they took, seconds.
+        took_s: f64,
+        /// How long a turn takes, seconds.
+        turn_s: f64,
     },
 }
 
@@ -45,7 +56,9 @@ impl Flaw {
             (Self::Packet(Ouster(a)), Self::Packet(Ouster(b))) => {
                 discriminant(a) == discriminant(b)
             }
-            (Self::Times { .. }, Self::Times { .. }) => true,
+            (Self::Times { .. }, Self::Times { .. }) | (Self::Late { .. }, Self::Late { .. }) => {
+                true
+            }
             _ => false,
         }
     }

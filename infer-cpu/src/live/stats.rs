@@ -9,10 +9,8 @@ formats::named! {
     pub enum Stage: "stage" {
         /// Decoding packets.
         Decode = "decode",
-        /// Segmenting points into clusters.
-        Segment = "segment",
-        /// Classifying clusters.
-        Classify = "classify",
+        /// Detecting the objects of turns.
+        Detect = "detect",
         /// Computing boxes and tracks.
         Track = "track",
     }
@@ -26,8 +24,6 @@ pub struct Stats {
     latency: Histogram<u64>,
     /// The counts at the end of the last whole turn.
     whole: Counts,
-    /// The longest time of the first turn, whose ground is known at its end.
-    first_turn: Option<Duration>,
 }
 
 /// The longest duration in a histogram, microseconds.
@@ -42,7 +38,6 @@ impl Stats {
             stages: Stage::ALL.map(|_| histogram()),
             latency: histogram(),
             whole: Counts::default(),
-            first_turn: None,
         }
     }
 
@@ -58,11 +53,8 @@ impl Stats {
         }
     }
 
-    pub(super) fn answered_after(&mut self, latency: Duration, turn: u64) {
-        match turn {
-            0 => self.first_turn = self.first_turn.max(Some(latency)),
-            _ => self.latency.saturating_record(latency.as_micros() as u64),
-        }
+    pub(super) fn answered_after(&mut self, latency: Duration) {
+        self.latency.saturating_record(latency.as_micros() as u64);
     }
 
     /// Points and clusters of the average turn.
@@ -89,16 +81,7 @@ impl Stats {
         self.stages[stage as usize].mean() / 1e3
     }
 
-    /// The longest time from a cluster's last packet to its result in the first turn, milliseconds;
-    /// `None` if packets did not arrive in real time. The clusters of that turn wait for its end,
-    /// because the ground is that of the turn before.
-    #[must_use]
-    pub fn first_turn_ms(&self) -> Option<f64> {
-        self.first_turn.map(|latency| latency.as_secs_f64() * 1e3)
-    }
-
-    /// The quantile `share` (0 to 1) of the times from a cluster's last packet to its result in all
-    /// later turns, milliseconds; `None` if packets did not arrive in real time.
+    /// The quantile `share` (0 to 1) of the times from an object's last packet to its result, milliseconds; `None` if packets did not arrive in real time.
     #[must_use]
     pub fn latency_ms(&self, share: f64) -> Option<f64> {
         (!self.latency.is_empty()).then(|| self.latency.value_at_quantile(share) as f64 / 1e3)
@@ -114,15 +97,15 @@ mod tests {
     fn each_turn_counts_with_its_own_time() {
         let mut stats = Stats::new();
         for turn in 0..10 {
-            stats.spend(Stage::Segment, Duration::from_millis(turn));
-            stats.spend(Stage::Segment, Duration::from_millis(2));
-            stats.answered_after(Duration::from_millis(20 - turn), turn);
+            stats.spend(Stage::Detect, Duration::from_millis(turn));
+            stats.spend(Stage::Detect, Duration::from_millis(2));
+            stats.answered_after(Duration::from_millis(20 - turn));
             stats.end_turn(&Counts { points: 5 * (turn + 1), ..Counts::default() });
         }
         let near = |found: f64, expected: f64| (found - expected).abs() <= 0.01 * expected;
-        assert!(near(stats.mean_ms(Stage::Segment), 6.5) && stats.mean_ms(Stage::Track) == 0.0);
-        assert!(near(stats.stage_ms(Stage::Segment, 1.0), 11.0) && stats.n_turns() == 10);
-        assert_eq!((stats.first_turn_ms(), stats.per_turn()), (Some(20.0), [5.0, 0.0]));
-        assert!(near(stats.latency_ms(1.0).unwrap(), 19.0));
+        assert!(near(stats.mean_ms(Stage::Detect), 6.5) && stats.mean_ms(Stage::Track) == 0.0);
+        assert!(near(stats.stage_ms(Stage::Detect, 1.0), 11.0) && stats.n_turns() == 10);
+        assert_eq!(stats.per_turn(), [5.0, 0.0]);
+        assert!(near(stats.latency_ms(1.0).unwrap(), 20.0));
     }
 }

@@ -166,6 +166,11 @@ impl Tracker {
         self.turn_s = turn_s.clamp(LEAST_TURN_S, MOST_TURN_S);
     }
 
+    /// How long a turn takes, seconds.
+    pub fn turn_s(&self) -> f64 {
+        self.turn_s
+    }
+
     /// Forgets all objects; track numbers continue.
     pub fn forget(&mut self) {
         for track in &mut self.tracks {
@@ -214,7 +219,7 @@ impl Tracker {
         if matched.is_some_and(|at| self.tracks[at].n_whole >= SETTLED) {
             return None;
         }
-        let is_short = seen.usual_length_m.is_some_and(|length_m| length_m < SHORT_M);
+        let is_short = seen.whole_length_m.is_some_and(|length_m| length_m < SHORT_M);
         let holds = |track: &Track| {
             let is_older = track.n_seen > n_seen && seen.time_s - track.last_whole_s <= PATIENCE_S;
             let is_another = is_short && track.whole.place.size_m[0] > f64::from(SHORT_M);
@@ -264,7 +269,7 @@ mod tests {
             yaw_rad: 0.0,
             sensor_m: [0.0; 2],
             view: None,
-            usual_length_m: None,
+            whole_length_m: None,
         }
     }
 
@@ -296,7 +301,7 @@ mod tests {
         assert!(track.id == 1 && track.is_piece && track.whole.place == whole);
         assert_eq!(track.velocity_m_s(), None);
         assert!(tracker.observe(&Observation { time_s: 0.1, ..car }).is_none());
-        let person = Observation { usual_length_m: Some(0.8), ..seen(0.1, 11.0, 0.7) };
+        let person = Observation { whole_length_m: Some(0.8), ..seen(0.1, 11.0, 0.7) };
         assert_eq!(tracker.observe(&person).unwrap().id, 2);
         assert_eq!(tracker.observe(&seen(0.1, 10.0, -1.5)).unwrap().id, 3);
         let longer = Observation { size_m: [6.0, 1.0], ..seen(0.1, 10.0, 0.5) };

@@ -6,14 +6,12 @@ use std::process::{Child, Command, Stdio};
 use std::thread;
 use std::time::Duration;
 
-use formats::model_card::{ModelCard, Normalization};
 use serde_json::Value;
 
-use crate::program::{Folder, card};
+use crate::program::Folder;
 use crate::street::{PACKET_S, PACKETS_PER_S, Thing, capture, capture_of, packets, street};
-use crate::tiny_model;
 
-pub const LIVE: &str = "live --model m.safetensors --threads 1 --min-turns 1";
+pub const LIVE: &str = "live --threads 1 --min-turns 1";
 
 /// The order of keys is part of the format.
 const KEYS: [&str; 18] = [
@@ -37,17 +35,9 @@ const KEYS: [&str; 18] = [
     "whole_box",
 ];
 
-/// A folder with a model of clusters.
-pub fn model_folder() -> Folder {
-    let folder = Folder::new();
-    let card = ModelCard { normalization: Normalization::Metric, ..card() };
-    tiny_model::write(&folder.path("m.safetensors"), &tiny_model::tensors(4), &card);
-    folder
-}
-
-/// The same, with a capture `drive.pcap` of one second from Unix time 1000 s on.
+/// A folder with a capture `drive.pcap` of one second from Unix time 1000 s on.
 pub fn folder() -> Folder {
-    let folder = model_folder();
+    let folder = Folder::new();
     let sent = packets(&street(), 7, PACKETS_PER_S);
     let time_us = |i: usize| 1_000_000_000 + (i as f64 * PACKET_S * 1e6) as u64;
     let timed = sent.iter().enumerate().map(|(i, packet)| (time_us(i), &packet[..]));
@@ -92,11 +82,7 @@ fn in_real_time_a_capture_takes_its_time_and_answers_have_latencies() {
     let ran = run("drive.pcap");
     let latencies: Vec<_> = ran.json().iter().map(|o| o["latency_ms"].as_f64().unwrap()).collect();
     assert!(!latencies.is_empty() && latencies.iter().all(|ms| *ms > 0.0));
-    let first = ran.json().into_iter().filter(|object| object["turn"] == 0);
-    let first = first.map(|object| object["latency_ms"].as_f64().unwrap()).fold(0.0, f64::max);
-    let first =
-        format!("of the first turn, whose objects wait for its end, left out above: {first:.3} ms");
-    for word in ["decode", "segment", "classify", "track", "latency, ms", &first, "0 lost"] {
+    for word in ["decode", "detect", "track", "latency, ms", "0 lost"] {
         assert!(ran.err.contains(word), "{}", ran.err);
     }
 }
@@ -190,26 +176,26 @@ fn the_stamps_of_a_sensor_rule_over_the_times_of_a_capture() {
 }
 
 #[test]
-fn a_model_of_whole_objects_warns_and_bundled_models_have_names() {
+fn models_have_names_and_those_of_clouds_are_refused() {
     let folder = folder();
-    let cars = |line: &str| {
+    let objects = |line: &str| {
         let ran = folder.run(&format!("live --pcap drive.pcap --threads 1 {line}"));
-        let n_cars = ran.json().iter().filter(|object| object["class"] == "car").count();
-        (ran.err, n_cars)
+        (ran.err, ran.out)
     };
-    // Two of the three things are cars, for ten turns.
-    let (err, n_cars) = cars("");
-    assert_eq!((err.as_str(), n_cars >= 10), ("", true), "{n_cars}");
-    assert_eq!(cars("--model street-128"), (err, n_cars));
-    for model in ["edge-64", "shapes-rotational-64"] {
+    let (err, out) = objects("");
+    assert_eq!((err.as_str(), out.lines().count() >= 20), ("", true), "{out}");
+    assert_eq!(objects("--model street-bev"), (err, out));
+    for model in ["edge-64", "street-128"] {
         let ran = folder.run(&format!("live --pcap drive.pcap --model {model}"));
-        ran.assert_refused(2, &format!("error: {model}: expected a model of clusters in metres"));
+        ran.assert_refused(1, &format!("error: {model}: card: expected a bird's-eye model"));
     }
+    let ran = folder.run("classify --model street-bev drive.pcap");
+    ran.assert_refused(1, "error: street-bev: card: expected a model of clouds");
 }
 
 #[test]
 fn a_silent_sensor_is_reported() {
-    let folder = model_folder();
+    let folder = Folder::new();
     let port = free_port();
     let mut child = listen(&folder, port, "");
     let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
@@ -246,7 +232,7 @@ pub fn terminate(child: &mut Child) -> (Option<i32>, String) {
 
 #[test]
 fn udp_packets_are_answered_at_once_and_sigterm_ends_the_run() {
-    let folder = model_folder();
+    let folder = Folder::new();
     let port = free_port();
     let mut child = listen(&folder, port, "--json --stats");
     let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
@@ -273,7 +259,7 @@ fn udp_packets_are_answered_at_once_and_sigterm_ends_the_run() {
 
 #[test]
 fn packets_from_other_addresses_are_not_looked_at() {
-    let folder = model_folder();
+    let folder = Folder::new();
     let port = free_port();
     let mut child = listen(&folder, port, "--from 127.0.0.9 --stats");
     let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
@@ -292,7 +278,7 @@ fn packets_from_other_addresses_are_not_looked_at() {
 
 #[test]
 fn an_address_that_cannot_be_bound_is_named() {
-    let folder = model_folder();
+    let folder = Folder::new();
     let taken = UdpSocket::bind("127.0.0.1:0").unwrap();
     let port = taken.local_addr().unwrap().port();
     let address = format!("127.0.0.1:{port}");

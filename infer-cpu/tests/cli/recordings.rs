@@ -11,7 +11,7 @@ use std::time::Duration;
 use mcap::MessageStream;
 use mcap::read::Options;
 
-use crate::live::{LIVE, folder, free_port, listen, model_folder, terminate};
+use crate::live::{LIVE, folder, free_port, listen, terminate};
 use crate::program::Folder;
 use crate::street::{PACKET_S, packets, street};
 
@@ -80,7 +80,7 @@ fn recorded(folder: &Folder) -> Child {
 
 #[test]
 fn a_recording_of_a_killed_program_can_be_read() {
-    let folder = model_folder();
+    let folder = Folder::new();
     let mut child = recorded(&folder);
     child.kill().unwrap();
     child.wait().unwrap();
@@ -89,7 +89,7 @@ fn a_recording_of_a_killed_program_can_be_read() {
 
 #[test]
 fn sigterm_ends_a_recording_with_what_has_come() {
-    let folder = model_folder();
+    let folder = Folder::new();
     let mut child = recorded(&folder);
     let (code, err) = terminate(&mut child);
     assert_eq!((code, err.lines().count()), (Some(0), 2), "{err}");

@@ -6,25 +6,26 @@
 
 #![no_main]
 
-use formats::model_card::Normalization;
+use std::path::Path;
+
 use infer_cpu::live::{Arrival, LiveOptions, Object, Pipeline, Pose, Trajectory};
-use infer_cpu::{Classifier, Options};
+use infer_cpu::Options;
 use libfuzzer_sys::fuzz_target;
 
-const MODEL: &[u8] = include_bytes!("../../../assets/weights/untrained-test.safetensors");
+const MODEL: &str =
+    concat!(env!("CARGO_MANIFEST_DIR"), "/../../assets/weights/street-bev.safetensors");
 const COMMAND: usize = 16;
 
 fuzz_target!(|bytes: &[u8]| {
     let Some((&choice, commands)) = bytes.split_first() else { return };
-    let metric = Options { normalization: Some(Normalization::Metric), ..Options::default() };
-    let classifier = Classifier::from_bytes(MODEL, &metric).expect("a model");
     let mut options = LiveOptions::default();
     if choice & 1 == 1 {
         let turned = Pose::at([30.0, 0.0, 1.0]).turned_deg(f64::from(choice), 5.0, 0.0);
         let poses = vec![(0.0, Pose::IDENTITY), (10.0, turned)];
         options.ego_motion = Some(Trajectory::new(poses).expect("finite poses"));
     }
-    let mut pipeline = Pipeline::new(classifier, &options).expect("the default settings");
+    let model = Path::new(MODEL);
+    let mut pipeline = Pipeline::open(model, &Options::default(), &options).expect("a model");
     for command in commands.as_chunks::<COMMAND>().0 {
         let time_s = f64::from_le_bytes(std::array::from_fn(|i| command[8 + i]));
         let time_s = if command[0] & 1 == 1 { time_s } else { f64::from(stamp_us(command)) * 1e-6 };

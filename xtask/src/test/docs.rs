@@ -37,7 +37,9 @@ fn run_with(wheel: &Wheel, programs: &Programs) -> anyhow::Result<Counts> {
 
     let mut tests = pytest(&python, &folder);
     tests.arg(root().join("docs"));
-    for name in ["test_readme", "test_torch", "test_training", "test_import_weights"] {
+    for name in
+        ["test_readme", "test_torch", "test_training", "test_birdseye", "test_import_weights"]
+    {
         tests.arg(root().join("python/tests").join(name).with_extension("py"));
     }
     // `pip install edgepuck` in a block finds the wheel.

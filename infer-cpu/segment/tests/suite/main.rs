@@ -3,12 +3,11 @@
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+mod claims;
 mod clusters;
 mod components;
 mod frames;
 mod ground;
-mod hierarchy;
 mod inputs;
 mod real_frames;
 mod scanner;
-mod stream;

@@ -11,8 +11,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use crate::live::{Counts, Flaw, LiveError, LiveOptions, Pipeline, Recorder, Timeline, Trajectory};
-use crate::{Classifier, Error, Options, Precision};
+use crate::detect::DetectError;
+use crate::live::{Counts, Flaw, LiveOptions, Pipeline, Recorder, Timeline, Trajectory};
+use crate::{Options, Precision};
 use formats::ouster::Metadata;
 use formats::plausible::sensor_motion;
 use formats::trajectory::check_cover;
@@ -26,8 +27,8 @@ use notify::Notifier;
 use outputs::Outputs;
 use source::{Sensor, Source, Tick};
 
-/// The bundled model for clusters of streets.
-const MODEL: &str = "street-128";
+/// The bundled bird's-eye model of streets.
+const MODEL: &str = "street-bev";
 
 /// The silence of a sensor after which the user gets a warning: a turn takes at most 0.2 s.
 const SILENCE: Duration = Duration::from_secs(5);
@@ -84,11 +85,11 @@ pub struct LiveArgs {
     metadata: Option<PathBuf>,
 
     /// Poses of the sensor in the world, in TUM's format (Unix time x y z qx qy qz qw), by which
-    /// clusters are deskewed and tracked in the world; they must cover all packets
+    /// turns are deskewed and objects tracked in the world; they must cover all packets
     #[arg(long, value_name = "FILE")]
     poses: Option<PathBuf>,
 
-    /// Fewest points of a cluster that is classified
+    /// Fewest points of an object with a class
     #[arg(long, default_value_t = 20, value_name = "N")]
     min_points: usize,
 
@@ -100,11 +101,11 @@ pub struct LiveArgs {
     #[command(flatten)]
     model: ModelArgs,
 
-    /// Precision of the network: f32 or i8
+    /// Precision of the networks: f32 or i8
     #[arg(long, default_value = "f32")]
     precision: Precision,
 
-    /// Number of threads that classify [default: one per core, at most 4]
+    /// Number of threads that detect [default: one per core, at most 4]
     #[arg(long, value_name = "T", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
 }
@@ -157,7 +158,7 @@ pub fn run(args: &LiveArgs) -> anyhow::Result<Outcome> {
         }
         for flaw in pipeline.new_flaws() {
             match flaw {
-                Flaw::Times { .. } => program::say!("warning: {flaw}"),
+                Flaw::Times { .. } | Flaw::Late { .. } => program::say!("warning: {flaw}"),
                 _ => program::say!(
                     "warning: ignored a packet, and will ignore others with the same flaw: {flaw}"
                 ),
@@ -220,11 +221,8 @@ impl LiveArgs {
         let (model, _) = self.model.open_or(MODEL)?;
         let threads = n_threads(self.threads);
         let options = Options { precision: self.precision, threads, ..Options::default() };
-        let classifier = Classifier::load(&model, &options).map_err(of_setup)?;
-        Pipeline::new(classifier, live).map_err(|error| match error {
-            LiveError::Classifier(Error::WholeObjects(cause)) => {
-                Usage(format!("{}: {cause}", model.display())).into()
-            }
+        Pipeline::open(&model, &options, live).map_err(|error| match error {
+            DetectError::Model(error) => of_setup(error),
             error => error.into(),
         })
     }

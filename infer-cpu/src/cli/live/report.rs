@@ -20,12 +20,6 @@ pub fn print(pipeline: &Pipeline, read: &Read) {
     {
         program::say!("{:<22} {:>8} {p50:>8.3} {p90:>8.3} {p99:>8.3}", "latency, ms", "");
     }
-    if let Some(most) = stats.first_turn_ms() {
-        program::say!(
-            "latency of the first turn, whose objects wait for its end, left out above: {most:.3} ms \
-             at most"
-        );
-    }
     let [points, clusters] = stats.per_turn();
     program::say!(
         "{} of {points:.0} points and {clusters:.1} clusters on average",

@@ -1,0 +1,52 @@
+"""The objects at the peaks of the network's scores, as infer-cpu/src/birdseye/peaks.rs finds them."""
+
+import numpy as np
+import torch
+from grid import CELL_M, REACH_M, raster
+from network import N_CLASSES
+from numpy import ndarray
+from torch.nn import functional as F
+
+SIDE = int(2 * REACH_M / CELL_M)
+REACH = [3, 1, 2, 4]
+APART_M, CLOSER = [1.5, 0.4, 0.45, 3.0], 0.6
+# How far about a box its points are, and about a person, metres; and up to which height.
+MARGIN_M, PERSON_M, HIGHEST_M = 0.15, 0.55, 4.0
+PERSON = 1
+
+
+def scores(net: torch.nn.Module, points: ndarray) -> tuple[ndarray, ndarray]:
+    """The outputs of the network, and the scores of its classes. `points` are those of `grid.points_of`, in metres."""
+    with torch.no_grad():
+        image = torch.from_numpy(raster(points, -REACH_M, -REACH_M, SIDE))[None]
+        output = net(image.contiguous(memory_format=torch.channels_last))[0].float()
+    return output.numpy(), torch.sigmoid(output[:N_CLASSES]).numpy()
+
+
+def objects(output: ndarray, score: ndarray, least: float) -> list[tuple]:
+    """(score, class, x, y, length, width, height, yaw), the best first."""
+    pooled = [F.max_pool2d(torch.from_numpy(score)[None, c : c + 1], 2 * r + 1, 1, r)[0, 0] for c, r in enumerate(REACH)]
+    is_peak = (score == torch.stack(pooled).numpy()) & (score >= least)
+    seen = []
+    for of, i, j in zip(*np.nonzero(is_peak), strict=True):
+        u, v, *sizes, cos, sin = output[N_CLASSES:, i, j]
+        at = [(cell + 0.5 + off) * CELL_M - REACH_M for cell, off in ((i, u), (j, v))]
+        seen.append((float(score[of, i, j]), int(of), *at, *np.exp(np.clip(sizes, -2, 3)), np.arctan2(sin, cos) / 2))
+    kept: list[tuple] = []
+    for one in sorted(seen, reverse=True):
+        apart = [max(APART_M[one[1]], APART_M[other[1]]) * (1 if one[1] == other[1] else CLOSER) for other in kept]
+        if all(np.hypot(one[2] - other[2], one[3] - other[3]) > m for other, m in zip(kept, apart, strict=True)):
+            kept.append(one)
+    return kept
+
+
+def within(points: ndarray, of: int, x: float, y: float, length: float, width: float, yaw: float) -> ndarray:
+    """Which points are those of an object."""
+    off = points[:, :2] - np.array([x, y], np.float32)
+    if of == PERSON:
+        inside = np.hypot(*off.T) < PERSON_M
+    else:
+        ahead = np.array([np.cos(yaw), np.sin(yaw)])
+        inside = np.abs(off @ ahead) < length / 2 + MARGIN_M
+        inside &= np.abs(off @ np.array([-ahead[1], ahead[0]])) < width / 2 + MARGIN_M
+    return inside & (points[:, 3] == 0) & (points[:, 2] < HIGHEST_M)
