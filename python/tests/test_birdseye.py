@@ -30,7 +30,7 @@ def random_network() -> "torch.nn.Module":
             part.running_var.uniform_(0.5, 2)
             part.weight.data.uniform_(0.5, 1.5)
             part.bias.data.normal_(0, 0.2)
-    net.head.bias.data[: 4 * network.N_CLASSES] = -1
+    net.head.bias.data[: 4 * network.N_CLASSES] = -2.3
     return net.eval()
 
 
@@ -54,8 +54,8 @@ def test_detect_sees_what_the_network_sees(tmp_path: Path, monkeypatch: pytest.M
     boxes = peaks.objects(*peaks.scores(net, seen), 0.05)
     expected = np.array([[x, y, length, width, height, score] for score, _, x, y, length, width, height, _ in boxes])
     found = ep.detect(scan, tmp_path / "random.safetensors", min_confidence=0.0, min_points=5)
-    assert len(found) > 50
+    assert len(found) > 20
     told = np.array([[*one.whole_centre[:2], *one.whole_size, one.confidence] for one in found])
     off = np.abs(told[:, None] - expected[None]).max(2).min(1)
-    # f16 weights are the same in both; a point on the border of a cell may fall on either side of it.
-    assert np.mean(off < 0.01) > 0.9, np.sort(off)
+    # Of two peaks as far apart as two objects must be, rounding decides whether both are kept.
+    assert np.mean(off < 0.001) > 0.8, np.sort(off)

@@ -1,10 +1,9 @@
 """TrackEval's HOTA of `infer-cpu live` on a simulated drive, beside assignment by the Hungarian method.
 
-The tracker of `live` takes each cluster as soon as it is complete, to the track that expects it
-most. A tracker of the same Kalman filters and footprints that waits for the turn to end, and then
-assigns all of its clusters at once by SciPy's `linear_sum_assignment`, but does not know pieces of
-objects by their whole boxes, must be worse by five points of HOTA on the mean of three drives: it is by
-ten. Both get the same clusters, those that `live` reports; the truth is the drive's. Run by
+The tracker of `live` takes the clusters of a turn one after the other, each to the track that expects
+it most. A tracker of the same Kalman filters and footprints that assigns all of them at once by SciPy's
+`linear_sum_assignment`, but does not know pieces of objects by their whole boxes, must be worse by
+five points of HOTA on the mean of three drives: it is by six. Both get the same clusters, those that `live` reports; the truth is the drive's. Run by
 `cargo xtask test`; see xtask/src/test/peers.rs.
 """
 

@@ -10,7 +10,7 @@ use super::confidence::Confidence;
 use crate::birdseye::{BirdsEye, Heights, Scores, Seen, Standing};
 
 /// The network's least score of a box, and of a cluster's place: what is less likely is not asked about. On labelled
-/// sweeps, lower ones find nothing more (assets/reports/reality/frames.md).
+/// sweeps, lower ones find nothing more (assets/reports/reality/by-class.md).
 const LEAST_OF_BOX: f32 = 0.05;
 const LEAST_OF_CLUSTER: f32 = 0.03;
 /// The widest clusters of each class of the network, metres along the diagonal, and how far about their

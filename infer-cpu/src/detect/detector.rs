@@ -16,7 +16,7 @@ use crate::error::Error;
 use crate::model::source::ModelSource;
 
 /// The least confidence of an object, chosen with one source of labelled sweeps left out after the other
-/// (assets/reports/reality/frames.md).
+/// (assets/reports/reality/by-class.md).
 pub const LEAST_CONFIDENCE: f64 = 0.5;
 
 /// An object keeps the points that no surer one has, if these are this share of its points.

@@ -1,6 +1,6 @@
 """What `detect` finds in labelled sweeps of real sensors, by class: all classes, with what it takes for each of them.
 
-    python xtask/lab/peers/by_class.py FRAME.npz... [--min-confidence 0.7]
+    python xtask/lab/peers/by_class.py FRAME.npz... [--min-confidence 0.5]
 
 It needs the package edgepuck and NumPy. A frame holds `xyz_mm`, `boxes` (centre, length, width, height, yaw), and `classes`
 (of KITTI or Argoverse 2) or `cls` (1 car, 2 person, 3 two-wheeler, 4 truck, 5 bus, 6 not judged), and as JSON in `meta` the
@@ -90,7 +90,7 @@ def interval(right, asked):
 def main():
     flags = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     flags.add_argument("frames", type=Path, nargs="+")
-    flags.add_argument("--min-confidence", type=float, default=0.7)
+    flags.add_argument("--min-confidence", type=float, default=0.5)
     asked = flags.parse_args()
     tally = defaultdict(Counter)
     frames = Counter(judge(file, asked.min_confidence, tally) for file in asked.frames)
