@@ -26,8 +26,9 @@ impl Heights {
         for cell in by_cell.chunk_by(|a, b| a.0 == b.0) {
             z_m[cell[0].0] = cell[cell.len() / 2].1;
         }
-        let filled = (0..N * N).map(|cell| nearest(&z_m, cell)).collect::<Option<_>>()?;
-        Some(Self { z_m: filled })
+        let in_row: Vec<_> = (0..N * N).map(|cell| nearest_in_row(&z_m, cell)).collect();
+        let filled = (0..N * N).map(|cell| Some(z_m[nearest(&in_row, cell)?]));
+        Some(Self { z_m: filled.collect::<Option<_>>()? })
     }
 
     /// The height of the ground at (x, y), metres in the sensor's frame.
@@ -47,29 +48,34 @@ pub fn nearest_index(along_m: f32) -> usize {
     ((along_m + REACH_M) / CELL_M).clamp(0.0, (N - 1) as f32) as usize
 }
 
-/// The height of the nearest known cell, by the distance of the middles. Of several, the first counts.
-fn nearest(z_m: &[f32], cell: usize) -> Option<f32> {
+/// The column of the nearest known cell of the same row, the left one of two.
+fn nearest_in_row(z_m: &[f32], cell: usize) -> Option<usize> {
     let (row, column) = (cell / N, cell % N);
-    let mut best = (usize::MAX, f32::NAN);
-    for ring in 0..N {
-        // No cell of this ring or beyond is nearer.
-        if best.0 <= ring * ring {
+    let is_known = |&column: &usize| !z_m[row * N + column].is_nan();
+    let left = (0..=column).rev().find(is_known);
+    let right = (column..N).find(is_known);
+    [left, right].into_iter().flatten().min_by_key(|found| found.abs_diff(column))
+}
+
+/// The nearest known cell, by the distance of the middles, given that of each row. Of several, that in
+/// the smallest square about the cell counts, and of these the first.
+fn nearest(in_row: &[Option<usize>], cell: usize) -> Option<usize> {
+    let (row, column) = (cell / N, cell % N);
+    let mut best: Option<(usize, usize, usize)> = None;
+    for away in 0..N {
+        // No cell of these rows or beyond is nearer.
+        if best.is_some_and(|(square, ..)| square < away * away) {
             break;
         }
-        let rows = row.saturating_sub(ring)..=(row + ring).min(N - 1);
-        for i in rows {
-            let is_end = i.abs_diff(row) == ring;
-            let step = if is_end || ring == 0 { 1 } else { 2 * ring };
-            for j in (0..=2 * ring).step_by(step).filter_map(|k| (column + k).checked_sub(ring)) {
-                let known = z_m.get(i * N + j).filter(|z| j < N && !z.is_nan());
-                let square = i.abs_diff(row).pow(2) + j.abs_diff(column).pow(2);
-                if let Some(&z) = known.filter(|_| square < best.0) {
-                    best = (square, z);
-                }
+        for i in [row.checked_sub(away), Some(row + away)].into_iter().flatten() {
+            if let Some(j) = in_row.get(i * N + column).copied().flatten() {
+                let aside = j.abs_diff(column);
+                let found = (away * away + aside * aside, away.max(aside), i * N + j);
+                best = Some(best.map_or(found, |best| best.min(found)));
             }
         }
     }
-    (best.0 < usize::MAX).then_some(best.1)
+    best.map(|(_, _, found)| found)
 }
 
 #[cfg(test)]

@@ -60,25 +60,26 @@ impl<'a> Standing<'a> {
         let [rows, columns] = seen
             .centre_m
             .map(|along| nearest_index(along - reach_m)..=nearest_index(along + reach_m));
+        let (sin, cos) = libm::sincosf(seen.yaw_rad);
+        let is_own = |&&point: &&u32| is_within(seen, [cos, sin], self.points[point as usize]);
         let mut found = Vec::new();
         for row in rows {
             let (first, last) = (row * N + columns.start(), row * N + columns.end());
             let begin = first.checked_sub(1).map_or(0, |before| self.ends[before]);
             let near = &self.members[begin as usize..self.ends[last] as usize];
-            found
-                .extend(near.iter().filter(|&&point| is_within(seen, self.points[point as usize])));
+            found.extend(near.iter().filter(is_own));
         }
         found.sort_unstable();
         found
     }
 }
 
-fn is_within(seen: &Seen, [x, y, _]: [f32; 3]) -> bool {
+/// Whether a point is one of an object, whose yaw has this cosine and sine.
+fn is_within(seen: &Seen, [cos, sin]: [f32; 2], [x, y, _]: [f32; 3]) -> bool {
     let [dx, dy] = [x - seen.centre_m[0], y - seen.centre_m[1]];
     if seen.class == PERSON {
         return libm::hypotf(dx, dy) < PERSON_M;
     }
-    let (sin, cos) = libm::sincosf(seen.yaw_rad);
     let off_m = [dx * cos + dy * sin, dy * cos - dx * sin];
     off_m.iter().zip(seen.size_m).all(|(off_m, size_m)| off_m.abs() < size_m / 2.0 + MARGIN_M)
 }

@@ -52,7 +52,7 @@ def ranges(net: BirdsEye, scenes: Scenes) -> dict[str, float]:
     for step, part in SUMS.items():
         net.get_submodule(part).register_forward_pre_hook(lambda _, inputs, step=step: note(step, inputs[0]))
     side = int(2 * REACH_M / CELL_M)
-    for number in np.linspace(0, len(scenes) - 1, N_SWEEPS).astype(int):
+    for number in np.unique(np.linspace(0, len(scenes) - 1, N_SWEEPS).astype(int)):
         image = raster(scenes.sweep(number)[0], -REACH_M, -REACH_M, side)
         with torch.no_grad():
             net(torch.from_numpy(image)[None])

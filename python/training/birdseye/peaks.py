@@ -32,10 +32,14 @@ def objects(output: ndarray, score: ndarray, least: float) -> list[tuple]:
         u, v, *sizes, cos, sin = output[N_CLASSES:, i, j]
         at = [(cell + 0.5 + off) * CELL_M - REACH_M for cell, off in ((i, u), (j, v))]
         seen.append((float(score[of, i, j]), int(of), *at, *np.exp(np.clip(sizes, -2, 3)), np.arctan2(sin, cos) / 2))
-    kept: list[tuple] = []
-    for one in sorted(seen, reverse=True):
-        apart = [max(APART_M[one[1]], APART_M[other[1]]) * (1 if one[1] == other[1] else CLOSER) for other in kept]
-        if all(np.hypot(one[2] - other[2], one[3] - other[3]) > m for other, m in zip(kept, apart, strict=True)):
+    seen.sort(reverse=True)
+    of, places = np.array([one[1] for one in seen], int), np.array([one[2:4] for one in seen]).reshape(-1, 2)
+    apart, kept, is_kept = np.array(APART_M)[of], [], np.zeros(len(seen), bool)
+    for number, one in enumerate(seen):
+        others = np.flatnonzero(is_kept[:number])
+        least = np.maximum(apart[number], apart[others]) * np.where(of[others] == of[number], 1, CLOSER)
+        if (np.hypot(*(places[others] - places[number]).T) > least).all():
+            is_kept[number] = True
             kept.append(one)
     return kept
 
