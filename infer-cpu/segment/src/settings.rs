@@ -14,7 +14,7 @@ pub struct Settings {
     /// Height of a row of the range image in degrees, for sweeps that come without rings.
     pub row_height_deg: f32,
     /// The elevation of each ring of the sensor in degrees, in the order of the rings' numbers.
-    /// `None` takes the mean of each ring's returns. A [`Stream`](crate::Stream) requires them.
+    /// `None` takes the mean of each ring's returns.
     pub ring_elevations_deg: Option<Vec<f32>>,
     /// The steepest ground in degrees, relative to the ground plane around the sensor, so that a
     /// hill or a tilt of the sensor of up to 20 degrees does not count.

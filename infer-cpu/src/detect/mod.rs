@@ -23,5 +23,5 @@ mod detector;
 mod object;
 
 pub use detector::{DetectError, Detections, Detector, LEAST_CONFIDENCE};
-pub use edgepuck_segment::{Label, OrientedBox, Sweep};
+pub use edgepuck_segment::{Cluster, Label, OrientedBox, Settings, Sweep};
 pub use object::Object;
