@@ -4,7 +4,6 @@ use std::f64::consts::TAU;
 
 use crate::returns::Return;
 use crate::velodyne::{Sector, UnsentPackets};
-use crate::vlp32c::SEQUENCE_US;
 use crate::{ouster, velodyne};
 
 /// Why a payload is not the sensor's data.
@@ -132,15 +131,6 @@ impl Decoder {
         }
     }
 
-    /// The largest azimuth offset of a beam from the head, radians.
-    #[must_use]
-    pub fn most_offset_rad(&self) -> f64 {
-        match self {
-            Self::Velodyne { decoder, .. } => decoder.most_offset_rad(),
-            Self::Ouster { decoder, .. } => decoder.most_offset_rad(),
-        }
-    }
-
     /// The elevations of its rings, degrees.
     #[must_use]
     pub fn elevations_deg(&self) -> Vec<f32> {
@@ -159,16 +149,6 @@ impl Decoder {
             Self::Velodyne { .. } => Some(3.6e9),
             Self::Ouster { .. } => None,
         }
-    }
-
-    /// The azimuth step from one firing of all beams to the next, radians.
-    #[must_use]
-    pub fn step_rad(&self, facts: &Facts) -> f64 {
-        let step_us = match self {
-            Self::Velodyne { .. } => SEQUENCE_US,
-            Self::Ouster { decoder, .. } => facts.duration_us / f64::from(decoder.columns()),
-        };
-        step_us * facts.speed_rad_us
     }
 }
 

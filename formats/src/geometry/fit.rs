@@ -1,4 +1,4 @@
-//! The box around points, and that of the whole object of which they show a part.
+//! The box around points.
 
 use std::f32::consts::FRAC_PI_2;
 
@@ -15,9 +15,6 @@ const NEAR_M: f32 = 0.05;
 
 /// The most points from which the direction is found; of a larger cluster, every second or third.
 const MOST_SEARCHED: usize = 300;
-
-/// A longer side of this many times the usual width, at least and at most, is the width.
-const SHOWS_WIDTH: [f32; 2] = [0.7, 1.4];
 
 impl OrientedBox<f32> {
     /// The box around `points` with the most points near its edges: a sensor sees the near sides of
@@ -51,41 +48,6 @@ impl OrientedBox<f32> {
             return Self::default();
         }
         rectangle.with_heights(low, high)
-    }
-
-    /// The box of the whole object, where this one is around its points, seen from the origin: each
-    /// side is as long as `usual_m`, length and width in metres, or as its points reach, and begins
-    /// where they begin on the side of the sensor. The base is the ground, if it is known. An object
-    /// that shows a side of its usual width shows its front or its rear.
-    #[must_use]
-    pub fn completed(&self, usual_m: [f32; 2], ground_z_m: Option<f32>) -> Self {
-        let ([x, y, z], [long_m, short_m, height_m]) = (self.centre_m, self.size_m);
-        let shows_width =
-            (SHOWS_WIDTH[0] * usual_m[1]..=SHOWS_WIDTH[1] * usual_m[1]).contains(&long_m);
-        let (seen_m, yaw_rad) = match shows_width {
-            // In -pi/2..=pi/2, too.
-            true if self.yaw_rad > 0.0 => ([short_m, long_m], self.yaw_rad - FRAC_PI_2),
-            true => ([short_m, long_m], self.yaw_rad + FRAC_PI_2),
-            false => ([long_m, short_m], self.yaw_rad),
-        };
-        let middle = turned(&self.centre_m, yaw_rad);
-        let (mut size_m, mut along) = ([0.0; 2], [0.0; 2]);
-        for axis in 0..2 {
-            size_m[axis] = seen_m[axis].max(usual_m[axis]);
-            let hidden_m = size_m[axis] - seen_m[axis];
-            along[axis] = middle[axis] + 0.5 * hidden_m.copysign(middle[axis]);
-        }
-        let [x, y] = match size_m == seen_m {
-            true => [x, y],
-            false => unturned(along, yaw_rad),
-        };
-        let top_m = z + 0.5 * height_m;
-        let base_m = ground_z_m.map_or(z - 0.5 * height_m, |ground_m| ground_m.min(z));
-        Self {
-            centre_m: [x, y, top_m.midpoint(base_m)],
-            size_m: [size_m[0], size_m[1], top_m - base_m],
-            yaw_rad,
-        }
     }
 }
 
@@ -175,33 +137,6 @@ mod tests {
             assert!(
                 (found.centre_m[0] - 10.0).abs() < 0.1 && (found.centre_m[1] - 3.0).abs() < 0.1
             );
-        }
-    }
-
-    /// A car, 3.9 by 1.6 m, of which a sensor at the origin sees the near part of a side and the rear, or
-    /// the rear alone, and a longer car.
-    #[test]
-    fn a_seen_box_is_completed_to_the_whole() {
-        let usual_m = [3.9, 1.6];
-        for (centre, size, yaw, whole_centre, whole_size, whole_yaw) in [
-            ([11.0, 4.0], [2.4, 1.5], 0.0, [11.75, 4.05], [3.9, 1.6], 0.0),
-            ([-11.0, -4.0], [2.4, 1.5], 0.0, [-11.75, -4.05], [3.9, 1.6], 0.0),
-            ([10.0, 0.5], [1.6, 0.2], FRAC_PI_2, [11.85, 0.5], [3.9, 1.6], 0.0),
-            ([0.5, -9.0], [1.5, 0.3], 0.0, [0.55, -10.8], [3.9, 1.6], FRAC_PI_2),
-            ([8.0, 2.0], [4.7, 1.8], 0.3, [8.0, 2.0], [4.7, 1.8], 0.3),
-        ] {
-            let seen = OrientedBox {
-                centre_m: [centre[0], centre[1], -0.5],
-                size_m: [size[0], size[1], 1.0],
-                yaw_rad: yaw,
-            };
-            let whole = seen.completed(usual_m, Some(-1.6));
-            let off = |a: f32, b: f32| (a - b).abs() < 1e-5;
-            assert!((0..2).all(|i| off(whole.centre_m[i], whole_centre[i])), "{seen:?}: {whole:?}");
-            assert!((0..2).all(|i| off(whole.size_m[i], whole_size[i])), "{seen:?}: {whole:?}");
-            assert!(off(whole.yaw_rad, whole_yaw), "{seen:?}: {whole:?}");
-            assert!(off(whole.size_m[2], 1.6) && off(whole.centre_m[2], -0.8), "{whole:?}");
-            assert_eq!(seen.completed(usual_m, None).size_m[2], 1.0);
         }
     }
 

@@ -156,13 +156,6 @@ impl Decoder {
         self.metadata.columns_per_packet
     }
 
-    /// The largest azimuth offset of a row from the encoder, radians.
-    #[must_use]
-    pub fn most_offset_rad(&self) -> f64 {
-        let azimuths = self.metadata.beams_deg.iter().map(|[_, azimuth]| azimuth.abs());
-        azimuths.fold(0.0, f64::max).to_radians()
-    }
-
     /// The altitudes of the rows by ring, ascending, radians.
     #[must_use]
     pub fn elevations_rad(&self) -> Vec<f32> {

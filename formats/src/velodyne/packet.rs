@@ -179,12 +179,6 @@ impl Decoder {
         Self { model, lasers: model.lasers() }
     }
 
-    /// The largest azimuth offset of a laser from the encoder, radians.
-    #[must_use]
-    pub fn most_offset_rad(&self) -> f64 {
-        self.lasers.iter().map(|laser| laser.azimuth_offset.abs()).fold(0.0, f64::max)
-    }
-
     /// The sensor.
     #[must_use]
     pub fn model(&self) -> Model {

@@ -16,7 +16,8 @@
 //! The points are sorted into a range image by ring and azimuth. In each column, the ground is
 //! followed from the lowest ring up. The ground returns give a polar grid of heights; every point
 //! just above that grid is ground. The other points are linked to their neighbours in the image,
-//! and linked points form a cluster. A [`Segmenter`] does this for one sweep after the other. Clouds without the structure of a scan are cut into connected components instead.
+//! and linked points form a cluster. A [`Segmenter`] does this for one sweep after the
+//! other. Clouds without the structure of a scan are cut into connected components instead.
 
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))]
 #![warn(clippy::print_stdout, clippy::print_stderr)]
@@ -39,7 +40,7 @@ mod sweep;
 pub use axes::other_axis_up;
 pub use formats::geometry::OrientedBox;
 pub use label::Label;
-pub use segmentation::{Cluster, Segmentation};
+pub use segmentation::{Cluster, Extent, Segmentation};
 pub use segmenter::Segmenter;
 pub use settings::{Settings, SettingsError};
 pub use sweep::{SegmentError, Sweep};

@@ -140,20 +140,30 @@ impl Segmentation {
     }
 }
 
-/// The number of points of a set and their bounding rectangle.
+/// The number of points of a set and their bounding rectangle, seen from above.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Extent {
-    pub count: usize,
+pub struct Extent {
+    count: usize,
     low: [f32; 2],
     high: [f32; 2],
 }
 
 impl Extent {
-    pub fn at([x, y, _]: [f32; 3]) -> Self {
+    /// Of some points; without any, of one at the origin that does not count.
+    #[must_use]
+    pub fn of(points: impl Iterator<Item = [f32; 3]>) -> Self {
+        let join = |mut all: Self, one| {
+            all.add(&one);
+            all
+        };
+        points.map(Self::at).reduce(join).unwrap_or_default()
+    }
+
+    fn at([x, y, _]: [f32; 3]) -> Self {
         Self { count: 1, low: [x, y], high: [x, y] }
     }
 
-    pub fn add(&mut self, other: &Self) {
+    fn add(&mut self, other: &Self) {
         self.count += other.count;
         for axis in 0..2 {
             self.low[axis] = self.low[axis].min(other.low[axis]);
@@ -162,17 +172,33 @@ impl Extent {
     }
 
     /// Whether the set is neither too small nor too large for a cluster.
-    pub fn is_cluster(&self, settings: &Settings) -> bool {
+    fn is_cluster(&self, settings: &Settings) -> bool {
         (settings.min_points..=settings.max_points).contains(&self.count)
             && self.diagonal_m() <= settings.max_size_m
     }
 
+    /// The diagonal of the rectangle, metres.
+    #[must_use]
     pub fn diagonal_m(&self) -> f32 {
         libm::hypotf(self.high[0] - self.low[0], self.high[1] - self.low[1])
     }
 
+    /// The middle of the rectangle, metres.
+    #[must_use]
     pub fn middle(&self) -> [f32; 2] {
         // Halves first: a sum may overflow.
         [0, 1].map(|axis| self.low[axis] / 2.0 + self.high[axis] / 2.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Extent;
+
+    #[test]
+    fn the_extent_is_that_of_the_points_from_above() {
+        let points = [[1.0, 2.0, 9.0], [4.0, 6.0, -9.0], [2.0, 3.0, 0.0]];
+        let extent = Extent::of(points.into_iter());
+        assert_eq!((extent.middle(), extent.diagonal_m()), ([2.5, 4.0], 5.0));
     }
 }

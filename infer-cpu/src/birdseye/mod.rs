@@ -18,6 +18,7 @@ mod tests;
 
 use edgepuck_kernels::{F32, Format, I8, Kernels};
 use edgepuck_segment::Label;
+use formats::FormatError;
 use formats::model_card::ModelCard;
 use formats::weights::WeightsFile;
 
@@ -31,6 +32,8 @@ use image::Image;
 use layers::Layers;
 use network::{Forward, Network};
 pub use peaks::{Scores, Seen};
+use plan::CLASSES;
+pub use plan::PERSON;
 pub use standing::Standing;
 
 /// A loaded network.
@@ -45,6 +48,10 @@ impl BirdsEye {
     /// A file that is no such model; threads that cannot be started; a machine without kernels for the
     /// precision.
     pub fn new(file: &mut WeightsFile, card: &ModelCard, options: &Options) -> Result<Self, Error> {
+        if card.classes != CLASSES {
+            let cause = format!("expected {CLASSES:?}, found {:?}", card.classes);
+            return Err(FormatError::malformed(file.path(), "metadata `classes`", cause).into());
+        }
         let kernels = choose_kernels(options.precision, options.kernel)?;
         let network = match options.precision {
             Precision::F32 => team(Layers::<F32>::read(file, card, kernels)?, kernels, options),

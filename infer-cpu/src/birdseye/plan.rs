@@ -1,12 +1,16 @@
 //! The steps of the network, in order.
 
-/// Scores of classes, in the order of the model's card.
-pub const N_CLASSES: usize = 4;
+/// The classes whose scores come first.
+pub const CLASSES: [&str; 4] = ["car", "person", "two-wheeler", "truck"];
+pub const N_CLASSES: usize = CLASSES.len();
+/// The number of persons among them.
+pub const PERSON: usize = 1;
 /// After the scores come, of the object about a cell: the offset of its centre along x and y (cells), the
 /// logarithms of its length, width and height (metres), and the cosine and sine of twice its yaw.
 const N_BOX: usize = 7;
 /// The outputs of a cell of 0.4 m: each of the above for its four quarters.
 pub const OUTPUTS: usize = 4 * (N_CLASSES + N_BOX);
+
 /// A step: its layer's name, and what it computes.
 pub struct Step {
     pub name: &'static str,

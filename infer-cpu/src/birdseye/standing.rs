@@ -4,12 +4,11 @@ use edgepuck_segment::Label;
 
 use super::heights::{Heights, N, index, nearest_index};
 use super::peaks::Seen;
+use super::plan::PERSON;
 
 /// How far about a box its points are, and about the middle of a person, metres.
 const MARGIN_M: f32 = 0.15;
 const PERSON_M: f32 = 0.55;
-/// The class of persons.
-const PERSON: usize = 1;
 /// The least and the greatest height over the ground, metres: what is higher is over an object, such as
 /// a roof or the crown of a tree.
 const LOWEST_M: f32 = -0.6;

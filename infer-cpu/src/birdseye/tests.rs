@@ -10,7 +10,7 @@ use formats::rng::StreamKey;
 use formats::weights::{Tensor, WeightsFile, write_weights};
 
 use super::image::{CHANNELS, Image, SIDE};
-use super::plan::{HEAD, OUTPUTS, Of, STEPS};
+use super::plan::{CLASSES, HEAD, OUTPUTS, Of, STEPS};
 use super::{BirdsEye, Heights};
 use crate::classify::options::Options;
 use crate::precision::Precision;
@@ -62,6 +62,7 @@ fn card(range: f32) -> ModelCard {
     let names = STEPS.iter().filter(|step| step.name != "head").map(|step| step.name.to_owned());
     ModelCard {
         activation_ranges: names.map(|name| (name, range)).collect(),
+        classes: CLASSES.map(str::to_owned).to_vec(),
         ..ModelCard::default()
     }
 }
@@ -220,6 +221,11 @@ fn a_file_that_lacks_a_part_or_has_another_is_refused() {
     let unknown = Tensor { shape: vec![1], values: vec![0.0] };
     let unknown = changed(&|all| drop(all.insert("b3.bias".to_owned(), unknown.clone())));
     assert!(unknown.contains("no layer takes a tensor of this name"), "{unknown}");
-    let no_range = refused(&tensors(), &ModelCard::default());
+    let no_ranges = ModelCard { activation_ranges: BTreeMap::new(), ..card(1.0) };
+    let no_range = refused(&tensors(), &no_ranges);
     assert!(no_range.contains("no range in `activation_ranges`"), "{no_range}");
+    let mut fewer = card(1.0);
+    fewer.classes.pop();
+    let fewer = refused(&tensors(), &fewer);
+    assert!(fewer.contains("metadata `classes`: expected [\"car\", "), "{fewer}");
 }

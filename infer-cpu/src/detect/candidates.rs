@@ -4,10 +4,10 @@
 //! A box may hold points of what is beside an object, which mislead the model that is asked. What stands apart is a
 //! cluster, and a person who touches something is often one by a narrower gap.
 
-use edgepuck_segment::{Label, Segmenter, Settings, SettingsError, Sweep};
+use edgepuck_segment::{Extent, Label, Segmenter, Settings, SettingsError, Sweep};
 
 use super::confidence::Confidence;
-use crate::birdseye::{BirdsEye, Heights, Scores, Seen, Standing};
+use crate::birdseye::{BirdsEye, Heights, PERSON, Scores, Seen, Standing};
 
 /// The network's least score of a box, and of a cluster's place: what is less likely is not asked about. On labelled
 /// sweeps, lower ones find nothing more (assets/reports/reality/by-class.md).
@@ -16,7 +16,6 @@ const LEAST_OF_CLUSTER: f32 = 0.03;
 /// The widest clusters of each class of the network, metres along the diagonal, and how far about their
 /// middles the network's score counts, cells of 0.2 m. Trucks are cut into several.
 const CLUSTERS: [(usize, f32, usize); 3] = [(0, 7.0, 4), (PERSON, 2.0, 2), (2, 2.8, 2)];
-const PERSON: usize = 1;
 /// The widest gap between points of a part, metres: a part of a cluster may be a person.
 const GAP_M: f32 = 0.12;
 
@@ -53,7 +52,7 @@ impl Candidates {
         &mut self,
         points: &[[f32; 3]],
         labels: &[Label],
-        clusters: &[Vec<u32>],
+        clusters: impl Iterator<Item = Vec<u32>>,
         ground: &Heights,
         joint: &Confidence,
     ) -> Vec<Candidate> {
@@ -70,14 +69,15 @@ impl Candidates {
             })
             .collect();
         let mut add = |own: Vec<u32>, is_part: bool| {
-            let (middle_m, diagonal_m) = extent(points, &own);
-            let seen = seen_near(&scores, joint, middle_m, diagonal_m, is_part);
+            let extent = Extent::of(own.iter().map(|&i| points[i as usize]));
+            let middle_m = extent.middle();
+            let seen = seen_near(&scores, joint, middle_m, extent.diagonal_m(), is_part);
             if !seen.is_empty() {
                 let ground_z_m = ground.z_m(middle_m);
                 found.push(Candidate { points: own, ground_z_m, seen, is_cluster: true });
             }
         };
-        clusters.iter().for_each(|own| add(own.clone(), false));
+        clusters.for_each(|own| add(own, false));
         let positions: Vec<_> = standing.all().iter().map(|&i| points[i as usize]).collect();
         let sweep = Sweep { points: &positions, rings: None };
         // There are fewer points than in the whole sweep.
@@ -107,16 +107,6 @@ fn seen_near(
         scores.near(class, middle_m, reach).filter(|seen| seen.score >= LEAST_OF_CLUSTER)
     };
     CLUSTERS.iter().filter(is_asked).filter_map(near).collect()
-}
-
-/// The middle of points seen from above, and the diagonal of their bounds, metres.
-fn extent(points: &[[f32; 3]], own: &[u32]) -> ([f32; 2], f32) {
-    let bounds = [0, 1].map(|axis| {
-        let along = own.iter().map(|&i| points[i as usize][axis]);
-        along.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
-    });
-    let [x, y] = bounds.map(|[low, high]| high - low);
-    (bounds.map(|[low, high]| low / 2.0 + high / 2.0), libm::hypotf(x, y))
 }
 
 #[cfg(test)]
@@ -150,12 +140,6 @@ mod tests {
         assert!(seen_near(&scores, &none, [10.1, 0.1], 1.0, false).is_empty());
     }
 
-    #[test]
-    fn the_extent_is_that_of_the_own_points_from_above() {
-        let points = [[1.0, 2.0, 9.0], [4.0, 6.0, -9.0], [2.0, 3.0, 0.0], [100.0; 3]];
-        assert_eq!(extent(&points, &[0, 1, 2]), ([2.5, 4.0], 5.0));
-    }
-
     /// Two persons 0.2 m apart are one cluster by a gap of 0.3 m, and two parts.
     #[test]
     fn parts_of_a_cluster_are_candidates() {
@@ -170,7 +154,8 @@ mod tests {
         let mut candidates = Candidates::new(birdseye, 20).unwrap();
         let heights = Heights::of(&points, &labels).unwrap();
         let joint = Confidence::of_clusters(&[true; 4]);
-        let all = candidates.of(&points, &labels, &[(0..60).collect()], &heights, &joint);
+        let all =
+            candidates.of(&points, &labels, [(0..60).collect()].into_iter(), &heights, &joint);
         let clusters = all.iter().filter(|one| one.is_cluster);
         let mut clusters: Vec<_> =
             clusters.map(|one| (one.points[0], one.points.len(), one.ground_z_m)).collect();

@@ -110,6 +110,7 @@ impl Detector {
             wrong("card", cause.to_owned())
         })?;
         let asked = Classifier::load(&beside(model, name), options)?;
+        asked.unsuited_to_clusters().map_or(Ok(()), |cause| Err(Error::WholeObjects(cause)))?;
         let joint = Confidence::new(&card, &asked).map_err(|cause| wrong("card", cause))?;
         Ok(Self {
             segmenter: Segmenter::new(settings)?,
@@ -140,10 +141,9 @@ impl Detector {
         let segmented = self.segmenter.segment(sweep)?;
         // Without ground, nothing is seen from above, and all clusters are unknown.
         let candidates = Heights::of(sweep.points, segmented.labels()).map(|ground| {
-            let clusters: Vec<_> =
-                segmented.clusters().map(|cluster| cluster.points.to_vec()).collect();
+            let clusters = segmented.clusters().map(|cluster| cluster.points.to_vec());
             let labels = segmented.labels();
-            self.candidates.of(sweep.points, labels, &clusters, &ground, &self.joint)
+            self.candidates.of(sweep.points, labels, clusters, &ground, &self.joint)
         });
         let candidates = self.named(sweep.points, candidates.unwrap_or_default());
         let chosen = self.choose(candidates, sweep.points.len());

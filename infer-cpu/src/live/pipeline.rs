@@ -127,10 +127,7 @@ impl Pipeline {
         let Self { options, detector, classes, tracker, counts, stats, .. } = self;
         let start = Instant::now();
         let motion = options.ego_motion.as_ref().filter(|_| !turn.points.is_empty());
-        if let Some(motion) = motion {
-            turn.rectify(motion);
-        }
-        let pose = motion.map(|motion| motion.at_unnormalized(turn.last_s()));
+        let pose = motion.map(|motion| turn.rectify(motion));
         let sweep = Sweep { points: &turn.points, rings: Some(&turn.rings) };
         // There are fewer points than a sweep can have, and one ring for each.
         let Ok(found) = detector.detect(&sweep) else { return };
@@ -264,7 +261,7 @@ impl Pipeline {
             self.tracker.set_turn(TAU / facts.speed_rad_us * 1e-6);
         }
         let n_turns = turns.n_ended();
-        SensorData::push(turns, facts, returns, packet);
+        turns.add(facts, returns, packet);
         counts.dropped_points = turns.n_dropped();
         if turns.n_ended() > n_turns {
             self.stats.end_turn(counts);

@@ -1,11 +1,8 @@
-//! The packets of one sensor, their order, and the turns of its returns.
-
-use formats::returns::Return;
+//! The packets of one sensor, and their order.
 
 use super::options::LiveOptions;
 use super::packet_clock::PacketClock;
-use super::sensor::{Decoder, Facts, Flaw};
-use super::turns::{Tag, Turns};
+use super::sensor::{Decoder, Flaw};
 
 /// The room for the returns of each ring: 1.5 times as many as a VLP-32C sends in its slowest turn with
 /// dual returns.
@@ -29,29 +26,5 @@ impl SensorData {
     /// The most points of a turn.
     pub fn capacity(&self) -> usize {
         self.decoder.elevations_deg().len() * ROOM_PER_RING
-    }
-
-    /// Adds the returns of a packet, which may follow a gap, to the turns; `packet` has its time.
-    pub fn push(
-        turns: &mut Turns,
-        facts: &Facts,
-        returns: &[Return],
-        (packet, is_behind_gap): (Tag, bool),
-    ) {
-        match is_behind_gap && facts.n_unsent > 0 {
-            true => turns.pass_sector(facts.azimuth_rad),
-            false => turns.advance(facts.azimuth_rad, is_behind_gap),
-        }
-        let mut resumes = facts.resumes;
-        for found in returns {
-            if let Some((_, azimuth_rad)) = resumes.take_if(|(us, _)| found.after_us >= *us) {
-                turns.pass_sector(azimuth_rad);
-            }
-            let time_s = packet.time_s + found.after_us * 1e-6;
-            turns.push(found.point_m, found.ring, Tag { time_s, ..packet });
-        }
-        if let Some((_, azimuth_rad)) = resumes {
-            turns.pass_sector(azimuth_rad);
-        }
     }
 }

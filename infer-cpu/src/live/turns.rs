@@ -3,7 +3,9 @@
 use std::f64::consts::{PI, TAU};
 use std::time::Instant;
 
-use formats::geometry::Trajectory;
+use formats::geometry::{Pose, Trajectory};
+use formats::packets::Facts;
+use formats::returns::Return;
 use glam::Vec3;
 
 /// A sector that the sensor does not send ends a turn after this angle, radians: it begins with any of
@@ -66,9 +68,28 @@ impl Turns {
         *self = Self { complete, n_dropped, ..Self::new(capacity) };
     }
 
+    /// Adds the returns of a packet, which may follow a gap; `packet` has its time.
+    pub fn add(&mut self, facts: &Facts, returns: &[Return], (packet, is_behind_gap): (Tag, bool)) {
+        match is_behind_gap && facts.n_unsent > 0 {
+            true => self.pass_sector(facts.azimuth_rad),
+            false => self.advance(facts.azimuth_rad, is_behind_gap),
+        }
+        let mut resumes = facts.resumes;
+        for found in returns {
+            if let Some((_, azimuth_rad)) = resumes.take_if(|(us, _)| found.after_us >= *us) {
+                self.pass_sector(azimuth_rad);
+            }
+            let time_s = packet.time_s + found.after_us * 1e-6;
+            self.push(found.point_m, found.ring, Tag { time_s, ..packet });
+        }
+        if let Some((_, azimuth_rad)) = resumes {
+            self.pass_sector(azimuth_rad);
+        }
+    }
+
     /// Moves the head to `azimuth_rad`. More than half a turn ahead is behind, and changes nothing:
     /// azimuths of packets may go back a little. After a gap in the data it is ahead.
-    pub fn advance(&mut self, azimuth_rad: f64, is_behind_gap: bool) {
+    fn advance(&mut self, azimuth_rad: f64, is_behind_gap: bool) {
         let before_rad = *self.azimuth_rad.get_or_insert(azimuth_rad);
         let ahead_rad = (azimuth_rad - before_rad).rem_euclid(TAU);
         if ahead_rad > PI && !is_behind_gap {
@@ -83,7 +104,7 @@ impl Turns {
     }
 
     /// Moves the head over a sector that the sensor does not send, where its turns end.
-    pub fn pass_sector(&mut self, azimuth_rad: f64) {
+    fn pass_sector(&mut self, azimuth_rad: f64) {
         self.azimuth_rad = Some(azimuth_rad);
         if self.turned_rad > LEAST_RAD {
             self.turned_rad = 0.0;
@@ -92,7 +113,7 @@ impl Turns {
     }
 
     /// Adds a return.
-    pub fn push(&mut self, point_m: [f32; 3], ring: u16, tag: Tag) {
+    fn push(&mut self, point_m: [f32; 3], ring: u16, tag: Tag) {
         let Turn { points, rings, tags, .. } = &mut self.current;
         if points.len() == self.capacity {
             self.n_dropped += 1;
@@ -106,8 +127,7 @@ impl Turns {
     /// Completes the current turn, and begins anew.
     pub fn end(&mut self) {
         if !self.current.points.is_empty() {
-            self.end_turn();
-            self.n_ended -= 1;
+            self.complete_current();
         }
         (self.azimuth_rad, self.turned_rad) = (None, 0.0);
     }
@@ -122,11 +142,15 @@ impl Turns {
     }
 
     fn end_turn(&mut self) {
+        self.complete_current();
+        self.n_ended += 1;
+    }
+
+    fn complete_current(&mut self) {
         let mut next = self.spare.take().unwrap_or_default();
         next.clear();
         let ended = std::mem::replace(&mut self.current, next);
         self.complete.push(Turn { number: self.n_ended, ..ended });
-        self.n_ended += 1;
     }
 
     /// The first complete turn that was not taken. Its memory is reused once it is
@@ -158,14 +182,10 @@ impl Turn {
         self.tags.clear();
     }
 
-    /// When its last point was measured, Unix time in seconds.
-    pub fn last_s(&self) -> f64 {
-        self.tags.iter().fold(f64::NEG_INFINITY, |last_s, tag| last_s.max(tag.time_s))
-    }
-
-    /// Puts all points into the frame of the sensor at the time of the last one.
-    pub fn rectify(&mut self, motion: &Trajectory) {
-        let last = motion.at_unnormalized(self.last_s());
+    /// Puts all points into the frame of the sensor at the time of the last one, and returns its pose then.
+    pub fn rectify(&mut self, motion: &Trajectory) -> Pose {
+        let last_s = self.tags.iter().fold(f64::NEG_INFINITY, |last_s, tag| last_s.max(tag.time_s));
+        let last = motion.at_unnormalized(last_s);
         let (mut time_s, mut pose) = (f64::NAN, last);
         for (point, tag) in self.points.iter_mut().zip(&self.tags) {
             // The points of a firing have one time.
@@ -175,6 +195,7 @@ impl Turn {
             let in_world = pose.to_world(Vec3::from(*point).as_dvec3());
             *point = last.from_world(in_world).as_vec3().to_array();
         }
+        last
     }
 }
 
@@ -244,7 +265,6 @@ mod tests {
 
     #[test]
     fn points_of_a_moving_sensor_are_those_of_its_last_pose() {
-        use formats::geometry::Pose;
         let poses = [0.0, 10.0].map(|time_s| (time_s, Pose::at([2.0 * time_s, 0.0, 0.0])));
         let mut turns = Turns::new(10);
         turned(&mut turns, 0..4);
