@@ -28,7 +28,8 @@ PI = "aarch64-unknown-linux-musl"
 AS_ROOT = [] if os.geteuid() == 0 else ["unshare", "--map-root-user"]
 # Of 0 to 10; systemd calls up to 2 "OK".
 MOST_EXPOSED = 1.5
-START_S = 20.0
+# An emulated processor takes some ten seconds for a turn.
+START_S = 180.0
 
 
 def free_port():
