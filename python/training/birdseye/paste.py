@@ -123,3 +123,22 @@ def pasted(points: ndarray, boxes: ndarray, cutouts: Cutouts, rng: Generator) ->
     if not street.added:
         return points, boxes
     return np.concatenate([points[street.kept], *street.added]), np.array(street.boxes, np.float32)
+
+
+def covered(points: ndarray, rng: Generator) -> ndarray:
+    """The sweep below awnings, arcades and crowns, of which each cell of 0.2 m has a point or none; or without all that is high.
+
+    What hangs above them hid persons and trucks of real streets from a network whose streets were open."""
+    if rng.random() < 0.3:
+        points = points[(points[:, 3] > 0) | (points[:, 2] < rng.uniform(2.0, 4.0))]
+    if rng.random() < 0.5:
+        return points
+    roofs = [points]
+    for _ in range(rng.integers(1, 6)):
+        half, dense = rng.uniform([1.5, 0.7], [10, 3]), rng.uniform(0.05, 0.8)
+        cells = np.stack(np.meshgrid(*(np.arange(-side, side, 0.2) for side in half)), -1).reshape(-1, 2)
+        roof = np.zeros((len(cells), 4), np.float32)
+        roof[:, 2] = rng.uniform(2.2, 4.7) + roof[:, 0] * rng.normal(0, 0.05) + rng.normal(0, rng.choice([0.03, 0.5]), len(cells))
+        roof[:, :2] = turned((cells + rng.uniform(0, 0.2, cells.shape)).astype(np.float32), rng.uniform(0, np.pi)) + rng.uniform(-28, 28, 2)
+        roofs.append(roof[(rng.random(len(cells)) < dense) & (roof[:, 2] > 2.0)])
+    return np.concatenate(roofs)

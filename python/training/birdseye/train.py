@@ -16,7 +16,7 @@ import torch
 from grid import CELL_M, REACH_M, raster
 from network import N_BOX, N_CLASSES, BirdsEye
 from numpy.random import Generator
-from paste import Cutouts, pasted
+from paste import Cutouts, covered, pasted
 from torch import Tensor
 from torch.nn import functional as F
 
@@ -130,8 +130,8 @@ class Patches(torch.utils.data.IterableDataset):
         share = np.array([len(one) for one in scenes]) / sum(map(len, scenes))
         while True:
             one = scenes[rng.choice(len(scenes), p=share)]
-            sweep = pasted(*one.sweep(rng.integers(len(one))), one.cutouts, rng)
-            points, boxes = varied(*sweep, rng)
+            points, boxes = pasted(*one.sweep(rng.integers(len(one))), one.cutouts, rng)
+            points, boxes = varied(covered(points, rng), boxes, rng)
             begin = corner(boxes, rng)
             yield raster(points, *begin, N).astype(np.float16), *targets(boxes, begin)
 

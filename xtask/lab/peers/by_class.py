@@ -12,6 +12,7 @@ half made of its points; a false alarm is a detection half of which is in no lab
 import argparse
 import json
 from collections import Counter, defaultdict
+from dataclasses import dataclass
 from math import sqrt
 from pathlib import Path
 
@@ -54,9 +55,21 @@ def inside(points, box, margin_m=0.0):
     return (np.abs(along) <= box[3:6] / 2 + margin_m).all(1)
 
 
-def judge(file, least, tally):
-    """Adds to `tally[sensor, class]`: how many are asked for and found, and to what detections of the class belong."""
-    points, rings, boxes, names, half, sensor = read(file)
+@dataclass
+class Outcome:
+    """An object that is asked for and found or missed, or a detection that is right or false."""
+
+    kind: str
+    label: str
+    points: np.ndarray
+    # For a false detection: to what its points belong.
+    truth: str = ""
+    confidence: float | None = None
+
+
+def outcomes(sweep, least):
+    """What `detect` finds and misses in a sweep of `read`."""
+    points, rings, boxes, names, half, _ = sweep
     cloud = points.astype(np.float32)
     found = ep.detect(cloud, rings=rings, min_confidence=least)
     is_ground = ep.segment(cloud, rings=rings) == -1
@@ -67,17 +80,27 @@ def judge(file, least, tally):
             standing = (own & ~is_ground).sum()
             holds = lambda one: (own & ~is_ground)[one.indices].sum() >= max(1, standing / 2)
             within = lambda one: inside(points[one.indices], box, 0.3).mean() >= 0.5
-            tally[sensor, name]["asked"] += 1
-            tally[sensor, name]["found"] += any(one.label == name and holds(one) and within(one) for one in found)
+            is_found = any(one.label == name and holds(one) and within(one) for one in found)
+            yield Outcome("found" if is_found else "missed", name, np.flatnonzero(own))
     for one in filter(lambda one: is_judged(one.centre), found):
         held = [name for box, name in zip(boxes, names) if inside(points[one.indices], box, 0.3).mean() >= 0.5]
         if one.label in held:
-            tally[sensor, one.label]["right"] += 1
+            yield Outcome("right", one.label, one.indices, confidence=one.confidence)
         elif "not judged" not in held:
-            what = next(filter(None, held), "nothing labelled" if not held else "another label")
-            tally[sensor, one.label]["false"] += 1
-            tally[sensor, one.label]["in truth", what] += 1
-    return sensor
+            truth = next(filter(None, held), "nothing labelled" if not held else "another label")
+            yield Outcome("false", one.label, one.indices, truth, one.confidence)
+
+
+def judge(file, least, tally):
+    """Counts the outcomes of a sweep in `tally[sensor, class]`; gives the sensor."""
+    sweep = read(file)
+    for one in outcomes(sweep, least):
+        counted = tally[sweep[-1], one.label]
+        counted[one.kind] += 1
+        counted["asked"] += one.kind in ("found", "missed")
+        if one.kind == "false":
+            counted["in truth", one.truth] += 1
+    return sweep[-1]
 
 
 def interval(right, asked):
