@@ -27,20 +27,23 @@ impl OrientedBox<f32> {
     pub fn around(points: &[[f32; 3]]) -> Self {
         let finite = |point: &&[f32; 3]| point.iter().all(|x| x.is_finite());
         let stride = points.len().div_ceil(MOST_SEARCHED).max(1);
-        let searched = points.iter().step_by(stride).filter(finite);
+        let searched: Vec<_> = points.iter().step_by(stride).filter(finite).collect();
         let points = points.iter().filter(finite);
-        let closeness = |degrees: i32| {
+        let mut along = Vec::with_capacity(searched.len());
+        let mut closeness = |degrees: i32| {
             let angle_rad = (degrees as f32).to_radians();
-            Rectangle::around(searched.clone(), angle_rad).closeness(searched.clone())
+            along.clear();
+            along.extend(turned(searched.iter().copied(), angle_rad));
+            Rectangle::around(along.iter().copied(), angle_rad).closeness(&along)
         };
-        let best_of = |directions: &mut dyn Iterator<Item = i32>| {
+        let mut best_of = |directions: &mut dyn Iterator<Item = i32>| {
             let all = directions.map(|degrees| (closeness(degrees), degrees));
             all.reduce(|best, other| if other.0 > best.0 { other } else { best }).map_or(0, |b| b.1)
         };
         let coarse = best_of(&mut (0..QUARTER_DEG).step_by(COARSE_DEG as usize));
         let fine = best_of(&mut (coarse + 1 - COARSE_DEG..coarse + COARSE_DEG));
         let angle_rad = (fine.rem_euclid(QUARTER_DEG) as f32).to_radians();
-        let rectangle = Rectangle::around(points.clone(), angle_rad);
+        let rectangle = Rectangle::around(turned(points.clone(), angle_rad), angle_rad);
         let heights = points.map(|point| point[2]);
         let (low, high) = heights
             .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), z| (low.min(z), high.max(z)));
@@ -60,10 +63,10 @@ struct Rectangle {
 }
 
 impl Rectangle {
-    fn around<'a>(points: impl Iterator<Item = &'a [f32; 3]>, angle_rad: f32) -> Self {
+    /// The bounds of points with these coordinates along the axes.
+    fn around(points: impl Iterator<Item = [f32; 2]>, angle_rad: f32) -> Self {
         let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
-        for point in points {
-            let along = turned(point, angle_rad);
+        for along in points {
             for axis in 0..2 {
                 low[axis] = low[axis].min(along[axis]);
                 high[axis] = high[axis].max(along[axis]);
@@ -73,14 +76,13 @@ impl Rectangle {
     }
 
     /// The sum over points of one over the distance to the nearest edge.
-    fn closeness<'a>(&self, points: impl Iterator<Item = &'a [f32; 3]>) -> f32 {
-        let to_edge = |point| {
-            let along = turned(point, self.angle_rad);
+    fn closeness(&self, points: &[[f32; 2]]) -> f32 {
+        let to_edge = |along: &[f32; 2]| {
             let distance =
                 |axis: usize| (along[axis] - self.low[axis]).min(self.high[axis] - along[axis]);
             distance(0).min(distance(1))
         };
-        points.map(|point| to_edge(point).max(NEAR_M).recip()).sum()
+        points.iter().map(|along| to_edge(along).max(NEAR_M).recip()).sum()
     }
 
     fn with_heights(&self, low_m: f32, high_m: f32) -> OrientedBox<f32> {
@@ -105,10 +107,13 @@ fn unturned([along, across]: [f32; 2], angle_rad: f32) -> [f32; 2] {
     [cos * along - sin * across, sin * along + cos * across]
 }
 
-/// A point's horizontal coordinates along axes turned by `angle_rad`.
-fn turned(&[x, y, _]: &[f32; 3], angle_rad: f32) -> [f32; 2] {
+/// The horizontal coordinates of points along axes turned by `angle_rad`.
+fn turned<'a>(
+    points: impl Iterator<Item = &'a [f32; 3]>,
+    angle_rad: f32,
+) -> impl Iterator<Item = [f32; 2]> {
     let (sin, cos) = libm::sincosf(angle_rad);
-    [cos * x + sin * y, cos * y - sin * x]
+    points.map(move |&[x, y, _]| [cos * x + sin * y, cos * y - sin * x])
 }
 
 #[cfg(test)]

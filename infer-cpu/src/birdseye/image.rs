@@ -7,6 +7,8 @@ use super::heights::Heights;
 /// The length of a cell, and how far the image reaches, metres.
 pub const CELL_M: f32 = 0.2;
 pub const REACH_M: f32 = 40.0;
+/// Points farther away than this are not seen, metres: the network was trained without them.
+pub const FARTHEST_M: f32 = 44.0;
 /// The cells along one side.
 pub const SIDE: usize = (2.0 * REACH_M / CELL_M) as usize;
 
@@ -20,6 +22,12 @@ pub const CHANNELS: usize = GROUND + 3;
 /// The least and the greatest height over the ground of a point that counts, metres.
 const LOWEST_M: f32 = -0.6;
 const HIGHEST_M: f32 = 5.0;
+
+/// Where a coordinate is along a side, in cells; `None` beyond them.
+pub fn cells_along(along_m: f32) -> Option<f32> {
+    let cells = (along_m + REACH_M) / CELL_M;
+    (0.0..SIDE as f32).contains(&cells).then_some(cells)
+}
 
 /// What is in a cell.
 #[derive(Clone, Copy, Default, PartialEq)]
@@ -41,12 +49,11 @@ impl Image {
         let mut cells = vec![Cell::default(); SIDE * SIDE];
         for (&[x, y, z], label) in points.iter().zip(labels) {
             let height_m = z - ground.z_m([x, y]);
-            let is_seen = *label != Label::Invalid && height_m > LOWEST_M && height_m < HIGHEST_M;
-            let [u, v] = [x, y].map(|along| (along + REACH_M) / CELL_M);
-            let is_within = |along: f32| (0.0..SIDE as f32).contains(&along);
-            if !(is_seen && is_within(u) && is_within(v)) {
-                continue;
-            }
+            let is_seen = *label != Label::Invalid
+                && height_m > LOWEST_M
+                && height_m < HIGHEST_M
+                && libm::hypotf(x, y) < FARTHEST_M;
+            let (true, [Some(u), Some(v)]) = (is_seen, [x, y].map(cells_along)) else { continue };
             let cell = &mut cells[u as usize * SIDE + v as usize];
             if *label == Label::Ground {
                 cell.bits |= 1 << GROUND;
@@ -103,12 +110,13 @@ mod tests {
             ([0.15, 10.05, 1.0], Label::Cluster(0)),
             ([0.15, 10.15, 2.9], Label::Small),
             ([0.15, 10.15, 2.95], Label::Small),
-            // Too high, too low, invalid, and beyond the image.
+            // Too high, too low, invalid, beyond the image, and too far away in a corner of it.
             ([0.05, 10.05, 3.3], Label::Small),
             ([0.05, 10.05, -2.5], Label::Small),
             ([0.05, 10.05, -1.0], Label::Invalid),
             ([40.1, 0.0, -1.0], Label::Small),
             ([0.0, -40.1, -1.0], Label::Small),
+            ([33.0, 33.0, -1.0], Label::Small),
         ];
         let (points, labels): (Vec<_>, Vec<_>) = points.into_iter().unzip();
         let ground = Heights::of(&points, &labels).unwrap();

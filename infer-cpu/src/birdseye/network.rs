@@ -238,6 +238,10 @@ impl<T: Format> Network<T> {
         let Row { narrow, is_empty, .. } = &mut *row;
         for (column, narrow) in narrow.chunks_exact_mut(width).enumerate() {
             is_empty[column] = whole.is_empty[column] && half.is_empty[column / 2];
+            if is_empty[column] {
+                narrow.copy_from_slice(&self.planes[step].nothing.1);
+                continue;
+            }
             let a = &whole.wide[column * width..][..width];
             let b = &half.wide[column / 2 * width..][..width];
             out.clear();
@@ -260,7 +264,8 @@ fn gather<T: Format>(
         // The cells of this row that there are: from `first` to `last` of those under the kernel.
         let first = (size / 2).saturating_sub(column).min(size);
         let last = (side + size / 2).saturating_sub(column).clamp(first, size);
-        out.fill(T::Activation::default());
+        out[..first * channels].fill(T::Activation::default());
+        out[last * channels..].fill(T::Activation::default());
         if let Some(row) = row.as_ref().filter(|_| first < last) {
             let begin = (column + first - size / 2) * channels;
             let cells = &row.narrow[begin..][..(last - first) * channels];

@@ -1,7 +1,7 @@
 //! The objects at the peaks of a network's scores.
 
 use super::image::Image;
-use super::image::{CELL_M, REACH_M, SIDE};
+use super::image::{CELL_M, REACH_M, SIDE, cells_along};
 use super::network::Forward;
 use super::plan::{N_CLASSES, OUTPUTS};
 
@@ -27,6 +27,18 @@ pub struct Seen {
     pub yaw_rad: f32,
 }
 
+impl Seen {
+    /// Whether it is within reach, and does not hold the sensor: what does carries it.
+    fn may_be(&self) -> bool {
+        let [x, y] = self.centre_m;
+        let (sin, cos) = libm::sincosf(self.yaw_rad);
+        let off_m = [x * cos + y * sin, y * cos - x * sin];
+        let holds_sensor =
+            off_m.iter().zip(self.size_m).all(|(off_m, size_m)| off_m.abs() < size_m / 2.0);
+        libm::hypotf(x, y) <= REACH_M && !holds_sensor
+    }
+}
+
 /// What a network says of each cell of a sweep.
 pub struct Scores {
     outputs: Vec<f32>,
@@ -44,10 +56,12 @@ impl Scores {
 
     /// The objects whose score is `least` or more, the best first.
     pub fn objects(&self, least: f32) -> Vec<Seen> {
-        let mut seen = self.peaks(libm::logf(least / (1.0 - least)));
+        let peaks = self.at_least(least).filter(|&(class, cell)| self.is_peak(class, cell));
+        let mut seen: Vec<_> =
+            peaks.map(|(class, [row, column])| self.object(class, row, column)).collect();
         seen.sort_by(|a, b| b.score.total_cmp(&a.score));
         let mut kept: Vec<Seen> = Vec::new();
-        for one in seen {
+        for one in seen.into_iter().filter(Seen::may_be) {
             let is_apart = |other: &Seen| {
                 let apart_m = APART_M[one.class].max(APART_M[other.class]);
                 let factor = if one.class == other.class { 1.0 } else { CLOSER };
@@ -61,18 +75,26 @@ impl Scores {
         kept
     }
 
-    /// The object of a class at the best cell within `reach` cells of a place, metres; `None` beyond the
-    /// cells.
+    /// The object of a class at the best cell within `reach` cells of a place, metres; `None` if none may
+    /// be there.
     pub fn near(&self, class: usize, place_m: [f32; 2], reach: usize) -> Option<Seen> {
-        let cell = |along: f32| {
-            let at = (along + REACH_M) / CELL_M;
-            (0.0..SIDE as f32).contains(&at).then_some(at as usize)
-        };
-        let [row, column] = [cell(place_m[0])?, cell(place_m[1])?];
+        let [row, column] = [cells_along(place_m[0])? as usize, cells_along(place_m[1])? as usize];
         let cells = about(row, reach).flat_map(|i| about(column, reach).map(move |j| (i, j)));
         let score = |&(i, j): &(usize, usize)| self.at(class, i, j);
         let best = cells.max_by(|a, b| score(a).total_cmp(&score(b)));
-        best.map(|(i, j)| self.object(class, i, j))
+        best.map(|(i, j)| self.object(class, i, j)).filter(Seen::may_be)
+    }
+
+    /// For each cell, row by row, whether one within `reach` cells has a score of `least` or more.
+    pub fn about(&self, class: usize, least: f32, reach: usize) -> Vec<bool> {
+        let mut is_about = vec![false; SIDE * SIDE];
+        for (of, [row, column]) in self.at_least(least) {
+            for i in about(row, reach).filter(|_| of == class) {
+                let columns = about(column, reach);
+                is_about[i * SIDE + columns.start()..=i * SIDE + columns.end()].fill(true);
+            }
+        }
+        is_about
     }
 
     /// An output of a cell of 0.2 m.
@@ -81,26 +103,27 @@ impl Scores {
         self.outputs[(row / 2 * (SIDE / 2) + column / 2) * OUTPUTS + 4 * output + quarter]
     }
 
-    /// The objects at the cells whose scores are `least` or more, before the logistic function, and
-    /// none around is greater.
-    fn peaks(&self, least: f32) -> Vec<Seen> {
-        let mut seen = Vec::new();
-        for row in 0..SIDE {
-            for column in 0..SIDE {
-                for class in 0..N_CLASSES {
-                    if self.at(class, row, column) >= least && self.is_peak(class, row, column) {
-                        seen.push(self.object(class, row, column));
-                    }
-                }
-            }
-        }
-        seen
+    /// The class and the cell of each score of `least` or more.
+    fn at_least(&self, least: f32) -> impl Iterator<Item = (usize, [usize; 2])> {
+        let least = libm::logf(least / (1.0 - least));
+        self.outputs.chunks_exact(OUTPUTS).enumerate().flat_map(move |(cell, outputs)| {
+            let scores = outputs[..4 * N_CLASSES].iter().enumerate();
+            scores.filter(move |(_, score)| **score >= least).map(move |(number, _)| {
+                let [row, column] = [cell / (SIDE / 2), cell % (SIDE / 2)];
+                (number / 4, [2 * row + number % 4 / 2, 2 * column + number % 2])
+            })
+        })
     }
 
-    fn is_peak(&self, class: usize, row: usize, column: usize) -> bool {
+    /// Whether none around is greater; of several that are the same, the first is a peak.
+    fn is_peak(&self, class: usize, [row, column]: [usize; 2]) -> bool {
         let about = |at: usize| about(at, REACH[class]);
         let score = self.at(class, row, column);
-        about(row).all(|i| about(column).all(|j| self.at(class, i, j) <= score))
+        let is_less = |i: usize, j: usize| {
+            let other = self.at(class, i, j);
+            other < score || other == score && (i, j) >= (row, column)
+        };
+        about(row).all(|i| about(column).all(|j| is_less(i, j)))
     }
 
     fn object(&self, class: usize, row: usize, column: usize) -> Seen {
@@ -150,7 +173,7 @@ mod tests {
         assert_eq!(scores.near(0, [40.1, 0.0], 2), None);
         // Sizes that no object has.
         let of_box = [0.0, 0.0, 9.0, -9.0, 0.0, 1.0, 0.0];
-        let found = Scores::new(&Told(vec![([9, 9], 0, 2.0, of_box)]), empty()).objects(0.5);
+        let found = Scores::new(&Told(vec![([99, 99], 0, 2.0, of_box)]), empty()).objects(0.5);
         assert_eq!(found[0].size_m, [libm::expf(3.0), libm::expf(-2.0), 1.0]);
     }
 
@@ -159,17 +182,48 @@ mod tests {
     #[test]
     fn peaks_are_the_best_about_them_and_apart() {
         let at = |row: usize| (row as f32 + 0.5) * CELL_M - REACH_M;
-        let found = seen(&[([50, 50], 1, 3.0), ([51, 50], 1, 2.0), ([53, 50], 1, 0.5)]);
-        assert_eq!(found, [(1, [at(50), at(50)]), (1, [at(53), at(50)])]);
+        let found = seen(&[([100, 100], 1, 3.0), ([101, 100], 1, 2.0), ([103, 100], 1, 0.5)]);
+        assert_eq!(found, [(1, [at(100), at(100)]), (1, [at(103), at(100)])]);
         let found = seen(&[
-            ([50, 50], 0, 3.0),
-            ([50, 57], 0, 2.0),
-            ([58, 50], 0, 1.0),
-            ([54, 50], 1, 2.5),
-            ([45, 50], 1, 2.4),
+            ([100, 100], 0, 3.0),
+            ([100, 107], 0, 2.0),
+            ([108, 100], 0, 1.0),
+            ([104, 100], 1, 2.5),
+            ([95, 100], 1, 2.4),
             ([0, 399], 2, -0.1),
         ]);
-        let expected = [(0, [50, 50]), (1, [45, 50]), (0, [58, 50])];
+        let expected = [(0, [100, 100]), (1, [95, 100]), (0, [108, 100])];
         assert_eq!(found, expected.map(|(class, cell)| (class, cell.map(at))));
+    }
+
+    /// A car of 4 m by 1.6 m whose middle is 1.9 m ahead of the sensor carries it; one beside
+    /// it does not, and what is in a corner of the cells is too far away.
+    #[test]
+    fn no_object_holds_the_sensor_or_is_beyond_reach() {
+        let of_box = [0.0, 0.0, 4f32.ln(), 1.6f32.ln(), 0.4, 1.0, 0.0];
+        let rows = |cells: &[[usize; 2]]| {
+            let told = cells.iter().map(|&cell| (cell, 0, 2.0, of_box)).collect();
+            let scores = Scores::new(&Told(told), empty());
+            (scores.objects(0.5).len(), scores.near(0, [1.9, 0.1], 1).is_some())
+        };
+        assert_eq!(rows(&[[209, 200]]), (0, false));
+        assert_eq!(rows(&[[200, 205], [210, 200]]), (2, true));
+        assert_eq!([rows(&[[342, 342]]).0, rows(&[[340, 340]]).0], [0, 1]);
+    }
+
+    #[test]
+    fn a_plateau_is_one_peak() {
+        let plateau: Vec<_> = (0..3).map(|i| ([100, 100 + i], 1, 2.0)).collect();
+        let expected = [100.5, 100.5].map(|along| along * CELL_M - REACH_M);
+        assert_eq!(seen(&plateau), [(1, expected)]);
+    }
+
+    #[test]
+    fn cells_about_a_score_are_those_within_reach() {
+        let scores = Told::scores(&[([50, 60], 1, 2.0), ([0, 0], 1, -1.0), ([9, 9], 0, 2.0)]);
+        let is_about = scores.about(1, 0.5, 2);
+        let cells = (0..SIDE * SIDE).filter(|&cell| is_about[cell]);
+        let expected = (48..=52).flat_map(|row| (58..=62).map(move |column| row * SIDE + column));
+        assert!(cells.eq(expected));
     }
 }

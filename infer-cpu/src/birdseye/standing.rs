@@ -3,6 +3,7 @@
 use edgepuck_segment::Label;
 
 use super::heights::{Heights, N, index, nearest_index};
+use super::image::{CELL_M, FARTHEST_M, REACH_M, SIDE};
 use super::peaks::Seen;
 use super::plan::PERSON;
 
@@ -29,7 +30,8 @@ impl<'a> Standing<'a> {
             let height_m = z - ground.z_m([x, y]);
             let is_standing = !matches!(label, Label::Ground | Label::Invalid)
                 && height_m > LOWEST_M
-                && height_m < HIGHEST_M;
+                && height_m < HIGHEST_M
+                && libm::hypotf(x, y) < FARTHEST_M;
             is_standing.then(|| Some(index(x)? * N + index(y)?)).flatten()
         };
         let cells: Vec<_> = points.iter().zip(labels).map(cell_of).collect();
@@ -47,9 +49,15 @@ impl<'a> Standing<'a> {
         Self { points, ends, members }
     }
 
-    /// The indices of all.
-    pub fn all(&self) -> &[u32] {
-        &self.members
+    /// The indices of those in some cells of the image, row by row; those beyond the image count as in the
+    /// nearest.
+    pub fn about(&self, is_about: &[bool]) -> Vec<u32> {
+        let cell = |along_m: f32| ((along_m + REACH_M) / CELL_M).clamp(0.0, (SIDE - 1) as f32);
+        let is_near = |&&point: &&u32| {
+            let [x, y, _] = self.points[point as usize];
+            is_about[cell(x) as usize * SIDE + cell(y) as usize]
+        };
+        self.members.iter().filter(is_near).copied().collect()
     }
 
     /// The indices of the points of an object, ascending.

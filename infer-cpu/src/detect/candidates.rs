@@ -18,6 +18,9 @@ const LEAST_OF_CLUSTER: f32 = 0.03;
 const CLUSTERS: [(usize, f32, usize); 3] = [(0, 7.0, 4), (PERSON, 2.0, 2), (2, 2.8, 2)];
 /// The widest gap between points of a part, metres: a part of a cluster may be a person.
 const GAP_M: f32 = 0.12;
+/// The points of parts that may be persons are within these cells of a place that may be a person's: their middle
+/// is within two, they are within 1 m of it, and so is what a gap parts from them, rounded up.
+const PART_REACH: usize = 9;
 
 /// The points of what may be an object.
 pub struct Candidate {
@@ -78,13 +81,13 @@ impl Candidates {
             }
         };
         clusters.for_each(|own| add(own, false));
-        let positions: Vec<_> = standing.all().iter().map(|&i| points[i as usize]).collect();
+        let near = standing.about(&scores.about(PERSON, LEAST_OF_CLUSTER, PART_REACH));
+        let positions: Vec<_> = near.iter().map(|&i| points[i as usize]).collect();
         let sweep = Sweep { points: &positions, rings: None };
         // There are fewer points than in the whole sweep.
         if let Ok(parts) = self.parts.segment(&sweep) {
             for part in parts.clusters() {
-                let own = part.points.iter().map(|&i| standing.all()[i as usize]);
-                add(own.collect(), true);
+                add(part.points.iter().map(|&i| near[i as usize]).collect(), true);
             }
         }
         found.retain(|one| one.points.len() >= self.min_points);

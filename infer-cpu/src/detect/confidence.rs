@@ -57,11 +57,18 @@ impl Confidence {
         self.classes[class].weights.len() > 1
     }
 
+    /// The greatest confidence that any answer gives.
+    pub fn at_most(&self, seen: &Seen, is_cluster: bool) -> f64 {
+        let [bias, by_seen, by_asked] = self.classes[seen.class].weights_of(is_cluster);
+        logistic(bias + by_seen * logit(f64::from(seen.score)) + by_asked.abs() * logit(1.0))
+    }
+
     /// The name of an object's class and the confidence in it, by the network's class and score, and the
     /// answer about its points, which are those of a box or of a cluster.
     pub fn of(&self, seen: &Seen, is_cluster: bool, answer: &Prediction) -> (&str, f64) {
-        let Class { of_asked, weights } = &self.classes[seen.class];
-        let [bias, by_seen, by_asked] = weights[usize::from(is_cluster).min(weights.len() - 1)];
+        let class = &self.classes[seen.class];
+        let Class { of_asked, .. } = class;
+        let [bias, by_seen, by_asked] = class.weights_of(is_cluster);
         let probabilities =
             of_asked.iter().map(|(class, name)| (libm::exp(answer.log_probability(*class)), name));
         let (mut sum, mut likeliest) = (0.0, (0.0, &of_asked[0].1));
@@ -72,8 +79,18 @@ impl Confidence {
             }
         }
         let total = bias + by_seen * logit(f64::from(seen.score)) + by_asked * logit(sum);
-        (likeliest.1, 1.0 / (1.0 + libm::exp(-total)))
+        (likeliest.1, logistic(total))
     }
+}
+
+impl Class {
+    fn weights_of(&self, is_cluster: bool) -> [f64; 3] {
+        self.weights[usize::from(is_cluster).min(self.weights.len() - 1)]
+    }
+}
+
+fn logistic(logit: f64) -> f64 {
+    1.0 / (1.0 + libm::exp(-logit))
 }
 
 fn logit(probability: f64) -> f64 {
@@ -143,6 +160,10 @@ mod tests {
         assert!((joint.of(&seen(0, 0.75), true, &even).1 - 0.75).abs() < 1e-6);
         assert_eq!(joint.of(&seen(1, 0.75), true, &even), joint.of(&seen(1, 0.75), false, &even));
         assert_eq!([0, 1].map(|class| joint.takes_clusters(class)), [true, false]);
+        // What no answer exceeds, and a sure one reaches.
+        let sure = joint.of(&seen(0, 0.6), false, &answer(&[0.0, 0.0, 99.0, 0.0])).1;
+        assert!((joint.at_most(&seen(0, 0.6), false) - sure).abs() < 1e-9);
+        assert!((joint.at_most(&seen(0, 0.6), true) - 0.6).abs() < 1e-6);
         // Certainty counts as 1 in ten thousand that it is wrong.
         let (_, confidence) = joint.of(&seen(0, 1.0), false, &answer(&[0.0, 0.0, 99.0, 0.0]));
         assert!((confidence - of_odds(0.5f64.exp() * 9999f64.powi(3))).abs() < 1e-9);

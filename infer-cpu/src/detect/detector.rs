@@ -168,7 +168,11 @@ impl Detector {
 
     /// The likeliest class of each candidate, by the model of clusters that is asked about its points. One on
     /// which that overflows is none.
-    fn named(&mut self, points: &[[f32; 3]], candidates: Vec<Candidate>) -> Vec<Named> {
+    fn named(&mut self, points: &[[f32; 3]], mut candidates: Vec<Candidate>) -> Vec<Named> {
+        // No answer makes the others sure enough.
+        candidates.retain(|Candidate { seen, is_cluster, .. }| {
+            seen.iter().any(|seen| self.joint.at_most(seen, *is_cluster) >= self.min_confidence)
+        });
         let clouds: Vec<_> = candidates
             .iter()
             .map(|one| (positions(points, &one.points), Some(one.ground_z_m)))
@@ -180,7 +184,8 @@ impl Detector {
             let (Some(one), Ok(answer)) = (waiting.next(), answer) else { return };
             let Candidate { points, ground_z_m, seen, is_cluster } = one;
             let joined = seen.into_iter().map(|seen| (joint.of(&seen, is_cluster, answer), seen));
-            let best = joined.max_by(|((_, a), _), ((_, b), _)| a.total_cmp(b));
+            let possible = joined.filter(|((class, _), seen)| is_possible(class, seen.size_m));
+            let best = possible.max_by(|((_, a), _), ((_, b), _)| a.total_cmp(b));
             if let Some(((class, confidence), seen)) = best {
                 let class = class.to_owned();
                 named.push(Named { seen, points, ground_z_m, class, confidence });
@@ -191,9 +196,7 @@ impl Detector {
 
     /// The candidates that are sure enough, the surest first. A point belongs to the surest.
     fn choose(&self, mut candidates: Vec<Named>, n_points: usize) -> Vec<Named> {
-        candidates.retain(|one| {
-            one.confidence >= self.min_confidence && is_possible(&one.class, one.seen.size_m)
-        });
+        candidates.retain(|one| one.confidence >= self.min_confidence);
         candidates.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
         let mut is_free = vec![true; n_points];
         candidates.retain_mut(|one| {
@@ -210,10 +213,10 @@ impl Detector {
     }
 }
 
-/// The model `name` in the folder of `model`, or the bundled one.
+/// The model `name` in the folder of the file `model`, or the bundled one.
 fn beside(model: &Path, name: &str) -> std::path::PathBuf {
-    let file = model.with_file_name(name).with_extension("safetensors");
-    if file.exists() { file } else { name.into() }
+    let file = model.with_file_name(format!("{name}.safetensors"));
+    if model.is_file() && file.exists() { file } else { name.into() }
 }
 
 fn positions(points: &[[f32; 3]], of: &[u32]) -> Vec<[f32; 3]> {
@@ -255,10 +258,7 @@ mod tests {
         assert_eq!(chosen(vec![candidate("car", 0.6, 50, 100), sure()]), [(0.9, 100), (0.6, 50)]);
         assert_eq!(chosen(vec![candidate("car", 0.6, 49, 100), sure()]), [(0.9, 100)]);
         assert_eq!(chosen(vec![candidate("car", 0.6, 90, 29), sure()]), [(0.9, 100)]);
-        let mut large = candidate("car", 0.9, 300, 100);
-        large.seen.size_m[0] = 9.0;
-        let others = vec![candidate("car", 0.49, 200, 100), large];
-        assert_eq!(chosen(others), []);
+        assert_eq!(chosen(vec![candidate("car", 0.49, 200, 100)]), []);
     }
 
     /// Level ground 1.2 m below the sensor, and a board of 2 m by 1.7 m that stands on it, 6 m ahead.

@@ -158,6 +158,7 @@ impl Pipeline {
             latency.into_iter().for_each(|latency| stats.answered_after(latency));
         }
         stats.spend(Stage::Track, detected.elapsed());
+        stats.end_turn(counts, turn.is_whole);
         let (took_s, turn_s) = (start.elapsed().as_secs_f64(), tracker.turn_s());
         let is_live = turn.tags.iter().any(|tag| tag.moment.is_some());
         self.n_late = if is_live && took_s > turn_s { self.n_late + 1 } else { 0 };
@@ -260,12 +261,8 @@ impl Pipeline {
         if facts.speed_rad_us > 0.0 {
             self.tracker.set_turn(TAU / facts.speed_rad_us * 1e-6);
         }
-        let n_turns = turns.n_ended();
         turns.add(facts, returns, packet);
         counts.dropped_points = turns.n_dropped();
-        if turns.n_ended() > n_turns {
-            self.stats.end_turn(counts);
-        }
     }
 
     /// The content of the last packet of [`Pipeline::take`]; `None` if it was late, a duplicate or

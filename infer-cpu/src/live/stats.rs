@@ -45,11 +45,14 @@ impl Stats {
         self.turn[stage as usize] += time;
     }
 
-    pub(super) fn end_turn(&mut self, counts: &Counts) {
-        self.whole = *counts;
-        for (stage, time) in self.stages.iter_mut().zip(&mut self.turn) {
-            stage.saturating_record(time.as_micros() as u64);
-            *time = Duration::ZERO;
+    /// Ends a turn, with the counts until then. Parts of turns do not count.
+    pub(super) fn end_turn(&mut self, counts: &Counts, is_whole: bool) {
+        let spent = std::mem::take(&mut self.turn);
+        if is_whole {
+            self.whole = *counts;
+            for (stage, time) in self.stages.iter_mut().zip(spent) {
+                stage.saturating_record(time.as_micros() as u64);
+            }
         }
     }
 
@@ -100,7 +103,9 @@ mod tests {
             stats.spend(Stage::Detect, Duration::from_millis(turn));
             stats.spend(Stage::Detect, Duration::from_millis(2));
             stats.answered_after(Duration::from_millis(20 - turn));
-            stats.end_turn(&Counts { points: 5 * (turn + 1), ..Counts::default() });
+            stats.end_turn(&Counts { points: 5 * (turn + 1), ..Counts::default() }, true);
+            stats.spend(Stage::Detect, Duration::from_secs(1));
+            stats.end_turn(&Counts { points: 99, ..Counts::default() }, false);
         }
         let near = |found: f64, expected: f64| (found - expected).abs() <= 0.01 * expected;
         assert!(near(stats.mean_ms(Stage::Detect), 6.5) && stats.mean_ms(Stage::Track) == 0.0);

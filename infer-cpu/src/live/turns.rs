@@ -28,6 +28,8 @@ pub struct Tag {
 pub struct Turn {
     /// Its number, from 0.
     pub number: u64,
+    /// Whether it ended where it began or where the sensor sends nothing, and not in a gap or with the data.
+    pub is_whole: bool,
     /// Whether the sensor or its clock starts anew behind it, so that nothing is tracked further.
     pub is_last: bool,
     /// Metres in the sensor's frame.
@@ -63,9 +65,9 @@ impl Turns {
 
     /// Begins with the first turn of another sensor.
     pub fn begin(&mut self, capacity: usize) {
-        let complete = std::mem::take(&mut self.complete);
-        let n_dropped = self.n_dropped;
-        *self = Self { complete, n_dropped, ..Self::new(capacity) };
+        let before = std::mem::replace(self, Self::new(capacity));
+        let Self { complete, n_ended, n_dropped, .. } = before;
+        *self = Self { complete, n_ended, n_dropped, ..Self::new(capacity) };
     }
 
     /// Adds the returns of a packet, which may follow a gap; `packet` has its time.
@@ -99,7 +101,7 @@ impl Turns {
         self.turned_rad += ahead_rad;
         if self.turned_rad >= TAU - ROUNDING_RAD {
             self.turned_rad = (self.turned_rad - TAU).max(0.0);
-            self.end_turn();
+            self.end_turn(true);
         }
     }
 
@@ -108,7 +110,7 @@ impl Turns {
         self.azimuth_rad = Some(azimuth_rad);
         if self.turned_rad > LEAST_RAD {
             self.turned_rad = 0.0;
-            self.end_turn();
+            self.end_turn(true);
         }
     }
 
@@ -127,7 +129,7 @@ impl Turns {
     /// Completes the current turn, and begins anew.
     pub fn end(&mut self) {
         if !self.current.points.is_empty() {
-            self.complete_current();
+            self.end_turn(false);
         }
         (self.azimuth_rad, self.turned_rad) = (None, 0.0);
     }
@@ -141,16 +143,12 @@ impl Turns {
         })
     }
 
-    fn end_turn(&mut self) {
-        self.complete_current();
-        self.n_ended += 1;
-    }
-
-    fn complete_current(&mut self) {
+    fn end_turn(&mut self, is_whole: bool) {
         let mut next = self.spare.take().unwrap_or_default();
         next.clear();
         let ended = std::mem::replace(&mut self.current, next);
-        self.complete.push(Turn { number: self.n_ended, ..ended });
+        self.complete.push(Turn { number: self.n_ended, is_whole, ..ended });
+        self.n_ended += 1;
     }
 
     /// The first complete turn that was not taken. Its memory is reused once it is
@@ -258,9 +256,16 @@ mod tests {
         turned(&mut turns, 0..5);
         assert_eq!(turns.n_dropped(), 2);
         turns.end();
-        assert_eq!((taken(&mut turns), turns.n_ended()), (vec![(0, steps(0..3))], 0));
+        assert_eq!((taken(&mut turns), turns.n_ended()), (vec![(0, steps(0..3))], 1));
         turns.end();
         assert!(taken(&mut turns).is_empty());
+        // Turns behind a gap, or of another sensor, have other numbers; those that a gap ends are not whole.
+        turns.begin(100);
+        turned(&mut turns, 0..13);
+        turns.end();
+        let turns = [turns.take(), turns.take(), turns.take()];
+        let told = turns.map(|turn| turn.map(|turn| (turn.number, turn.is_whole)));
+        assert_eq!(told, [Some((1, true)), Some((2, false)), None]);
     }
 
     #[test]

@@ -22,11 +22,14 @@ import torch
 from grid import CELL_M, NAMES, REACH_M, points_of
 from network import BirdsEye
 from numpy import ndarray
-from peaks import objects, scores, within
+from peaks import box_at, may_be, objects, scores, within
+from safetensors import safe_open
 from scipy.optimize import minimize
 from train import Scenes
 
-sys.path.append(str(Path(__file__).resolve().parents[3] / "xtask/lab/peers"))
+ROOT = Path(__file__).resolve().parents[3]
+WEIGHTS = ROOT / "assets/weights"
+sys.path.append(str(ROOT / "xtask/lab/peers"))
 import by_class
 
 # As `detect` has them: which boxes and clusters are asked about, the widest clusters of each class and the cells about their
@@ -59,8 +62,10 @@ class Candidate:
 class Asked:
     """The model that is asked about points."""
 
-    def __init__(self, model: str, temperature: float) -> None:
-        self.net, self.temperature = ep.Classifier(model), temperature
+    def __init__(self, model: Path) -> None:
+        with safe_open(model, "numpy") as file:
+            self.temperature = float(file.metadata()["temperature"])
+        self.net = ep.Classifier(model)
         of = [HEAVY if name in HEAVY else [name] for name in NAMES]
         self.of = [[self.net.classes.index(name) for name in names] for names in of]
 
@@ -102,7 +107,11 @@ def candidates(net: BirdsEye, asked: Asked, points: ndarray, rings: ndarray | No
             for of, widest, reach in CLUSTERS:
                 about = score[of, max(0, i - reach) : i + reach + 1, max(0, j - reach) : j + reach + 1]
                 is_asked = np.hypot(*(high - low)) <= widest and (of == PERSON or not is_part)
-                if is_asked and about.size and about.max() >= LEAST_OF_CLUSTER:
+                if not is_asked or about.size == 0 or about.max() < LEAST_OF_CLUSTER:
+                    continue
+                row, column = np.unravel_index(about.argmax(), about.shape)
+                x, y, length, width, _, yaw = box_at(output, max(0, i - reach) + row, max(0, j - reach) + column)
+                if may_be(x, y, length, width, yaw):
                     told = told or asked.logits(points[crop], float(np.median(points[crop, 2] - over[crop])))
                     yield of, True, (logit(about.max()), told[of]), crop
 
@@ -163,16 +172,19 @@ def weights_of(all_of: list[Candidate]) -> dict[str, list[list[float]]]:
         for is_cluster in (False, True):
             own = [one for one in all_of if one.of == of and one.is_cluster == is_cluster and one.is_known]
             is_right = np.array([one.object is not None for one in own], float)
-            if own and is_right.any():
-                weights.setdefault(name, []).append(fitted(np.array([one.logits for one in own]), is_right))
+            # Clusters of a class are optional, boxes are not.
+            if own and is_right.any() or not is_cluster:
+                weights.setdefault(name, []).append(fitted(np.array([one.logits for one in own]).reshape(-1, 2), is_right))
     return weights
 
 
 def tell(weights: dict[str, list[list[float]]], all_of: list[Candidate]) -> None:
     """Writes the confidence of each candidate."""
     for one in all_of:
-        bias, *own = weights[NAMES[one.of]][one.is_cluster]
-        one.confidence = float(1 / (1 + np.exp(-bias - np.dot(own, one.logits))))
+        of_class = weights[NAMES[one.of]]
+        if one.is_cluster < len(of_class):
+            bias, *own = of_class[one.is_cluster]
+            one.confidence = float(1 / (1 + np.exp(-bias - np.dot(own, one.logits))))
 
 
 def chosen(all_of: list[Candidate], least: float) -> list[Candidate]:
@@ -211,12 +223,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("checkpoint", type=Path)
     parser.add_argument("frames", type=Path, nargs="+")
-    parser.add_argument("--asked", default="street-128")
-    parser.add_argument("--temperature", type=float, default=0.7659053777107038, help="of the model that is asked")
+    parser.add_argument("--asked", type=Path, default=WEIGHTS / "street-128.safetensors")
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--scenes", type=Path, nargs="+", required=True)
     flags = parser.parse_args()
-    net, asked = BirdsEye(), Asked(flags.asked, flags.temperature)
+    net, asked = BirdsEye(), Asked(flags.asked)
     net.load_state_dict(torch.load(flags.checkpoint, map_location="cpu")["mean"])
     net.eval()
     wanted: Counter = Counter()

@@ -23,15 +23,28 @@ def scores(net: torch.nn.Module, points: ndarray) -> tuple[ndarray, ndarray]:
     return output.numpy(), torch.sigmoid(output[:N_CLASSES]).numpy()
 
 
+def may_be(x: float, y: float, length: float, width: float, yaw: float) -> bool:
+    """Whether a box is within reach, and does not hold the sensor: what does carries it."""
+    ahead, aside = x * np.cos(yaw) + y * np.sin(yaw), y * np.cos(yaw) - x * np.sin(yaw)
+    return bool(np.hypot(x, y) <= REACH_M and not (abs(ahead) < length / 2 and abs(aside) < width / 2))
+
+
+def box_at(output: ndarray, i: int, j: int) -> tuple:
+    """x, y, length, width, height and yaw of the object about a cell."""
+    u, v, *sizes, cos, sin = output[N_CLASSES:, i, j]
+    at = [(cell + 0.5 + off) * CELL_M - REACH_M for cell, off in ((i, u), (j, v))]
+    return *at, *np.exp(np.clip(sizes, -2, 3)), np.arctan2(sin, cos) / 2
+
+
 def objects(output: ndarray, score: ndarray, least: float) -> list[tuple]:
     """(score, class, x, y, length, width, height, yaw), the best first."""
     pooled = [F.max_pool2d(torch.from_numpy(score)[None, c : c + 1], 2 * r + 1, 1, r)[0, 0] for c, r in enumerate(REACH)]
     is_peak = (score == torch.stack(pooled).numpy()) & (score >= least)
     seen = []
     for of, i, j in zip(*np.nonzero(is_peak), strict=True):
-        u, v, *sizes, cos, sin = output[N_CLASSES:, i, j]
-        at = [(cell + 0.5 + off) * CELL_M - REACH_M for cell, off in ((i, u), (j, v))]
-        seen.append((float(score[of, i, j]), int(of), *at, *np.exp(np.clip(sizes, -2, 3)), np.arctan2(sin, cos) / 2))
+        x, y, length, width, height, yaw = box_at(output, i, j)
+        if may_be(x, y, length, width, yaw):
+            seen.append((float(score[of, i, j]), int(of), x, y, length, width, height, yaw))
     seen.sort(reverse=True)
     of, places = np.array([one[1] for one in seen], int), np.array([one[2:4] for one in seen]).reshape(-1, 2)
     apart, kept, is_kept = np.array(APART_M)[of], [], np.zeros(len(seen), bool)
