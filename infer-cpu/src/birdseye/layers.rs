@@ -75,7 +75,8 @@ impl<T: Format> Layers<T> {
             }
             of.push(layer);
             widths.push(width);
-            let range = card.activation_ranges.get(step.name).copied().filter(|range| *range > 0.0);
+            let range = card.activation_ranges.get(step.name).copied();
+            let range = range.filter(|range| range.is_normal() && *range > 0.0);
             let missing = || error(file, step.name, "no range in `activation_ranges`".to_owned());
             ranges.push(if number == HEAD { 1.0 } else { range.ok_or_else(missing)? });
         }
@@ -89,6 +90,9 @@ impl<T: Format> Layers<T> {
         }
     }
 }
+
+/// The most outputs of a layer: the results of all cells are kept, and sums of int8 products fit 32 bits.
+const WIDEST: usize = 512;
 
 /// Reads a layer of `inputs` channels and a square kernel of `size` cells, and takes its tensors from
 /// those that are `left`.
@@ -104,9 +108,10 @@ fn read(
     left.remove(&weight_name);
     left.remove(&bias_name);
     let outputs = weight.shape.first().copied().unwrap_or(0);
-    if weight.shape != [outputs, inputs, size, size] || bias.shape != [outputs] || outputs == 0 {
+    let is_layer = weight.shape == [outputs, inputs, size, size] && bias.shape == [outputs];
+    if !is_layer || !(1..=WIDEST).contains(&outputs) {
         let cause = format!(
-            "expected shapes [n, {inputs}, {size}, {size}] and [n], found {:?} and {:?}",
+            "expected shapes [n, {inputs}, {size}, {size}] and [n], n up to {WIDEST}, found {:?} and {:?}",
             weight.shape, bias.shape
         );
         return Err(error(file, name, cause));

@@ -109,12 +109,13 @@ impl Detector {
             let cause = "expected a bird's-eye model, such as street-bev, found a model of clouds";
             wrong("card", cause.to_owned())
         })?;
+        let birdseye = BirdsEye::new(&mut file, &card, options)?;
         let asked = Classifier::load(&beside(model, name), options)?;
         asked.unsuited_to_clusters().map_or(Ok(()), |cause| Err(Error::WholeObjects(cause)))?;
         let joint = Confidence::new(&card, &asked).map_err(|cause| wrong("card", cause))?;
         Ok(Self {
             segmenter: Segmenter::new(settings)?,
-            candidates: Candidates::new(BirdsEye::new(&mut file, &card, options)?, min_points)?,
+            candidates: Candidates::new(birdseye, min_points)?,
             asked: ClassifierTeam::new(asked)?,
             joint,
             min_points,

@@ -10,7 +10,7 @@ pub struct Object {
     pub cluster: u32,
     /// Its class.
     pub class: String,
-    /// How sure the detection is, 0 to 1: of those at 0.8, some eight in ten are right.
+    /// How sure the detection is, 0 to 1: of those from 0.7 to 0.9 in sweeps of other sources, some seven in ten are right.
     pub confidence: f64,
     /// The number of its points.
     pub n_points: usize,

@@ -129,8 +129,10 @@ impl Pipeline {
         let motion = options.ego_motion.as_ref().filter(|_| !turn.points.is_empty());
         let pose = motion.map(|motion| turn.rectify(motion));
         let sweep = Sweep { points: &turn.points, rings: Some(&turn.rings) };
-        // There are fewer points than a sweep can have, and one ring for each.
-        let Ok(found) = detector.detect(&sweep) else { return };
+        let found = match detector.detect(&sweep) {
+            Ok(found) => found,
+            Err(error) => return self.note(Flaw::Turn(error.to_string())),
+        };
         let detected = Instant::now();
         stats.spend(Stage::Detect, detected - start);
 

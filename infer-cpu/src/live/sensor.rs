@@ -24,6 +24,9 @@ pub enum Flaw {
         /// The same by the stamps.
         stamped_s: f64,
     },
+    /// The objects of a turn cannot be found.
+    #[error("{0}")]
+    Turn(String),
     /// Several turns in a row took too long, although packets arrive in real time.
     #[error(
         "the objects of a turn take {took_s:.3} s, and the sensor turns in {turn_s:.3} s: results come \
@@ -56,9 +59,9 @@ impl Flaw {
             (Self::Packet(Ouster(a)), Self::Packet(Ouster(b))) => {
                 discriminant(a) == discriminant(b)
             }
-            (Self::Times { .. }, Self::Times { .. }) | (Self::Late { .. }, Self::Late { .. }) => {
-                true
-            }
+            (Self::Times { .. }, Self::Times { .. })
+            | (Self::Turn(_), Self::Turn(_))
+            | (Self::Late { .. }, Self::Late { .. }) => true,
             _ => false,
         }
     }

@@ -3,7 +3,7 @@
     python export.py OUT.pt OUT.safetensors SCENES.npz --set "what it was trained on"
 
 Batch norms become part of their convolutions. The largest outputs of the layers, which int8 needs, are those of sweeps of
-SCENES: a quarter of the points above them in a thousand may be clipped.
+SCENES, but for two values in a million, which int8 clips.
 """
 
 import argparse

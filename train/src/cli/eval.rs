@@ -114,7 +114,7 @@ pub fn run(args: &EvalArgs) -> anyhow::Result<()> {
 fn report_detections(args: &EvalArgs, files: [&Path; 2]) -> anyhow::Result<()> {
     let frames = detections::read(files)?;
     let least = args.min_points.unwrap_or(1) as u64;
-    super::print(detections::table(&frames, 0.0, least).trim_end())?;
+    super::print(detections::table(&frames, least).trim_end())?;
     if let Some(path) = &args.svg {
         atomic::write_bytes(path, detections::to_svg(&frames, least))?;
         program::say!("precision over recall: {}", path.display());

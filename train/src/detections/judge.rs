@@ -18,31 +18,21 @@ pub struct Asked {
     pub n_points: Option<u64>,
 }
 
-/// A detection of no object of its class.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct False {
-    /// The index of its class.
-    pub class: usize,
-    /// The class of the object that is there, if there is one.
-    pub truth: Option<usize>,
-}
-
 /// The outcome of all frames.
 #[derive(Debug, Default)]
 pub struct Judged {
     pub asked: Vec<Asked>,
-    pub wrong: Vec<False>,
-    pub n_right: Vec<usize>,
+    /// The classes of detections of no object of theirs.
+    pub wrong: Vec<usize>,
     pub n_frames: usize,
 }
 
-/// Judges the detections whose score is `least_score` or more. Objects of fewer than `min_points`,
-/// and those that no class is known of, are not asked for, and what is found there is not judged.
-pub fn judge(frames: &Frames, least_score: f64, min_points: u64) -> Judged {
-    let mut judged = Judged { n_right: vec![0; frames.classes.len()], ..Judged::default() };
-    judged.n_frames = frames.of.len();
+/// Judges the detections. Objects of fewer than `min_points`, and those that no class is known of, are
+/// not asked for, and what is found there is not judged.
+pub fn judge(frames: &Frames, min_points: u64) -> Judged {
+    let mut judged = Judged { n_frames: frames.of.len(), ..Judged::default() };
     for [found, labelled] in &frames.of {
-        let mut found: Vec<&Thing> = found.iter().filter(|one| one.score >= least_score).collect();
+        let mut found: Vec<&Thing> = found.iter().collect();
         found.sort_by(|a, b| b.score.total_cmp(&a.score));
         let mut answers: Vec<Option<usize>> = vec![None; labelled.len()];
         for one in found {
@@ -54,14 +44,12 @@ pub fn judge(frames: &Frames, least_score: f64, min_points: u64) -> Judged {
             let free = there.iter().filter(is_own).find(|&&at| answers[at] != Some(class));
             if let Some(&at) = free {
                 answers[at] = Some(class);
-                judged.n_right[class] += 1;
             } else if there.iter().all(|&at| is_asked(&labelled[at], min_points)) {
                 // Also the second one of the same object.
-                let truth = there.first().and_then(|&at| labelled[at].class);
                 if let Some(&at) = there.first() {
                     answers[at] = answers[at].or(Some(class));
                 }
-                judged.wrong.push(False { class, truth });
+                judged.wrong.push(class);
             }
         }
         for (one, answer) in labelled.iter().zip(answers) {
@@ -101,7 +89,7 @@ mod tests {
 
     fn judged(found: Vec<Thing>, labelled: Vec<Thing>) -> Judged {
         let classes = ["car", "person"].map(str::to_owned).to_vec();
-        judge(&Frames { classes, of: vec![[found, labelled]] }, 0.3, 30)
+        judge(&Frames { classes, of: vec![[found, labelled]] }, 30)
     }
 
     #[test]
@@ -110,20 +98,14 @@ mod tests {
         // 2 m and half a metre ahead of the middle of the car, and beyond; a second one; a person.
         for (x, is_right) in [(12.49, true), (12.51, false)] {
             let found = judged(vec![thing(Some(CAR), x, 0.9, 50)], labelled.clone());
-            assert_eq!(
-                (found.n_right[CAR] == 1, found.wrong.is_empty()),
-                (is_right, is_right),
-                "{x}"
-            );
+            assert_eq!(found.wrong.is_empty(), is_right, "{x}");
             assert_eq!(found.asked[0].answer, is_right.then_some(CAR));
         }
         let twice = vec![thing(Some(CAR), 10.0, 0.9, 50), thing(Some(CAR), 10.5, 0.8, 50)];
-        assert_eq!(judged(twice, labelled.clone()).wrong, [False { class: CAR, truth: Some(CAR) }]);
-        let confused = judged(vec![thing(Some(CAR), 20.0, 0.9, 50)], labelled.clone());
-        assert_eq!(confused.wrong, [False { class: CAR, truth: Some(PERSON) }]);
+        assert_eq!(judged(twice, labelled.clone()).wrong, [CAR]);
+        let confused = judged(vec![thing(Some(CAR), 20.0, 0.9, 50)], labelled);
+        assert_eq!(confused.wrong, [CAR]);
         assert_eq!(confused.asked[1].answer, Some(CAR));
-        let unsure = judged(vec![thing(Some(CAR), 10.0, 0.2, 50)], labelled);
-        assert!(unsure.n_right == [0, 0] && unsure.wrong.is_empty());
     }
 
     #[test]

@@ -25,9 +25,9 @@ fn reported(frames: &Frames) -> Vec<(usize, &str)> {
     names.filter(|(class, name)| STREET.contains(name) || is_found(*class)).collect()
 }
 
-/// The report on `frames`, for detections of `least_score` or more and objects of `min_points` or more.
-pub fn table(frames: &Frames, least_score: f64, min_points: u64) -> String {
-    let judged = judge(frames, least_score, min_points);
+/// The report on `frames`, for objects of `min_points` or more.
+pub fn table(frames: &Frames, min_points: u64) -> String {
+    let judged = judge(frames, min_points);
     let n_frames = judged.n_frames.max(1) as f64;
     let mut text = format!(
         "{:14} {:>14} {:>17} {:>6} {:>8} {:>6} {:>6} {:>6} {:>6}\n",
@@ -35,7 +35,7 @@ pub fn table(frames: &Frames, least_score: f64, min_points: u64) -> String {
     );
     for (class, name) in reported(frames) {
         let asked: Vec<&Asked> = judged.asked.iter().filter(|one| one.class == class).collect();
-        let n_wrong = judged.wrong.iter().filter(|one| one.class == class).count();
+        let n_wrong = judged.wrong.iter().filter(|one| **one == class).count();
         let (share, interval) = found(&asked);
         let precision = OfClass::of(frames, class, min_points);
         let precisions = DISTANCES_M

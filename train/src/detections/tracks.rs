@@ -79,10 +79,13 @@ fn switches(turns: &[Turn]) -> usize {
     n
 }
 
+/// The number of a file, and of a track or of an object in it.
+type Track = (usize, u64);
+
 /// The objects and tracks of a turn, and how similar each two are.
 struct Turn {
-    objects: Vec<u64>,
-    tracks: Vec<u64>,
+    objects: Vec<Track>,
+    tracks: Vec<Track>,
     /// A row for each object.
     similar: Vec<f64>,
 }
@@ -115,7 +118,7 @@ impl Turn {
     }
 
     /// The pairs of objects and tracks whose worth is the greatest together, with their similarity.
-    fn assigned(&self, worth: impl Fn(u64, u64, f64) -> f64) -> Vec<(u64, u64, f64)> {
+    fn assigned(&self, worth: impl Fn(Track, Track, f64) -> f64) -> Vec<(Track, Track, f64)> {
         let (n_rows, n_columns) = (self.objects.len(), self.tracks.len());
         let cells = (0..n_rows).flat_map(|row| (0..n_columns).map(move |column| (row, column)));
         let worths: Vec<f64> = cells
@@ -136,9 +139,9 @@ impl Turn {
 /// How often each object and each track is there, and how often both are where the other is.
 #[derive(Default)]
 struct Counts {
-    objects: BTreeMap<u64, f64>,
-    tracks: BTreeMap<u64, f64>,
-    together: BTreeMap<(u64, u64), f64>,
+    objects: BTreeMap<Track, f64>,
+    tracks: BTreeMap<Track, f64>,
+    together: BTreeMap<(Track, Track), f64>,
 }
 
 impl Counts {
@@ -161,7 +164,7 @@ impl Counts {
     }
 
     /// The share of the time of either that both are together.
-    fn alignment(&self, object: u64, track: u64) -> f64 {
+    fn alignment(&self, object: Track, track: Track) -> f64 {
         let together = self.together.get(&(object, track)).copied().unwrap_or(0.0);
         together / (self.objects[&object] + self.tracks[&track] - together)
     }
@@ -173,11 +176,11 @@ struct Matched {
     n: f64,
     n_objects: f64,
     n_tracks: f64,
-    pairs: BTreeMap<(u64, u64), f64>,
+    pairs: BTreeMap<(Track, Track), f64>,
 }
 
 impl Matched {
-    fn add<'a>(&mut self, turn: &Turn, pairs: impl Iterator<Item = &'a (u64, u64, f64)>) {
+    fn add<'a>(&mut self, turn: &Turn, pairs: impl Iterator<Item = &'a (Track, Track, f64)>) {
         self.n_objects += turn.objects.len() as f64;
         self.n_tracks += turn.tracks.len() as f64;
         for &(object, track, _) in pairs {
@@ -188,7 +191,7 @@ impl Matched {
 
     /// The accuracies of detection and of association.
     fn accuracies(&self, counts: &Counts) -> [f64; 2] {
-        let union = |(object, track): &(u64, u64), n: f64| {
+        let union = |(object, track): &(Track, Track), n: f64| {
             counts.objects[object] + counts.tracks[track] - n
         };
         let of_pairs = self.pairs.iter().map(|(pair, &n)| n * n / union(pair, n).max(1.0));
