@@ -1,6 +1,7 @@
 """The scripts that measure against real data, on simulated data whose truth is known."""
 
 import json
+import re
 import runpy
 import subprocess
 from pathlib import Path
@@ -51,3 +52,15 @@ def test_frames_are_judged_by_class(tmp_path, monkeypatch, capsys):
     cells = rows(monkeypatch, capsys, "by_class.py", *files)["all (3)", "car"]
     found, asked = map(int, cells[2].split(" of "))
     assert asked >= 5 and found > asked / 2 and int(cells[4]) > asked / 2, cells
+
+    # And what is missed or false, as pictures.
+    monkeypatch.syspath_prepend(PEERS)
+    page = tmp_path / "misses.html"
+    rows(monkeypatch, capsys, "misses.py", *files, "--out", page, "--min-confidence", 0.3)
+    told = page.read_text()
+    false = sum(int(n) for n in re.findall(r"<h2>false [a-z-]+: (\d+)", told))
+    missed = int(re.search(r"<h2>missed car: (\d+)|$", told)[1] or 0)
+    cells = rows(monkeypatch, capsys, "by_class.py", *files, "--min-confidence", 0.3)
+    assert missed == asked - int(cells["all (3)", "car"][2].split(" of ")[0])
+    assert false == sum(int(row[5]) for key, row in cells.items() if key[0] == "all (3)")
+    assert told.count("<img src=") == sum(int(n) for n in re.findall(r"<h2>[^<]*: (\d+)", told)) > 0
