@@ -405,3 +405,19 @@ fn clusters_of_few_points_have_no_class() {
     let Counts { clusters, unclassified, .. } = *pipeline.counts();
     assert_eq!((clusters, unclassified), (objects.len() as u64, objects.len() as u64));
 }
+
+/// Only packets in a row without one of the sensor's tell that it is replaced.
+#[test]
+fn foreign_packets_among_those_of_the_sensor_replace_nothing() {
+    let sent = packets(&street(), 5_000, 20);
+    let mut stranger = sent[0];
+    stranger[1205] = 0x28;
+    let mut pipeline = pipeline(&all());
+    for (since_s, packet) in on_time(&sent) {
+        let arrival = Arrival { time_s: START_S + since_s, moment: None };
+        pipeline.take(packet, arrival);
+        (0..100).for_each(|_| pipeline.take(&stranger, arrival));
+    }
+    let Counts { packets, foreign, restarts, .. } = *pipeline.counts();
+    assert_eq!((packets, foreign, restarts), (20, 2000, 0));
+}

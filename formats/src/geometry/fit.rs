@@ -160,4 +160,12 @@ mod tests {
         assert_eq!(point.size_m, [0.0; 3]);
         assert!((point.centre_m[0] - 1.0).abs() < 1e-6 && point.centre_m[2] == 3.0);
     }
+
+    /// Of 602 points, each third is searched.
+    #[test]
+    fn a_box_is_as_high_as_points_that_are_not_searched() {
+        let mut line: Vec<[f32; 3]> = (0..602).map(|i| [0.01 * i as f32, 0.0, 0.0]).collect();
+        (line[301][2], line[302][2]) = (1.5, -0.5);
+        assert_eq!(OrientedBox::around(&line).size_m[2], 2.0);
+    }
 }

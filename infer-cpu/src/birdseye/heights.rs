@@ -105,4 +105,12 @@ mod tests {
         let heights = Heights::of(&[[45.9, -45.9, 7.0], [0.0; 3]], &[Label::Ground; 2]).unwrap();
         assert_eq!(heights.z_m([1e9, -1e9]), 7.0);
     }
+
+    /// Both cells are five away, and both squares are as large.
+    #[test]
+    fn of_cells_that_are_as_near_the_first_counts() {
+        let ground = [[0.5, 5.5, 1.0], [-4.5, 0.5, 2.0]];
+        let heights = Heights::of(&ground, &[Label::Ground; 2]).unwrap();
+        assert_eq!(heights.z_m([0.5, 0.5]), 2.0);
+    }
 }

@@ -141,4 +141,24 @@ mod tests {
         let is_full = |cell: &usize| !image.is_empty(cell / SIDE, cell % SIDE);
         assert_eq!((0..SIDE * SIDE).filter(is_full).collect::<Vec<_>>(), [200 * SIDE + 250]);
     }
+
+    #[test]
+    fn a_height_on_a_border_is_over_it() {
+        for (over, border_m) in (1..).zip(BORDERS_M) {
+            let points = [[0.05, 10.05, 0.0], [0.05, 10.05, border_m]];
+            let labels = [Label::Ground, Label::Small];
+            let image = Image::new(&points, &labels, &Heights::of(&points, &labels).unwrap());
+            assert_eq!(channels(&image, 200, 250)[0], (over, 1.0), "{border_m}");
+        }
+    }
+
+    #[test]
+    fn the_far_edges_are_beyond_the_cells() {
+        assert_eq!([-REACH_M, REACH_M].map(cells_along), [Some(0.0), None]);
+        let points = [[0.5, 0.5, 0.0], [0.0, REACH_M, 1.0], [REACH_M, 0.0, 1.0]];
+        let labels = [Label::Ground, Label::Small, Label::Small];
+        let image = Image::new(&points, &labels, &Heights::of(&points, &labels).unwrap());
+        let is_full = |cell: &usize| !image.is_empty(cell / SIDE, cell % SIDE);
+        assert_eq!((0..SIDE * SIDE).filter(is_full).count(), 1);
+    }
 }

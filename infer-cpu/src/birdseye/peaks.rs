@@ -226,4 +226,29 @@ mod tests {
         let expected = (48..=52).flat_map(|row| (58..=62).map(move |column| row * SIDE + column));
         assert!(cells.eq(expected));
     }
+
+    /// A car of 4 m by 1.6 m, turned by 45 degrees, 1.8 m from the sensor along its length or aside.
+    #[test]
+    fn a_turned_object_holds_the_sensor_along_its_length() {
+        let of_box = [0.0, 0.0, 4f32.ln(), 1.6f32.ln(), 0.4, 0.0, 1.0];
+        let n_seen = |cell: [usize; 2]| {
+            Scores::new(&Told(vec![(cell, 0, 2.0, of_box)]), empty()).objects(0.5).len()
+        };
+        assert_eq!([[206, 206], [206, 193], [193, 193]].map(n_seen), [0, 1, 0]);
+    }
+
+    /// The cell at the end of a row is not beside the first one of the next, nor is one beyond the last row.
+    #[test]
+    fn nothing_is_beyond_the_last_cells() {
+        assert_eq!(seen(&[([200, 399], 1, 2.0), ([202, 0], 1, 3.0)]).len(), 2);
+        assert_eq!(seen(&[([399, 200], 1, 2.0), ([399, 399], 1, 2.0)]).len(), 1);
+    }
+
+    #[test]
+    fn what_holds_the_sensor_hides_nothing_beside_it() {
+        let of_box = [0.0, 0.0, 4f32.ln(), 1.6f32.ln(), 0.4, 1.0, 0.0];
+        let told = vec![([203, 200], 0, 3.0, of_box), ([203, 206], 0, 2.0, of_box)];
+        let found = Scores::new(&Told(told), empty()).objects(0.5);
+        assert!(found.len() == 1 && found[0].centre_m[1] > 1.0, "{found:?}");
+    }
 }

@@ -132,4 +132,14 @@ mod tests {
         let ground = Heights::of(&points, &labels).unwrap();
         assert_eq!(Standing::new(&points, &labels, &ground).of(&seen(0, 0.0)), [1, 2]);
     }
+
+    /// Of a small person at the border of a cell, in the next one.
+    #[test]
+    fn the_points_of_a_person_are_found_beyond_its_box() {
+        let person = Seen { centre_m: [10.47, -4.5], size_m: [0.5, 0.5, 1.7], ..seen(PERSON, 0.0) };
+        let points = [[10.47, -4.5, 0.0], [11.01, -4.5, 1.0], [11.03, -4.5, 1.0]];
+        let labels = [Label::Ground, Label::Small, Label::Small];
+        let ground = Heights::of(&points, &labels).unwrap();
+        assert_eq!(Standing::new(&points, &labels, &ground).of(&person), [1]);
+    }
 }

@@ -104,9 +104,11 @@ fn dense(image: &Image) -> Vec<f64> {
     all
 }
 
-/// The outputs of the network, [row, column, output], by its definition.
-fn expected(image: &Image, tensors: &Tensors) -> Vec<f64> {
+/// The outputs of the network, [row, column, output], by its definition, and a card with the largest output of
+/// each step.
+fn expected(image: &Image, tensors: &Tensors) -> (Vec<f64>, ModelCard) {
     let mut results: Vec<(usize, Vec<f64>)> = Vec::new();
+    let mut calibrated = card(1.0);
     for (number, step) in STEPS.iter().enumerate() {
         let result = match step.of {
             Of::Image => convolved(&(SIDE, dense(image)), CHANNELS, 1, step.name, tensors),
@@ -126,9 +128,11 @@ fn expected(image: &Image, tensors: &Tensors) -> Vec<f64> {
         results.push(result);
         if number != HEAD {
             results[number].1.iter_mut().for_each(|value| *value = value.max(0.0));
+            let largest = results[number].1.iter().fold(0.0f64, |largest, x| largest.max(*x));
+            calibrated.activation_ranges.insert(step.name.to_owned(), largest as f32);
         }
     }
-    results.pop().unwrap().1
+    (results.pop().unwrap().1, calibrated)
 }
 
 fn convolved(
@@ -167,6 +171,23 @@ fn outputs(network: &BirdsEye, image: Image) -> Vec<f64> {
     all
 }
 
+/// The network that is written out has the same steps: what they join is told here once more, as in
+/// `python/training/birdseye`.
+#[test]
+fn each_step_takes_the_one_before_and_sums_the_last_of_their_scale_on_the_way_down() {
+    let mut sums = Vec::new();
+    for (number, step) in STEPS.iter().enumerate() {
+        match step.of {
+            Of::Image => assert_eq!(number, 0),
+            Of::Conv { from, .. } => assert_eq!(from, number - 1, "{}", step.name),
+            Of::Sum { whole, half } => {
+                sums.push([step.name, STEPS[whole].name, STEPS[half].name]);
+            }
+        }
+    }
+    assert_eq!(sums, [["sum3", "c2", "up3"], ["sum2", "b2", "up2"], ["sum1", "a1", "up1"]]);
+}
+
 /// In f32 the sums of up to 423 products of numbers about 1 are off by less than 1e-4 after 19 layers. int8
 /// has 127 steps up to the range of a layer, and its error is a small part of the outputs' spread.
 #[test]
@@ -175,16 +196,16 @@ fn a_sweep_has_the_outputs_of_the_network_written_out() {
     let (points, labels) = sweep();
     let ground = Heights::of(&points, &labels).unwrap();
     let image = || Image::new(&points, &labels, &ground);
-    let expected = expected(&image(), &tensors());
+    let (expected, calibrated) = expected(&image(), &tensors());
     let mean = expected.iter().sum::<f64>() / expected.len() as f64;
     let spread = |off: &dyn Fn(usize) -> f64| {
         ((0..expected.len()).map(|i| off(i).powi(2)).sum::<f64>() / expected.len() as f64).sqrt()
     };
     let usual = spread(&|i| expected[i] - mean);
     assert!(usual > 0.1, "{usual}");
-    let path = written(folder.path(), &tensors(), &card(12.0));
+    let path = written(folder.path(), &tensors(), &calibrated);
     for threads in [1, 3] {
-        for (precision, most) in [(Precision::F32, 1e-4), (Precision::I8, 0.15 * usual)] {
+        for (precision, most) in [(Precision::F32, 1e-4), (Precision::I8, 0.03 * usual)] {
             let options = Options { precision, threads, ..Options::default() };
             let network = loaded(&path, &options).unwrap();
             // The second sweep finds the memory of another one.
@@ -218,12 +239,24 @@ fn a_file_that_lacks_a_part_or_has_another_is_refused() {
     assert!(shape.contains("layer `b2`: expected shapes [n, 8, 3, 3] and [n]"), "{shape}");
     let nan = changed(&|all| all.get_mut("up3.bias").unwrap().values[0] = f32::NAN);
     assert!(nan.contains("tensor `up3.bias`: element 0 is NaN"), "{nan}");
+    let sum = changed(&|all| {
+        let layer = [("weight", vec![7, 12, 1, 1]), ("bias", vec![7])];
+        for (part, shape) in layer {
+            let values = vec![0.0; shape.iter().product()];
+            all.insert(format!("up3.{part}"), Tensor { shape, values });
+        }
+    });
+    assert!(sum.contains("layer `up3`: expected 8 outputs, found 7"), "{sum}");
     let unknown = Tensor { shape: vec![1], values: vec![0.0] };
     let unknown = changed(&|all| drop(all.insert("b3.bias".to_owned(), unknown.clone())));
     assert!(unknown.contains("no layer takes a tensor of this name"), "{unknown}");
     let no_ranges = ModelCard { activation_ranges: BTreeMap::new(), ..card(1.0) };
     let no_range = refused(&tensors(), &no_ranges);
     assert!(no_range.contains("no range in `activation_ranges`"), "{no_range}");
+    for range in [0.0, -1.0] {
+        let no_range = refused(&tensors(), &card(range));
+        assert!(no_range.contains("no range in `activation_ranges`"), "{range}: {no_range}");
+    }
     let mut fewer = card(1.0);
     fewer.classes.pop();
     let fewer = refused(&tensors(), &fewer);

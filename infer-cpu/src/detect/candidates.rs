@@ -167,4 +167,37 @@ mod tests {
         let boxes: Vec<_> = all.iter().filter(|one| !one.is_cluster).collect();
         assert!(!boxes.is_empty() && boxes.iter().all(|one| one.seen.len() == 1));
     }
+
+    #[test]
+    fn a_cluster_needs_less_of_a_score_than_a_box() {
+        let joint = Confidence::of_clusters(&[true; 4]);
+        for (score, n) in [(0.029f32, 0), (0.031, 1)] {
+            let scores = Told::scores(&[([250, 200], 0, (score / (1.0 - score)).ln())]);
+            assert_eq!(seen_near(&scores, &joint, [10.1, 0.1], 5.0, false).len(), n, "{score}");
+        }
+    }
+
+    /// Two persons of 30 points behind 40 points of ground: parts have the numbers of the sweep.
+    #[test]
+    fn candidates_have_the_least_number_of_points_or_more() {
+        let ground = (0..40).map(|i| [0.3 * i as f32 - 2.0, 0.0, -1.6]);
+        let column = |x: f32| (0..30).map(move |i| [x, 0.02 * i as f32, -0.5]);
+        let points: Vec<_> = ground.chain(column(8.0)).chain(column(8.2)).collect();
+        let labels: Vec<_> =
+            (0..100).map(|i| if i < 40 { Label::Ground } else { Label::Cluster(0) }).collect();
+        let heights = Heights::of(&points, &labels).unwrap();
+        let joint = Confidence::of_clusters(&[true; 4]);
+        for (min_points, expected) in [(30, &[(40, 30), (40, 60), (70, 30)][..]), (31, &[(40, 60)])]
+        {
+            let told = [[240, 201], [241, 201]].map(|at| (at, 1, 2.0, [0.0; 7])).to_vec();
+            let birdseye = BirdsEye { network: Box::new(Told(told)) };
+            let mut candidates = Candidates::new(birdseye, min_points).unwrap();
+            let cluster = [(40..100).collect()].into_iter();
+            let all = candidates.of(&points, &labels, cluster, &heights, &joint);
+            let clusters = all.iter().filter(|one| one.is_cluster);
+            let mut found: Vec<_> = clusters.map(|one| (one.points[0], one.points.len())).collect();
+            found.sort();
+            assert_eq!(found, expected, "{min_points}");
+        }
+    }
 }

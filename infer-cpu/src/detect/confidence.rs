@@ -170,4 +170,15 @@ mod tests {
         let (_, confidence) = joint.of(&seen(0, 0.0), false, &answer(&[99.0, 0.0, 0.0, 0.0]));
         assert!(confidence > 0.0 && confidence < 1e-11, "{confidence}");
     }
+
+    #[test]
+    fn no_answer_exceeds_the_most_if_the_weight_of_answers_is_negative() {
+        let of_asked = vec![(0, "car".to_owned())];
+        let joint =
+            Confidence { classes: vec![Class { of_asked, weights: vec![[0.0, 1.0, -1.0]] }] };
+        let seen =
+            Seen { class: 0, score: 0.5, centre_m: [0.0; 2], size_m: [1.0; 3], yaw_rad: 0.0 };
+        let doubted = joint.of(&seen, false, &answer(&[0.0, 99.0])).1;
+        assert!((joint.at_most(&seen, false) - doubted).abs() < 1e-9, "{doubted}");
+    }
 }

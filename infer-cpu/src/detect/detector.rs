@@ -335,4 +335,39 @@ mod tests {
         let few_rings = Sweep { points: &[[1.0; 3]; 2], rings: Some(&[0]) };
         assert!(matches!(detector(20).detect(&few_rings), Err(DetectError::Sweep(_))));
     }
+
+    #[test]
+    fn a_candidate_that_is_dropped_takes_no_points() {
+        let all = vec![
+            candidate("car", 0.8, 40, 100),
+            candidate("car", 0.7, 100, 40),
+            candidate("car", 0.9, 0, 100),
+        ];
+        let chosen = detector(20).choose(all, 1000).into_iter();
+        let chosen: Vec<_> = chosen.map(|one| (one.confidence, one.points.len())).collect();
+        assert_eq!(chosen, [(0.9, 100), (0.7, 40)]);
+    }
+
+    /// A cluster is asked about if one of the answers may be sure enough, and is a car of no impossible size.
+    #[test]
+    fn one_possible_answer_of_a_cluster_suffices() {
+        let (points, _) = sweep();
+        let mut detector = detector(20);
+        let seen = |score: f32, length_m: f32| {
+            let (centre_m, size_m) = ([8.0, 0.0], [length_m, 1.6, 1.5]);
+            Seen { class: 0, score, centre_m, size_m, yaw_rad: 0.0 }
+        };
+        let most = [0.1, 0.6].map(|score| detector.joint.at_most(&seen(score, 4.0), true));
+        let mut n_named = |min_confidence: f64, seen: Vec<Seen>| {
+            detector.min_confidence = min_confidence;
+            let points_of = (0..100).collect();
+            let one = Candidate { points: points_of, ground_z_m: -1.2, seen, is_cluster: true };
+            detector.named(&points, vec![one]).len()
+        };
+        let between = most[0].midpoint(most[1]);
+        assert_eq!(n_named(between, vec![seen(0.1, 4.0)]), 0);
+        assert_eq!(n_named(between, vec![seen(0.1, 4.0), seen(0.6, 4.0)]), 1);
+        assert_eq!(n_named(0.0, vec![seen(0.6, 9.0)]), 0);
+        assert_eq!(n_named(0.0, vec![seen(0.6, 9.0), seen(0.1, 4.0)]), 1);
+    }
 }

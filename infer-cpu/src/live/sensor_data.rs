@@ -28,3 +28,18 @@ impl SensorData {
         self.decoder.elevations_deg().len() * ROOM_PER_RING
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A VLP-32C fires each laser every 55.296 us, turns 5 times per second at least, and has two returns.
+    #[test]
+    fn there_is_room_for_the_slowest_turn_with_dual_returns() {
+        let mut packet = [0; 1206];
+        packet[..1200].chunks_mut(100).for_each(|block| block[..2].copy_from_slice(&[0xff, 0xee]));
+        packet[1204..].copy_from_slice(&[0x39, 0x28]);
+        let sensor = SensorData::new(&packet, &LiveOptions::default()).unwrap();
+        assert!(sensor.capacity() as f64 > 32.0 * 2.0 * 200_000.0 / 55.296);
+    }
+}

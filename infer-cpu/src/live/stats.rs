@@ -113,4 +113,16 @@ mod tests {
         assert_eq!(stats.per_turn(), [5.0, 0.0]);
         assert!(near(stats.latency_ms(1.0).unwrap(), 20.0));
     }
+
+    /// On a slow machine, or if packets wait.
+    #[test]
+    fn durations_of_many_seconds_count() {
+        let mut stats = Stats::new();
+        stats.spend(Stage::Detect, Duration::from_secs(3));
+        stats.end_turn(&Counts::default(), true);
+        stats.answered_after(Duration::from_secs(30));
+        let near = |found: f64, expected: f64| (found - expected).abs() <= 0.01 * expected;
+        assert!(near(stats.mean_ms(Stage::Detect), 3e3), "{}", stats.mean_ms(Stage::Detect));
+        assert!(near(stats.latency_ms(0.5).unwrap(), 30e3), "{:?}", stats.latency_ms(0.5));
+    }
 }

@@ -278,4 +278,45 @@ mod tests {
         turn.rectify(&Trajectory::new(poses.to_vec()).unwrap());
         assert_eq!(first(&turn), [0.0 - 6.0, 1.0 - 4.0, 2.0 - 2.0, 3.0]);
     }
+
+    /// A packet that goes on behind such a sector 100 microseconds after its first firing.
+    #[test]
+    fn returns_from_the_end_of_a_sector_on_are_of_the_next_turn() {
+        let mut turns = Turns::new(100);
+        turned(&mut turns, 0..3);
+        let facts = Facts {
+            stamp_us: 0.0,
+            duration_us: 200.0,
+            azimuth_rad: 90f64.to_radians(),
+            speed_rad_us: 0.0,
+            n_unsent: 0,
+            n_unsent_before: 0,
+            resumes: Some((100.0, 0.0)),
+        };
+        let kind = formats::returns::Kind::Last;
+        let found = [(3.0, 99.0), (4.0, 100.0), (5.0, 101.0)].map(|(x, after_us)| Return {
+            point_m: [x; 3],
+            range_m: x,
+            ring: 0,
+            reflectivity: 0,
+            after_us,
+            kind,
+        });
+        turns.add(&facts, &found, (Tag::default(), false));
+        turns.end();
+        assert_eq!(taken(&mut turns), [(0, steps(0..4)), (1, steps(4..6))]);
+    }
+
+    #[test]
+    fn the_memory_of_a_last_turn_is_used_again_for_others() {
+        let mut turns = Turns::new(100);
+        turned(&mut turns, 0..5);
+        assert!(!turns.break_off());
+        let last = turns.take().unwrap();
+        assert!(last.is_last);
+        turns.give_back(last);
+        turned(&mut turns, 0..25);
+        let is_last = std::iter::from_fn(|| turns.take().map(|turn| turn.is_last));
+        assert_eq!(is_last.collect::<Vec<_>>(), [false, false]);
+    }
 }

@@ -4,7 +4,7 @@
 
 Logistic regression on candidates as `detect` has them, in labelled sweeps of real sensors (those of xtask/lab/peers/by_class.py). First it
 leaves out one source of sweeps after the other, and prints what the others' weights find in it, by the least confidence; then it
-fits the weights to all. Classes of which the sweeps show too few are fitted to boxes in SCENES, on which the network was not trained.
+fits the weights to all. For classes of which the sweeps show too few, boxes in SCENES, on which the network was not trained, are added.
 """
 
 import argparse
@@ -232,12 +232,12 @@ def main() -> None:
     net.eval()
     wanted: Counter = Counter()
     all_of = [one for file in flags.frames for one in judged(file, net, asked, wanted)]
-    rare = weights_of([one for file in flags.scenes for one in simulated(file, net, asked)])
+    of_scenes = [one for file in flags.scenes for one in simulated(file, net, asked)]
     for source in sorted({one.source for one in all_of}):
         rest = [one for one in all_of if one.source != source]
-        tell(weights_of(rest) | rare, [one for one in all_of if one.source == source])
+        tell(weights_of(rest + of_scenes), [one for one in all_of if one.source == source])
     table(all_of, wanted, len(flags.frames))
-    weights = weights_of(all_of) | rare
+    weights = weights_of(all_of + of_scenes)
     flags.out.write_text(json.dumps(weights) + "\n")
     print(weights)
 

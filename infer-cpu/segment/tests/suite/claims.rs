@@ -31,3 +31,15 @@ fn objects_come_first_and_others_keep_half_of_their_points() {
         assert_eq!(label, own.map_or(Label::Small, |number| Label::Cluster(number as u32)));
     }
 }
+
+/// The second of two posts loses 10 of its 30 points.
+#[test]
+fn a_later_cluster_keeps_half_of_its_own_points() {
+    let points: Vec<_> = post(5.0, 30).chain(post(9.0, 30)).collect();
+    let mut segmenter = Segmenter::new(Settings::default()).unwrap();
+    segmenter.segment(&Sweep { points: &points, rings: None }).unwrap();
+    let object: Vec<u32> = (30..40).collect();
+    segmenter.claim([(&object[..], None)].into_iter());
+    let n_points = segmenter.segmentation().clusters().map(|one| one.points.len());
+    assert_eq!(n_points.collect::<Vec<_>>(), [10, 30, 20]);
+}
