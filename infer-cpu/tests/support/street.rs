@@ -27,19 +27,30 @@ pub struct Thing {
 }
 
 impl Thing {
+    /// The nearest of a beam's hits on its boxes: a car is a body and a narrower cabin upon it.
     fn distance(&self, beam: [f64; 3], time_s: f64) -> Option<f64> {
         let middle = [0, 1].map(|i| self.at[i] + time_s * self.velocity[i]);
         let [length, width, height] = self.size;
-        let low = [middle[0] - length / 2.0, middle[1] - width / 2.0, -HEIGHT_M];
-        let high = [middle[0] + length / 2.0, middle[1] + width / 2.0, height - HEIGHT_M];
-        let (mut enter, mut leave) = (0.0f64, f64::INFINITY);
-        for axis in 0..3 {
-            let ends = [low[axis] / beam[axis], high[axis] / beam[axis]];
-            enter = enter.max(ends[0].min(ends[1]));
-            leave = leave.min(ends[0].max(ends[1]));
+        if length < 2.0 {
+            return distance_of_box(middle, self.size, beam);
         }
-        (enter <= leave && leave > 0.0).then_some(enter)
+        let boxes = [[length, width, 0.7 * height], [0.55 * length, 0.85 * width, height]];
+        boxes.into_iter().filter_map(|size| distance_of_box(middle, size, beam)).reduce(f64::min)
     }
+}
+
+/// Where a beam enters a box that stands on the street.
+fn distance_of_box(middle: [f64; 2], size: [f64; 3], beam: [f64; 3]) -> Option<f64> {
+    let [length, width, height] = size;
+    let low = [middle[0] - length / 2.0, middle[1] - width / 2.0, -HEIGHT_M];
+    let high = [middle[0] + length / 2.0, middle[1] + width / 2.0, height - HEIGHT_M];
+    let (mut enter, mut leave) = (0.0f64, f64::INFINITY);
+    for axis in 0..3 {
+        let ends = [low[axis] / beam[axis], high[axis] / beam[axis]];
+        enter = enter.max(ends[0].min(ends[1]));
+        leave = leave.min(ends[0].max(ends[1]));
+    }
+    (enter <= leave && leave > 0.0).then_some(enter)
 }
 
 /// A parked car, a car that drives by and a walking person.
