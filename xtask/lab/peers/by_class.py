@@ -1,6 +1,6 @@
 """What `detect` finds in labelled sweeps of real sensors, by class: all classes, with what it takes for each of them.
 
-    python xtask/lab/peers/by_class.py FRAME.npz... [--min-confidence 0.5]
+    python xtask/lab/peers/by_class.py FRAME.npz... [--min-confidence 0.5] [--precision i8]
 
 It needs the package edgepuck and NumPy. A frame holds `xyz_mm`, `boxes` (centre, length, width, height, yaw), and `classes`
 (of KITTI or Argoverse 2) or `cls` (1 car, 2 person, 3 two-wheeler, 4 truck, 5 bus, 6 not judged), and as JSON in `meta` the
@@ -67,11 +67,11 @@ class Outcome:
     confidence: float | None = None
 
 
-def outcomes(sweep, least):
+def outcomes(sweep, least, precision="f32"):
     """What `detect` finds and misses in a sweep of `read`."""
     points, rings, boxes, names, half, _ = sweep
     cloud = points.astype(np.float32)
-    found = ep.detect(cloud, rings=rings, min_confidence=least)
+    found = ep.detect(cloud, rings=rings, min_confidence=least, precision=precision)
     is_ground = ep.segment(cloud, rings=rings) == -1
     is_judged = lambda at: np.hypot(*at[:2]) <= 40 and abs(np.arctan2(at[1], at[0])) <= half
     for box, name in zip(boxes, names):
@@ -91,10 +91,10 @@ def outcomes(sweep, least):
             yield Outcome("false", one.label, one.indices, truth, one.confidence)
 
 
-def judge(file, least, tally):
+def judge(file, least, tally, precision="f32"):
     """Counts the outcomes of a sweep in `tally[sensor, class]`; gives the sensor."""
     sweep = read(file)
-    for one in outcomes(sweep, least):
+    for one in outcomes(sweep, least, precision):
         counted = tally[sweep[-1], one.label]
         counted[one.kind] += 1
         counted["asked"] += one.kind in ("found", "missed")
@@ -114,9 +114,10 @@ def main():
     flags = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     flags.add_argument("frames", type=Path, nargs="+")
     flags.add_argument("--min-confidence", type=float, default=0.5)
+    flags.add_argument("--precision", choices=["f32", "i8"], default="f32")
     asked = flags.parse_args()
     tally = defaultdict(Counter)
-    frames = Counter(judge(file, asked.min_confidence, tally) for file in asked.frames)
+    frames = Counter(judge(file, asked.min_confidence, tally, asked.precision) for file in asked.frames)
     for (sensor, name), one in list(tally.items()):
         tally["all", name].update(one)
     frames["all"] = frames.total()
