@@ -12,7 +12,7 @@ import edgepuck as ep
 
 torch = pytest.importorskip("torch")
 pytest.importorskip("scipy")
-pytest.importorskip("safetensors")
+safe_open = pytest.importorskip("safetensors").safe_open
 sys.path.append(str(ROOT / "python/training/birdseye"))
 import export  # noqa: E402
 import grid  # noqa: E402
@@ -46,7 +46,14 @@ def test_detect_sees_what_the_network_sees(tmp_path: Path, monkeypatch: pytest.M
     files = [tmp_path / name for name in ("random.pt", "random.safetensors", "scenes.npz")]
     words = ["export", *files, "--set", "none", "--confidence", tmp_path / "confidence.json"]
     monkeypatch.setattr(sys, "argv", list(map(str, words)))
+    # Ranges of a thousandth would clip nearly all outputs.
+    monkeypatch.setattr(export, "SHARES", (0.001, 0.5))
+    largest = export.ranges(net, export.images([tmp_path / "scenes.npz"]))
     export.main()
+    with safe_open(tmp_path / "random.safetensors", "numpy") as file:
+        chosen = json.loads(file.metadata()["activation_ranges"])
+    halved = [step for step in largest if abs(chosen[step] / largest[step] - 0.5) < 1e-3]
+    assert halved == list(export.CHOSEN)
 
     over = grid.heights(points, labels == -1)
     seen = np.column_stack([points[:, :2], over, labels == -1]).astype(np.float32)

@@ -53,6 +53,7 @@ def images(files: list[Path]) -> list[Tensor]:
     return found
 
 
+@torch.no_grad()
 def ranges(net: BirdsEye, images: list[Tensor]) -> dict[str, float]:
     """The largest output of each step, but for few."""
     largest: dict[str, float] = {}
@@ -74,6 +75,7 @@ def ranges(net: BirdsEye, images: list[Tensor]) -> dict[str, float]:
     return largest
 
 
+@torch.no_grad()
 def choose(net: BirdsEye, images: list[Tensor], largest: dict[str, float]) -> None:
     """Replaces the ranges of the first steps in `largest` by those of the least error of scores."""
     logits = lambda image: net(image)[0, :N_CLASSES]
