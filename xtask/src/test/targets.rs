@@ -44,11 +44,19 @@ const SELDOM: [(&str, &str, Check); 4] = [
 /// The code that depends on the processor, with its unit tests.
 const KERNELS: [&str; 3] = ["--package", "edgepuck-kernels", "--lib"];
 
-/// The classifier as a library, and the tests of its logits: they are PyTorch's, whether or not the
-/// processor flushes subnormal numbers. All other tests run natively only, but
+/// The classifier and the detector as a library, and the tests of logits: they are PyTorch's, whether or not
+/// the processor flushes subnormal numbers. All other tests run natively only, but
 /// tests/peers/debian_package.py emulates the program.
-const CLASSIFIER: [&str; 6] =
-    ["--package", "infer-cpu", "--no-default-features", "--lib", "--test", "suite"];
+const CLASSIFIER: [&str; 8] = [
+    "--package",
+    "infer-cpu",
+    "--no-default-features",
+    "--features",
+    "detect,bundled",
+    "--lib",
+    "--test",
+    "suite",
+];
 
 pub fn build_meanwhile() -> anyhow::Result<Meanwhile> {
     ensure!(standard_library(pi_target::TRIPLE)?.is_dir(), "there is no standard library for it");
