@@ -13,8 +13,9 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from grid import CELL_M, NAMES, REACH_M, raster
+from grid import NAMES, REACH_M, raster
 from network import N_CLASSES, BirdsEye
+from peaks import SIDE
 from safetensors.torch import save_file
 from torch import Tensor, nn
 from train import Scenes
@@ -46,10 +47,10 @@ def folded(block: nn.Module) -> tuple[Tensor, Tensor]:
 
 def images(files: list[Path]) -> list[Tensor]:
     """The sweeps that are looked at, seen from above."""
-    side, found = int(2 * REACH_M / CELL_M), []
+    found = []
     for scenes in map(Scenes, files):
         for number in np.unique(np.linspace(0, len(scenes) - 1, -(-N_SWEEPS // len(files))).astype(int)):
-            found.append(torch.from_numpy(raster(scenes.sweep(number)[0], -REACH_M, -REACH_M, side))[None])
+            found.append(torch.from_numpy(raster(scenes.sweep(number)[0], -REACH_M, -REACH_M, SIDE))[None])
     return found
 
 
@@ -97,7 +98,7 @@ def choose(net: BirdsEye, images: list[Tensor], largest: dict[str, float]) -> No
         net.get_submodule(PARTS[step]).register_forward_hook(lambda _, __, out, step=step: rounded(step, out)) for step in CHOSEN
     ]
     for step in ROUNDS * CHOSEN:
-        errors = {share * largest[step]: error(step, share * largest[step]) for share in SHARES}
+        errors = {range_: error(step, range_) for range_ in (share * largest[step] for share in SHARES)}
         tried[step] = min(errors, key=errors.__getitem__)
         print(f"{step}: {tried[step]:.3f} of {largest[step]:.3f}, an error of {errors[tried[step]]:.3f}", flush=True)
     for hook in hooks:
@@ -105,7 +106,6 @@ def choose(net: BirdsEye, images: list[Tensor], largest: dict[str, float]) -> No
     largest.update(tried)
 
 
-@torch.no_grad()
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("checkpoint", type=Path)
